@@ -82,7 +82,9 @@ def diagnoses() -> Iterator[Diagnosis]:
         return
     yield from _folders(deployment)
     yield _robot(deployment)
-    if deployment.wire is Wire.SERIAL:
+    if not _has_gateway(deployment):
+        yield Diagnosis(Verdict.OK, "wire", "the gateway is on another host of the site, and the device's wire with it")
+    elif deployment.wire is Wire.SERIAL:
         yield serial_port(deployment.serial.device)
     else:
         yield broker(deployment.mqtt)
@@ -90,6 +92,11 @@ def diagnoses() -> Iterator[Diagnosis]:
     yield router
     if router.verdict is Verdict.OK:
         yield from _twin()
+
+
+def _has_gateway(deployment: Deployment) -> bool:
+    """False on a host of a site whose gateway runs elsewhere: only that one's host has its certificate."""
+    return not deployment.router.tls or Path(deployment.router.ca).with_name("gateway.pem").exists()
 
 
 def _machine() -> Iterator[Diagnosis]:

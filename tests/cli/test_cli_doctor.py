@@ -74,6 +74,31 @@ def test_the_doctor_says_why_a_broker_does_not_let_the_gateway_in(tmp_path: Path
     assert "are its address and port right" in away.found
 
 
+@pytest.mark.parametrize("wire", ["mqtt", "serial"])
+def test_where_a_sites_gateway_is_on_another_host_the_devices_wire_is_no_matter_here(wire, monkeypatch, tmp_path: Path):
+    file, keys = tmp_path / "rm1.toml", tmp_path / "keys"
+    keys.mkdir()
+    file.write_text(f"""robot = "urdf/rm1"
+wire = "{wire}"
+[router]
+port = 1
+tls = true
+ca = "{keys}/ca.pem"
+[mqtt]
+broker = "external"
+port = 1
+secure_folder = "{tmp_path}/broker"
+[serial]
+device = "/dev/nobody"
+""")
+    monkeypatch.setenv("GEMELO_CONFIG", str(file))
+    found = {each.subject: each for each in doctor.diagnoses()}
+    assert found["wire"].verdict is doctor.Verdict.OK
+    (keys / "gateway.pem").touch()
+    found = {each.subject: each for each in doctor.diagnoses()}
+    assert found["broker" if wire == "mqtt" else "serial port"].verdict is doctor.Verdict.ERROR
+
+
 def test_the_doctor_says_that_a_folder_cannot_be_written(monkeypatch, tmp_path: Path, capsys):
     monkeypatch.setenv("GEMELO_PATHS_OUT", str(tmp_path))
     monkeypatch.setenv("GEMELO_ROUTER_PORT", "1")

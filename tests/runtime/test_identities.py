@@ -114,7 +114,7 @@ def test_a_name_that_is_no_role_may_nothing(router):
 def test_tls_without_one_of_its_files_is_refused_by_name(lock, name):
     section = lock.section("operator", 1)
     require_certificate(section)
-    with pytest.raises(BusError, match=f"router.tls is set, but router.{name} is not"):
+    with pytest.raises(BusError, match=f"router.tls is set, but router.{name} is not: .* gives the host `roles`"):
         require_certificate(msgspec.structs.replace(section, **{name: ""}))
     with pytest.raises(BusError, match=f"router.{name}: cannot read /nowhere"):
         require_certificate(msgspec.structs.replace(section, **{name: "/nowhere"}))

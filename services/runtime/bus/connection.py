@@ -58,7 +58,8 @@ def require_certificate(router: RouterSection) -> None:
     for name in ("ca", "certificate", "key"):
         path = getattr(router, name)
         if not path:
-            raise BusError(f"router.tls is set, but router.{name} is not: `gemelo deploy keys` makes the files")
+            made = "`gemelo deploy keys` makes the files, for people where the site's file gives the host `roles`"
+            raise BusError(f"router.tls is set, but router.{name} is not: {made}")
         if not os.access(path, os.R_OK):
             raise BusError(f"router.{name}: cannot read {path}: `gemelo deploy keys` makes it")
     require_private(router.key)
