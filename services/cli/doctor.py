@@ -18,13 +18,14 @@ from schemas.deployment import Deployment, MqttSection, Wire
 from schemas.device import DeviceState, DeviceStatus
 from schemas.device_faults import fault_text
 from schemas.errors import ConfigurationError
+from schemas.system import NodeInfo
 from schemas.topics import DEVICE_STATE, DEVICE_STATUS
 from services.cli.errors import CommandError, ExitCode
 from services.cli.node import TIMEOUT, living
 from services.cli.parser import Options
 from services.cli.session import Session, connect
 from services.cli.text_table import table
-from services.cli.version import version_text
+from services.cli.version import gemelo_version, version_text
 from services.credentials.private_files import AccessError
 from services.mqtt.access import gateway_access
 from services.runtime.clock_offset import ClockOffset
@@ -192,20 +193,31 @@ def twin(session: Session) -> Iterator[Diagnosis]:
     nodes, up = living(session), when_silent(session.deployment.router.host)
     yield Diagnosis(Verdict.OK if nodes else Verdict.ERROR, "nodes", ", ".join(nodes) or "none", "" if nodes else up)
     yield device(statuses[-1] if statuses else None, states[-1] if states else None, up)
-    yield clocks(_offsets(session, nodes))
+    told = _told(session, nodes)
+    yield versions({name: info for name, (info, _) in told.items()})
+    yield clocks({name: clock for name, (_, clock) in told.items() if clock is not None})
 
 
-def _offsets(session: Session, nodes: Iterable[str]) -> dict[str, ClockOffset]:
+def _told(session: Session, nodes: Iterable[str]) -> dict[str, tuple[NodeInfo, ClockOffset | None]]:
+    """What each node says of itself, and its clock."""
     from services.runtime.errors import NoAnswer  # 0.1 s, for a twin that runs
     from services.runtime.node_clock import ask_about
 
     found = {}
     for name in nodes:
         with suppress(NoAnswer):  # that it is silent, `gemelo node list` says
-            _, clock = ask_about(session.node, name, TIMEOUT)
-            if clock is not None:
-                found[name] = clock
+            found[name] = ask_about(session.node, name, TIMEOUT)
     return found
+
+
+def versions(infos: Mapping[str, NodeInfo]) -> Diagnosis:
+    """Whether every node runs the version of gemelo that this command is of."""
+    own = gemelo_version()
+    others = [f"{name} {info.version} on {info.host}" for name, info in infos.items() if info.version != own]
+    if not others:
+        return Diagnosis(Verdict.OK, "versions of the nodes", f"{len(infos)} nodes run {own}, as this command")
+    remedy = "put one version on every host (`make setup` there), and start its nodes anew"
+    return Diagnosis(Verdict.WARNING, "versions of the nodes", f"{', '.join(others)}; this command is {own}", remedy)
 
 
 def device(status: DeviceStatus | None, state: DeviceState | None, up: str) -> Diagnosis:

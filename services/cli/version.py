@@ -19,8 +19,12 @@ def run(options: Options) -> ExitCode:
 
 def version_text() -> str:
     """The three versions as one line."""
+    return f"gemelo {gemelo_version()}, wire protocol {WIRE_PROTOCOL}, Python {platform.python_version()}"
+
+
+def gemelo_version() -> str:
+    """That of the package."""
     try:
-        gemelo = version("gemelo")
+        return version("gemelo")
     except PackageNotFoundError:
-        gemelo = "(not installed)"
-    return f"gemelo {gemelo}, wire protocol {WIRE_PROTOCOL}, Python {platform.python_version()}"
+        return "(not installed)"

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import platform
+import re
 from contextlib import closing
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
 from schemas.device import DeviceState, DeviceStatus
+from schemas.system import NodeInfo
 from services.cli import doctor
 from services.cli.errors import ExitCode
 from services.cli.main import run
@@ -29,6 +33,7 @@ def test_the_doctor_finds_a_twin_that_is_well(session, stack):
     assert found["nodes"].verdict is doctor.Verdict.OK
     assert found["device"].found == "rm1 is online"
     assert found["clocks"].verdict is doctor.Verdict.OK
+    assert found["versions of the nodes"].verdict is doctor.Verdict.OK
 
 
 def test_the_doctor_without_a_twin_says_what_would_do(monkeypatch, capsys):
@@ -42,6 +47,43 @@ def test_the_doctor_without_a_twin_says_what_would_do(monkeypatch, capsys):
     assert "twin" not in found
 
 
+def test_the_doctor_says_what_versions_are_installed(monkeypatch, capsys):
+    monkeypatch.setenv("GEMELO_ROUTER_PORT", "1")
+    run(["doctor"])
+    (line,) = [each for each in capsys.readouterr().out.splitlines() if " versions " in each]
+    for words in (f"gemelo {version('gemelo')}", "wire protocol 1", f"Python {platform.python_version()}"):
+        assert words in line
+    assert line.split()[0] == "ok"
+
+
+@pytest.mark.parametrize(
+    ("limit", "plenty", "nothing_left", "subject", "remedy"),
+    [
+        ("LEAST_DISK", 0.0, 1e30, "disk", "free space where "),
+        ("LEAST_MEMORY", 0.0, 1e30, "memory", "end what uses it"),
+        ("MOST_CPU", 101.0, -1.0, "CPU", "end what uses it (`gemelo top` says which node)"),
+    ],
+)
+def test_the_doctor_says_how_much_room_is_left_and_what_would_do(
+    monkeypatch, tmp_path, capsys, limit, plenty, nothing_left, subject, remedy
+):
+    """Measured here and now, against one limit that everything keeps, and one that nothing does."""
+    monkeypatch.setenv("GEMELO_ROUTER_PORT", "1")
+    monkeypatch.setenv("GEMELO_PATHS_OUT", str(tmp_path / "not_there_yet" / "out"))
+    said = []
+    for value in (plenty, nothing_left):
+        monkeypatch.setattr(doctor, limit, value)
+        run(["doctor", "--json"])
+        found = {each["subject"]: each for each in json.loads(capsys.readouterr().out)}
+        said.append((found[subject]["verdict"], found[subject]["remedy"]))
+        assert re.match(
+            r"\d+ % of \d+ cores in use$" if subject == "CPU" else r"\d+\.\d GB free$", found[subject]["found"]
+        )
+    assert said[0] == ("ok", "")
+    assert said[1][0] == "warning"
+    assert said[1][1].startswith(remedy)
+
+
 @pytest.mark.parametrize(
     ("diagnosis", "verdict", "words"),
     [
@@ -53,6 +95,17 @@ def test_the_doctor_without_a_twin_says_what_would_do(monkeypatch, capsys):
         (doctor.clocks({"a": ClockOffset(0.0003, 0.001), "b": OK}), "ok", "farthest from this host's is a, +0.3 ±1.0"),
         (doctor.clocks({}), "warning", "no node tells its time"),
         (doctor.serial_port("/dev/nobody"), "error", "/dev/nobody is not there"),
+        (
+            doctor.versions({"planner": NodeInfo(version="0.0.1", host="brain")}),
+            "warning",
+            "planner 0.0.1 on brain; this",
+        ),
+        (
+            doctor.versions({"planner": NodeInfo(version="0.0.1")}),
+            "warning",
+            "put one version on every host (`make setup`",
+        ),
+        (doctor.versions({"planner": NodeInfo(version=version("gemelo"))}), "ok", "1 nodes run"),
     ],
 )
 def test_the_doctor_names_what_is_wrong_with_its_remedy(diagnosis, verdict, words):
