@@ -13,7 +13,7 @@ import threading
 import tomllib
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -28,9 +28,18 @@ import gemelo
 from schemas.device import DeviceStopRequest, StopKind
 from schemas.frames import FrameTransform, FrameTransforms, Transform
 from schemas.joints import JointState
-from schemas.message import Message
+from schemas.message import Message, encode
 from schemas.system import NodeStatistics, TopicStatistics
-from schemas.topics import DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, STATIC_FRAMES, Delivery, Topic
+from schemas.topics import (
+    DEVICE_STOP,
+    FOLLOW_JOINT_TRAJECTORY,
+    FRAMES,
+    JOINT_STATES,
+    LOG,
+    STATIC_FRAMES,
+    Delivery,
+    Topic,
+)
 from services.arm.frames.transforms import from_rpy, to_rpy
 from services.cli import (
     action_watch,
@@ -127,6 +136,26 @@ def test_the_topic_of_a_user_s_node_is_echoed_whole(session, diver, capsys):
 def test_the_rate_of_a_user_s_topic_is_measured(session, diver, capsys):
     assert topic_rates.hz(session, living_topics.topic_on(session, "sonar"), 1000, 1) is ExitCode.OK
     assert 10.0 < float(capsys.readouterr().out.split()[2]) < 40.0
+
+
+def test_the_bandwidth_and_the_delay_of_a_user_s_topic_are_measured(session, diver, deployment, network):
+    reports: list[object] = []
+
+    def keep(report: object) -> str:
+        reports.append(report)
+        return ""
+
+    found = living_topics.topic_on(session, "sonar")
+    assert topic_rates.bandwidth(session, found, 1000, 1, keep) is ExitCode.OK
+    with Node("cli-2", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        assert topic_rates.delay(session._replace(node=node), found, 1000, 1, keep) is ExitCode.OK
+    bandwidth, delay = reports
+    assert isinstance(bandwidth, topic_rates.Bandwidth)
+    size = len(encode(Sonar(stamp=2**60, echo=Inner(depth=1.5), beams=(0.1, 0.2))))
+    assert bandwidth.size_min == bandwidth.size_max == size
+    assert 10.0 * size < bandwidth.bytes_per_second < 40.0 * size
+    assert isinstance(delay, topic_rates.Delay)
+    assert 0.0 <= delay.delay_min <= delay.delay_mean <= delay.delay_max < 1.0
 
 
 def test_a_topic_of_nobody_is_answered_with_the_nearest_of_all(session, diver):
@@ -377,6 +406,31 @@ def test_top_has_every_node_with_its_figures(session, stack, capsys):
     assert 0.0 <= cpu < 200.0
     assert memory > 10.0
     assert 25.0 < loop < 100.0
+
+
+def test_top_says_what_was_lost_what_was_bad_and_how_late_a_loop_is(session, stack, deployment, network):
+    reports: list[top.Report] = []
+    with (
+        Node("sleeper", deployment, robot="rm1", bus=MemoryBus(network), log_level="error") as node,
+        closing(MemoryBus(network)) as stranger,
+    ):
+        # [s] five periods: the step comes late, and newer states replace those that wait
+        node.subscribe(JOINT_STATES, lambda state: threading.Event().wait(0.1))
+        words = stranger.publish("log", "Nonsense", Delivery.EVERY)
+        node.subscribe(LOG, lambda record: None)
+        with spinning(node, lambda now: words.put(b"not a record")):
+            assert top.watch(session, 2, lambda report: reports.append(report) or "") is ExitCode.OK
+    rows = {each.node: each for each in reports[-1].nodes}
+    assert rows["sleeper"].lost > 5
+    assert rows["sleeper"].bad > 0
+    assert rows["sleeper"].loop_late_max > 0.05
+    assert rows["sleeper"].loop_rate < 15.0
+    assert (rows["stepper_gateway"].lost, rows["stepper_gateway"].bad) == (0, 0)
+    line, slow = [each for each in str(reports[-1]).splitlines() if each.startswith("sleeper")]
+    assert re.fullmatch(r"sleeper hears joint_states \d+\.\d times a second; stepper_gateway promises 50", slow)
+    cells = dict(zip(top.HEADINGS, re.split(r" {2,}", line), strict=True))
+    assert (int(cells["lost"]), int(cells["bad"])) == (rows["sleeper"].lost, rows["sleeper"].bad)
+    assert float(cells["worst lateness [ms]"]) == pytest.approx(1e3 * rows["sleeper"].loop_late_max, abs=0.06)
 
 
 def test_a_topic_that_comes_too_seldom_is_named_and_a_silent_one_is_not():

@@ -11,6 +11,7 @@ import threading
 import time
 from contextlib import contextmanager
 from importlib.metadata import version
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -21,34 +22,49 @@ from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandResponse, DeviceEvent, DeviceStopRequest
+from schemas.device import (
+    DeviceCommandRequest,
+    DeviceCommandResponse,
+    DeviceEvent,
+    DeviceStopRequest,
+    ReferenceCommand,
+    ResetCommand,
+    SpeedCommand,
+)
 from schemas.frames import RobotDescription
 from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
 from schemas.joints import JointState
 from schemas.message import Message
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
+from schemas.scene import CylinderShape, SceneAdd, SceneObject, SceneRemove, SceneRequest
 from schemas.system import LogRecord, Parameter, SetParameter
 from schemas.topics import (
     COMMAND_ACKS,
     COMMANDS,
     DESCRIPTION,
+    DEVICE_COMMAND,
     DEVICE_EVENTS,
     DEVICE_STOP,
     GRIPPER_COMMAND,
     JOINT_STATES,
     LOG,
     PLAN,
+    SCENE_EDIT,
     Delivery,
     Request,
     Topic,
 )
+from services.arm.model.description import load_arm
 from services.logger.main import run
+from services.planner.scene.scene_store import SceneStore
 from services.runtime.actions import accept
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.deployment import load_deployment
 from services.runtime.errors import Refused
 from services.runtime.node import Node
 from services.visualizer.render.outputs import VisualizerParameters
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
@@ -210,6 +226,47 @@ def test_goals_requests_parameters_and_a_users_topic_are_recorded_as_what_they_a
     assert schemas["gripper/torque"]["properties"]["value"]["type"] == "number"
     assert json.loads(kept["deployment"]["json"])["router"]["port"] == deployment.router.port
     assert kept["gemelo"]["ruckig"]
+
+
+def answer_to(question):
+    """As a gateway in Idle says it."""
+    if question.command == ResetCommand():
+        return DeviceCommandResponse(reason="no fault")
+    return DeviceCommandResponse(accepted=True)
+
+
+def test_what_persons_command_and_change_in_the_scene_is_recorded_with_its_answer(deployment, tmp_path):
+    """By the same calls that the command line, the page and scripts make."""
+    network = MemoryNetwork()
+    cup = SceneObject(name="cup", shape=CylinderShape(radius=0.04, length=0.1))
+    edits = (SceneAdd(object=cup), SceneRemove(name="no_cup"))
+    commands = (ReferenceCommand(name=("brazo_joint",), position=(0.25,)), SpeedCommand(scale=0.5), ResetCommand())
+    store = SceneStore(load_arm(ROOT / "urdf/rm1"))
+    with (
+        running(deployment, network),
+        Node("planner", deployment, bus=MemoryBus(network)) as planner,
+        Node("stepper_gateway", deployment, bus=MemoryBus(network)) as gateway,
+        Node("client", deployment, bus=MemoryBus(network)) as client,
+    ):
+        planner.serve(SCENE_EDIT, lambda question: store.edit(question, lambda: None, 0))
+        gateway.serve(DEVICE_COMMAND, answer_to)
+        with spinning(planner), spinning(gateway):
+            for edit in edits:
+                client.call(SCENE_EDIT, SceneRequest(edit=edit))
+            for command in commands:
+                client.call(DEVICE_COMMAND, DeviceCommandRequest(command=command))
+    (mcap,) = recordings(tmp_path, ".mcap")
+    said = {}
+    for topic, message in messages(mcap):
+        said.setdefault(topic, []).append(message)
+    asked = said["@request/scene/edit"]
+    assert [msgspec.convert(each["question"], SceneRequest).edit for each in asked] == list(edits)
+    assert [each["answer"]["accepted"] for each in asked] == [True, False]
+    told = said["@request/device/command"]
+    assert [msgspec.convert(each["question"], DeviceCommandRequest).command for each in told] == list(commands)
+    assert [each["answer"]["accepted"] for each in told] == [True, True, False]
+    assert told[2]["answer"]["reason"] == "no fault"
+    assert all(each["clients"] for each in (*asked, *told))  # who has asked
 
 
 def test_a_black_box_holds_configuration_versions_parameters_logs_and_the_layout_of_the_view(deployment, tmp_path):
