@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
+import signal
 import subprocess
 import time
+from pathlib import Path
 
 from mcap.reader import make_reader
 
+from services.cli.errors import ExitCode
 from services.visualizer.program.rerun_program import rerun_binary
+from tests.runtime.support import until
 from tests.stack.gemelo import gemelo
 
+SECTION = re.compile(r"^## What happened\?\n.*?```bash\n(.*?)```", re.DOTALL | re.MULTILINE)
+MAGIC = b"\x89MCAP0\r\n"  # with which a file of MCAP begins and ends
+FILE = "out/recordings/….mcap"
 SAVED = 25.0  # [s] 3 s of what follows, 10 s between two files, the census's 5 s, and a slow machine
 
 
@@ -69,3 +78,37 @@ def test_a_killed_planner_and_an_emergency_stop_are_told_afterwards(stack, opera
     assert "/story" in text
     assert "/device/mode" in text
     assert len(list((stack.out / "blackbox").glob("*.mcap"))) == 2
+
+
+def test_the_six_lines_of_the_readme_say_what_happened(stack, operator, tmp_path):
+    """Ledger, black boxes and replay, as they are printed there, on the stack whose arm was just stopped."""
+    found = SECTION.search((stack.root / "README.md").read_text(encoding="utf-8"))
+    assert found is not None
+    lines = [shlex.split(line, comments=True) for line in found[1].splitlines()]
+    assert [words[:3] if words[1] == "blackbox" else words[:2] for words in lines] == [
+        ["gemelo", "state"], ["gemelo", "blackbox", "list"], ["gemelo", "blackbox", "show"],
+        ["gemelo", "blackbox", "open"], ["gemelo", "replay"], ["gemelo", "bag"],
+    ]  # fmt: skip
+    recording = str(min((stack.out / "recordings").glob("*.mcap")))  # of the stack, from its beginning on
+    told = {"state": "ledger ", "list": "emergency stop", "show": "device: RUN -> ESTOP", "open": "-> ESTOP",
+            "info": "joint_states"}  # fmt: skip
+    for _, *words in lines:
+        typed = [recording if word == FILE else word for word in words]
+        if typed[0] == "replay":
+            replayed(stack, recording, typed)
+            continue
+        more = ["--save", str(tmp_path / "view.rrd")] if typed[1:2] == ["open"] else []  # for want of a person's eyes
+        name = typed[1] if typed[0] in ("blackbox", "bag") else typed[0]
+        assert told[name] in gemelo(stack, *typed, *more), name
+    assert (tmp_path / "view.rrd").is_file()
+
+
+def replayed(stack, recording: str, words: list[str]) -> None:
+    """A file that is being written cannot be replayed, and says so; it ends properly with its logger."""
+    assert "gemelo bag repair" in gemelo(stack, *words, code=ExitCode.USAGE)
+    stack.kill("logger", signal.SIGTERM)
+    ended = Path(recording)
+    assert until(lambda: ended.read_bytes()[-8:] == MAGIC, 20.0)
+    said = gemelo(stack, *words)
+    assert re.search(r"[1-9]\d* of @request/plan: the same to the byte", said), said
+    assert "no difference" in said
