@@ -10,7 +10,6 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import degrees
-from pathlib import Path
 
 import pytest
 
@@ -187,7 +186,7 @@ def test_steps_are_put_in_order_stepped_paused_and_run_from_any_and_the_running_
     served.chooses_step(3)
     for place in (1, 0):
         served.press("step_up")
-        until(lambda: teaching.program.steps[place].point, lambda point: point == "P2")
+        until(lambda place=place: teaching.program.steps[place].point, lambda point: point == "P2")
     until(lambda: served.page._programs._step.value, lambda chosen: chosen == "1  go to P2")
     served.press("step_down")
     until(lambda: [step.point for step in teaching.program.steps], lambda now: now == ["P0", "P2", "P1"])
