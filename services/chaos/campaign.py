@@ -10,7 +10,7 @@ import msgspec
 
 import gemelo
 from services.arm.device.device_config import device_config
-from services.chaos.faults import FAULTS, READY, Fault
+from services.chaos.faults import BYSTANDERS, FAULTS, READY, Fault
 from services.chaos.invariants import jerks, jumps, misses, moved, segments
 from services.chaos.person import Person, quietly_cancel
 from services.chaos.site import Site
@@ -20,6 +20,8 @@ from services.stack.stack import StackError
 
 TO_END = 25.0  # [s] beyond the move's own time in which its client must know its end
 TO_BEGIN = 5.0  # [s] for a move to get under way
+# Reasons of a machine without time for gateway and device.
+STARVED = ("lost the gateway's heartbeat", "is silent for more than", "has been silent for")
 MUTED = 2.0  # [s] after such a fault until everything is recorded again
 
 
@@ -84,6 +86,7 @@ class Campaign:
         to_end = time.monotonic() - begun_at
         if ended == "unknown":
             violations.append(f"its client heard no end within {TO_END:g} s of the move's own time")
+        violations += meddled(fault, ended, reason)
         to_ready = self._await_ready(healed, violations)
         if fault.mutes:
             self.muted.append((begun - int(MUTED * 1e9), time.time_ns() + int(MUTED * 1e9)))
@@ -184,6 +187,13 @@ class Campaign:
 def words_of(error: StackError) -> list[str]:
     """What a report says of a stack that is not ready: the names, then a line for each process with its reason."""
     return [str(error).partition("\n")[0], *(each.sentence for each in error.unready)]
+
+
+def meddled(fault: Fault, ended: str, reason: str) -> list[str]:
+    """That a process which takes no part in a move, as ARCHITECTURE.md's table has it, had to do with its end."""
+    if fault.of not in BYSTANDERS or ended == "succeeded" or any(words in reason for words in STARVED):
+        return []
+    return [f"{fault.of} takes no part in a move, and yet it ended {ended}: {reason or 'no reason was given'}"]
 
 
 def unexpected_hands(fault: Fault, hands: Sequence[str], was_late: bool = False) -> list[str]:

@@ -55,6 +55,7 @@ class Fault:
 
 
 SHORT, LONG = (0.05, 0.6), (0.8, 3.0)  # [s] within what motion and clients bear, and beyond it
+# They take no part in a move that has begun.
 BYSTANDERS = ("state_publisher", "planner", "visualizer", "viewer", "panel", "camera", "detector")
 CLOSED_BY_ITS_USER = "viewer"  # and not started anew, where it is asked to end
 FAULTS: tuple[Fault, ...] = (

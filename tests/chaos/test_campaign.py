@@ -10,7 +10,7 @@ from argparse import ArgumentParser
 import msgspec
 
 from schemas.deployment import Deployment
-from services.chaos.campaign import Episode, order, unexpected_hands, words_of
+from services.chaos.campaign import Episode, meddled, order, unexpected_hands, words_of
 from services.chaos.faults import FAULTS, Fault
 from services.chaos.main import chosen_faults, possible_faults, unfit
 from services.chaos.options import add_chaos_options
@@ -79,6 +79,17 @@ def test_a_person_may_only_do_what_the_fault_asks_for() -> None:
     assert unexpected_hands(fault("device reboots"), ["arm", "reference"]) == []
     assert unexpected_hands(fault("device reboots"), ["reset"]) == ["a person had to reset"]
     assert unexpected_hands(fault("e-stop"), ["reset", "arm", "reference"]) == []
+
+
+def test_what_takes_no_part_in_a_move_may_not_end_it() -> None:
+    for name in ("kill panel", "restart planner", "freeze viewer long", "kill camera", "freeze detector shortly"):
+        assert meddled(fault(name), "succeeded", "") == []
+        assert meddled(fault(name), "aborted", 'device "rm1" is silent for more than 0.5 s: check its power') == []
+        (said,) = meddled(fault(name), "canceled", "")
+        assert said == f"{name.split()[1]} takes no part in a move, and yet it ended canceled: no reason was given"
+    (said,) = meddled(fault("kill panel"), "aborted", "its client has gone")
+    assert said.endswith("it ended aborted: its client has gone")
+    assert meddled(fault("kill stepper_gateway"), "lost", "") == meddled(fault("stop"), "canceled", "") == []
 
 
 def test_a_run_is_good_only_if_nothing_was_violated() -> None:
