@@ -51,6 +51,16 @@ def information_of(session: Session, name: str) -> NodeInfo:
     return session.node.call(Request(f"@node/{name}/info", Empty, NodeInfo, name, ""), Empty(), timeout=TIMEOUT)
 
 
+def told_information_of(session: Session, name: str) -> NodeInfo | None:
+    """As `information_of`; None of a node that does not answer, or has just ended."""
+    from services.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
+
+    try:
+        return information_of(session, name)
+    except (NoAnswer, CommandError):
+        return None
+
+
 def require_alive(session: Session, name: str) -> None:
     """Raises `CommandError` with the nearest name if no such node is alive."""
     alive = living(session)

@@ -12,7 +12,7 @@ from schemas.system import NodeInfo, NodeStatistics
 from schemas.topics import STATISTICS, TOPICS
 from services.cli.errors import ExitCode
 from services.cli.forms import Form, count_options, csv_rows, form_options, json_line
-from services.cli.node import information_of
+from services.cli.node import told_information_of
 from services.cli.parser import Options, Parser
 from services.cli.session import Session, connect
 from services.cli.text_table import table
@@ -113,7 +113,7 @@ def form_of_reports(options: Options) -> Form:
 
 def watch(session: Session, count: int | None, form: Form = str) -> ExitCode:
     """Prints `count` reports."""
-    infos: dict[str, NodeInfo] = {}
+    infos: dict[str, NodeInfo | None] = {}
     node, printed, last = session.node, 0, session.node.monotonic() + FIRST - EVERY
     heard = figures_by_node(session)
 
@@ -126,7 +126,7 @@ def watch(session: Session, count: int | None, form: Form = str) -> ExitCode:
         figures = {name: each for name, each in sorted(heard.items()) if name in alive}
         for name in figures:
             if name not in infos:
-                infos[name] = information_of(session, name)
+                infos[name] = told_information_of(session, name)
         print(form(report(figures, infos)), flush=True)
         printed += 1
         if printed == count:
@@ -136,7 +136,7 @@ def watch(session: Session, count: int | None, form: Form = str) -> ExitCode:
     return ExitCode.OK
 
 
-def report(figures: Mapping[str, Figures], infos: Mapping[str, NodeInfo]) -> Report:
+def report(figures: Mapping[str, Figures], infos: Mapping[str, NodeInfo | None]) -> Report:
     """A row for each node, and the topics that come too seldom."""
     nodes = tuple(_row(name, each, infos.get(name)) for name, each in figures.items())
     return Report(nodes=nodes, slow_topics=tuple(slow_topics(figures)))
@@ -170,7 +170,7 @@ def _cells(each: NodeFigures) -> Sequence[str]:
 
 
 def memory(info: NodeInfo | None) -> int | None:
-    """[bytes] resident of a process on this machine; None for others."""
+    """[bytes] resident of a process on this machine; None for others, and where `info` is not known."""
     import psutil  # 20 ms
 
     if info is None or info.host != socket.gethostname():

@@ -9,7 +9,7 @@ import msgspec
 from schemas.message import Message
 from schemas.system import NodeInfo
 from schemas.topics import Topic
-from services.cli.node import information_of, living
+from services.cli.node import living, told_information_of
 from services.cli.session import Session
 from services.cli.top import FIRST, Figures, figures_by_node
 
@@ -39,7 +39,7 @@ class Ends(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def ends(session: Session, topic: Topic[Any]) -> Ends:
-    """Listens to the topic and to the counters of all nodes for `FIRST` [s]."""
+    """Listens to the topic and to the counters of all nodes for `FIRST` [s]; one that does not answer is left out."""
     node = session.node
     heard: dict[str, list[float]] = {}  # [s] monotonic, by writer
     figures = figures_by_node(session)
@@ -52,7 +52,9 @@ def ends(session: Session, topic: Topic[Any]) -> Ends:
     subscription.close()
     told = Ends(written_by={}, read_by={})
     for name in living(session):
-        info = information_of(session, name)
+        info = told_information_of(session, name)
+        if info is None:
+            continue
         if topic.key in info.publishes:
             told.written_by[name] = Writer(process=_process(info), rate_hz=_rate(heard.get(name, [])))
         if topic.key in info.subscribes:

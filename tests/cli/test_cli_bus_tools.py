@@ -37,6 +37,7 @@ from schemas.topics import (
     JOINT_STATES,
     LOG,
     STATIC_FRAMES,
+    STATISTICS,
     Delivery,
     Topic,
 )
@@ -178,6 +179,14 @@ def test_who_writes_and_reads_a_topic_is_named_with_rates(session, stack, deploy
     assert reader.received is not None
     assert reader.received > 50
     assert (reader.lost, reader.bad) == (0, 0)
+
+
+def test_a_node_that_hangs_does_not_keep_the_others_from_being_named(session, diver, deployment, network):
+    with Node("hanging", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        node.subscribe(SONAR, lambda message: None)  # and nobody lets it spin
+        told = topic_ends.ends(session, living_topics.topic_on(session, "sonar"))
+    assert list(told.written_by) == ["diver"]
+    assert told.read_by == {}
 
 
 def test_what_a_reader_has_lost_is_said(session, diver, deployment, network):
@@ -431,6 +440,21 @@ def test_top_says_what_was_lost_what_was_bad_and_how_late_a_loop_is(session, sta
     cells = dict(zip(top.HEADINGS, re.split(r" {2,}", line), strict=True))
     assert (int(cells["lost"]), int(cells["bad"])) == (rows["sleeper"].lost, rows["sleeper"].bad)
     assert float(cells["worst lateness [ms]"]) == pytest.approx(1e3 * rows["sleeper"].loop_late_max, abs=0.06)
+
+
+def test_top_goes_on_where_a_node_hangs(session, stack, deployment, network):
+    """One that spoke a moment ago, and now does not say what its process is."""
+    reports: list[top.Report] = []
+    with (
+        Node("hanging", deployment, robot="rm1", bus=MemoryBus(network)),  # and nobody lets it spin
+        Node("speaker", deployment, robot="rm1", bus=MemoryBus(network)) as speaker,
+    ):
+        words = speaker.publisher(STATISTICS)
+        with spinning(speaker, lambda now: words.put(NodeStatistics(stamp=now, node="hanging")), rate=1.0):
+            assert top.watch(session, 1, lambda report: reports.append(report) or "") is ExitCode.OK
+    rows = {each.node: each for each in reports[-1].nodes}
+    assert rows["hanging"].memory is None
+    assert rows["stepper_gateway"].memory is not None
 
 
 def test_a_topic_that_comes_too_seldom_is_named_and_a_silent_one_is_not():
