@@ -67,6 +67,28 @@ def test_a_press_that_is_not_answered_is_given_up_and_the_next_one_goes_out() ->
     assert presses(rig) == ["estop", "estop"]
 
 
+def test_a_device_that_starts_anew_before_its_answer_has_left_was_pressed() -> None:
+    rig = virtual(VirtualArm())
+    rig.press(InjectRequest(kind=InjectKind.REBOOT), 1)
+    rig.press(ESTOP, 2)
+    rig.reboot(boot_id=78)
+    assert rig.run(1.0, lambda: 1 in rig.pressed)
+    assert rig.pressed[1].accepted
+    assert presses(rig) == ["reboot", "estop"]
+    assert 2 not in rig.pressed  # of that nothing is known yet
+
+
+def test_a_press_of_something_else_is_not_done_by_a_reboot() -> None:
+    rig = virtual(VirtualArm())
+    rig.press(ESTOP, 1)
+    rig.reboot(boot_id=78)
+    rig.run(1.0)
+    assert "rebooted" in rig.events()
+    assert 1 not in rig.pressed
+    rig.run(1.5)
+    assert not rig.pressed[1].accepted
+
+
 def test_an_absent_device_is_not_pressed() -> None:
     rig = virtual(VirtualArm())
     rig.wire.is_cut = True

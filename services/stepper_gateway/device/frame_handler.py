@@ -119,6 +119,7 @@ class FrameHandler:
             reason = "the device has restarted"
             device.event("rebooted", f"{reason}: its position and boot id are read anew", moment)
             self._components.start_over(reason, moment)
+            self._components.injections.on_reboot()
         if not is_news:
             return
         if not device.session.fits(state):

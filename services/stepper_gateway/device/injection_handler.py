@@ -58,17 +58,24 @@ class InjectionHandler:
 
     def on_event(self, event: EventReport) -> None:
         """The device has done the oldest one, or refused it."""
-        if event.event in (DONE, REFUSED) and self._waiting:
-            injection = self._waiting.popleft()
+        if event.event in (DONE, REFUSED):
             done = event.event == DONE
-            self._answer(injection.ticket, done, "" if done else event.detail)
-            self._send()
+            self._conclude(done, "" if done else event.detail)
+
+    def on_reboot(self) -> None:
+        """The device has started anew: where that was asked for it is done, even if its answer never left."""
+        if self._waiting and self._waiting[0].request.kind is InjectKind.REBOOT:
+            self._conclude(True, "")
 
     def step(self, moment: Moment) -> None:
         """Give up what was not answered in time."""
         while self._waiting and moment.monotonic >= self._waiting[0].deadline:
-            injection = self._waiting.popleft()
-            self._answer(injection.ticket, False, f"the device has not answered {injection.request.kind} in time")
+            self._conclude(False, f"the device has not answered {self._waiting[0].request.kind} in time")
+
+    def _conclude(self, accepted: bool, reason: str) -> None:
+        """Answers the oldest one, if there is one, and sends the next."""
+        if self._waiting:
+            self._answer(self._waiting.popleft().ticket, accepted, reason)
             self._send()
 
     def _send(self) -> None:
