@@ -88,7 +88,10 @@ def run_render(options: Options) -> ExitCode:
             raise unknown("host", host, site.hosts)
     for host in options.hosts or site.hosts:
         folder = site_folder(site) / host
-        files = ", ".join(str(file.relative_to(folder)) for file in write(site, host, folder))
+        try:
+            files = ", ".join(str(file.relative_to(folder)) for file in write(site, host, folder))
+        except OSError as error:
+            raise CommandError(f"{error.filename}: {error.strerror}") from error
         print(f"{said_folder(site, host)}: {files}")
     print(
         f"the folder of a host goes to {site.config} there, and its systemd/ to /etc/systemd/system (deploy/README.md)"
@@ -108,6 +111,8 @@ def run_keys(options: Options) -> ExitCode:
         if options.retire_authority:
             authority_in(site_folder(site)).retire()
         made = make_keys(site, site_folder(site), project_root(), options.renew_within)
+    except OSError as error:
+        raise CommandError(f"{error.filename}: {error.strerror}") from error
     except ConfigurationError as error:
         raise CommandError(str(error)) from error
     rows = [

@@ -47,7 +47,11 @@ class Authority:
     def __init__(self, certificate: Path, key: Path) -> None:
         self._certificate, self._key = certificate, key
         self._former, self._voucher = certificate.with_name(FORMER), certificate.with_name(VOUCHER)
-        if not (certificate.exists() and key.exists()):
+        if certificate.exists() != key.exists():  # another one would end every link of those who trust this one
+            has, lacks = (certificate, key) if certificate.exists() else (key, certificate)
+            anew = f"delete {has} to begin with another authority, whose files everybody must then get at once"
+            raise AccessError(f"{lacks} is missing beside {has.name}: bring it back; or {anew}")
+        if not certificate.exists():
             _make(certificate, key)
 
     @property
@@ -116,13 +120,15 @@ class Authority:
 
     def _issue(self, name: str, extensions: str, certificate: Path, key: Path, days: int, unit: str = "") -> None:
         subject = f"/OU={unit}/CN={name}" if unit else f"/CN={name}"
-        with tempfile.TemporaryDirectory() as scratch:
-            request, wanted = Path(scratch, "request"), Path(scratch, "extensions")
+        with tempfile.TemporaryDirectory(dir=certificate.parent) as scratch:
+            request, wanted, own, signed = (Path(scratch, name) for name in ("r", "e", "k", "c"))
             wanted.write_text(extensions)
-            openssl("req", "-new", *KEY, "-subj", subject, "-keyout", str(key), "-out", str(request))
-            self._sign(request, wanted, certificate, days)
-        with certificate.open("a") as file:
-            file.write(self._vouched)
+            openssl("req", "-new", *KEY, "-subj", subject, "-keyout", str(own), "-out", str(request))
+            self._sign(request, wanted, signed, days)
+            with signed.open("a") as file:
+                file.write(self._vouched)
+            os.replace(own, key)
+            os.replace(signed, certificate)
 
     def _sign(self, request: Path, extensions: Path, certificate: Path, days: int) -> None:
         by = ("-CA", str(self._certificate), "-CAkey", str(self._key), "-set_serial", _serial())
@@ -141,7 +147,7 @@ def openssl(*arguments: str) -> str:
             "the command openssl makes the certificates, and is missing: sudo apt-get install openssl"
         ) from None
     if done.returncode:
-        raise AccessError(f"openssl {arguments[0]} failed: {done.stderr.strip().splitlines()[-1:]}")
+        raise AccessError(f"openssl {arguments[0]} failed: {' '.join(done.stderr.strip().splitlines()[-1:])}")
     return done.stdout
 
 

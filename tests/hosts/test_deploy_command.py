@@ -76,6 +76,37 @@ def test_render_and_keys_write_below_out_and_install_shows_before_it_does(out, t
     assert not any("authority" in word for each in done for word in each)
 
 
+def test_what_cannot_be_written_is_named(out, capsys):
+    out.parent.mkdir(parents=True)
+    out.touch()
+    assert gemelo("deploy", "render", "example") == 1
+    assert capsys.readouterr().err == f"gemelo: {out}/cell: Not a directory\n"
+    assert gemelo("deploy", "keys", "example") == 1
+    assert capsys.readouterr().err == f"gemelo: {out}: File exists\n"
+
+
+def test_an_authority_without_its_key_is_not_replaced_and_a_broken_one_harms_no_certificate(out, capsys):
+    """Hosts that got a certificate of another authority would no longer be believed by the rest."""
+    assert gemelo("deploy", "keys", "example") == 0
+    key = out / "authority/ca.key"
+    before, kept = all_below(out), key.read_bytes()
+    for spoil in (key.unlink, lambda: key.write_text("no key")):
+        spoil()
+        assert gemelo("deploy", "keys", "example", "--renew-within", "4000") == 1
+        assert "authority" in capsys.readouterr().err
+        key.write_bytes(kept)
+        assert all_below(out) == before
+    key.unlink()
+    assert gemelo("deploy", "keys", "example") == 1
+    assert (
+        f"{key} is missing beside ca.pem: bring it back; or delete {key.with_name('ca.pem')}" in capsys.readouterr().err
+    )
+
+
+def all_below(folder: Path) -> dict[str, bytes]:
+    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
 def test_an_install_stops_at_the_first_command_that_fails(out, tmp_path, capsys, monkeypatch):
     for words in (("render", "example", "brain"), ("keys", "example")):
         assert gemelo("deploy", *words) == 0
