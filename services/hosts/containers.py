@@ -9,7 +9,7 @@ from typing import Any
 from schemas.deployment import Wire
 from schemas.site import Site
 from services.hosts.deployments import HOST, environment
-from services.hosts.layout import Process, extras, processes
+from services.hosts.layout import FILES, TASKS, Process, extras, processes
 
 IN_IMAGE = "/opt/gemelo"  # where the Containerfile puts the project
 CONTAINERFILE = """\
@@ -86,7 +86,8 @@ def _contained(site: Site, process: Process) -> dict[str, Any]:
         "cap_drop": ["ALL"],
         "security_opt": ["no-new-privileges:true"],
         "mem_limit": process.service.memory.lower(),
-        "pids_limit": 256,
+        "pids_limit": TASKS,
+        "ulimits": {"nofile": FILES, "core": 0},
         "tmpfs": ["/tmp"],
         "volumes": [_mount(site.config, is_read_only=True), _mount(site.state, is_read_only=False)],
         **(_line(settings.serial) if settings and has_line else {}),

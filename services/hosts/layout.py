@@ -10,6 +10,7 @@ from schemas.site import Site
 
 ROLE_OF = {role.node: role.name for role in ROLES if role.node}
 ROUTER, BROKER = "router", "broker"
+TASKS, FILES = 256, 4096  # that one process may have, beside its memory: what leaks ends itself, and not the host
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from schemas.deployment import Wire
 from schemas.site import Site
 from services.hosts.deployments import environment
-from services.hosts.layout import Process, processes
+from services.hosts.layout import FILES, TASKS, Process, processes
 from services.hosts.quoting import systemd
 
 TARGET = "gemelo.target"
@@ -34,8 +34,8 @@ RestartSec=1
 TimeoutStopSec=5
 
 MemoryMax={memory}
-TasksMax=256
-LimitNOFILE=4096
+TasksMax={tasks}
+LimitNOFILE={files}
 LimitCORE=0
 UMask=0077
 NoNewPrivileges=yes
@@ -96,6 +96,8 @@ def _unit(site: Site, host: str, process: Process) -> str:
         # ":" keeps systemd from looking for variables in the words.
         command=f":{systemd(f'{site.project}/.venv/bin/{process.program}')}",
         memory=service.memory,
+        tasks=TASKS,
+        files=FILES,
         state=systemd(site.state),
         devices=_devices(site, process),
     )

@@ -30,6 +30,17 @@ def test_an_image_has_the_user_of_the_services_and_installs_what_its_host_runs(t
         assert not any("user" in service for service in services(lab, host).values())
 
 
+def test_a_container_has_the_limits_of_its_unit(tmp_path):
+    lab = site(tmp_path)
+    for host in lab.hosts:
+        files = rendered(lab, host)
+        for name, made in services(lab, host).items():
+            unit = dict(line.split("=", 1) for line in files[f"systemd/{name}.service"].splitlines() if "=" in line)
+            assert made["mem_limit"] == unit["MemoryMax"].lower()
+            assert made["pids_limit"] == int(unit["TasksMax"])
+            assert made["ulimits"] == {"nofile": int(unit["LimitNOFILE"]), "core": int(unit["LimitCORE"])}
+
+
 def test_a_serial_line_is_open_to_a_gateway_that_is_not_root(tmp_path):
     made = services(site(tmp_path, "[robots.rm1]", '[robots.rm1]\nwire = "serial"'), "cell")
     assert made["gemelo-rm1-stepper_gateway"]["group_add"] == ["dialout"]
