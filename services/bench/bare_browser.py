@@ -40,6 +40,7 @@ class BareBrowser:
         self._news = threading.Condition()
         self._labels: dict[str, str] = {}  # of buttons, by their number
         self._sliders: dict[str, str] = {}  # labels of sliders, by their number
+        self._choices: dict[str, str] = {}  # labels of drop-downs and checkboxes, by their number
         self._channel, self._answered = "", ""  # the number of the hidden field, and the newest mark that was answered
         self.frames = 0
         socket.send(msgspec.msgpack.encode(CAMERA))  # with its first camera a browser is there
@@ -59,11 +60,21 @@ class BareBrowser:
         """Presses the newest button whose label begins so, once the page has it; raises TimeoutError if it has none."""
         self._set(self._button(label), True)
 
-    def press_first(self, label: str) -> None:
-        """Presses the oldest button of exactly that label; raises StopIteration if the page has none."""
+    def press_exactly(self, label: str, place: int = -1) -> None:
+        """Presses the newest button of exactly that label, or that at `place` of all of them, the oldest first."""
         with self._news:
-            number = next(number for number, text in self._labels.items() if text == label)
-        self._set(number, True)
+            numbers = [number for number, text in self._labels.items() if text == label]
+        self._set(numbers[place], True)
+
+    def hold(self, label: str, rate: float) -> None:
+        """Says once, as it would `rate` [Hz] times while it is held, that the newest button whose label begins so is
+        held; raises TimeoutError if the page has none."""
+        said = {"type": "GuiButtonHoldMessage", "uuid": self._button(label), "frequency": rate}
+        self._socket.send(msgspec.msgpack.encode(said))
+
+    def choose(self, label: str, value: str | bool) -> None:
+        """Sets the newest drop-down or checkbox whose label begins so; raises TimeoutError if there is none."""
+        self._set(self._newest(self._choices, label, "choice"), value)
 
     def slide(self, label: str, value: float) -> None:
         """Sets the newest slider whose label begins so, in the unit of its label; raises TimeoutError if there is
@@ -102,9 +113,12 @@ class BareBrowser:
                     self._on_said(said, now)
 
     def _note(self, said: Said) -> None:
-        """Remembers buttons and sliders, and answers marks as the page's script does."""
-        if said["type"] in ("GuiButtonMessage", "GuiSliderMessage"):
-            labels = self._labels if said["type"] == "GuiButtonMessage" else self._sliders
+        """Remembers what can be pressed and set, and answers marks as the page's script does."""
+        labels = {
+            "GuiButtonMessage": self._labels, "GuiSliderMessage": self._sliders,
+            "GuiDropdownMessage": self._choices, "GuiCheckboxMessage": self._choices,
+        }.get(said["type"])  # fmt: skip
+        if labels is not None:
             with self._news:
                 labels[said["uuid"]] = str(said["props"]["label"])
                 self._news.notify_all()

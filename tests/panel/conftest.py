@@ -15,6 +15,7 @@ from services.stack.stack import Stack
 from tests.gemelo.conftest import BROKER, NEEDED, make_ready
 from tests.optional import need
 from tests.panel.person import Person
+from tests.panel.served import Served, served_page
 
 # As root it would put its drawing before everything else on the machine, and as a session of its own it counts as much
 # as the whole stack: both are taken from it.
@@ -51,11 +52,16 @@ def robot() -> str:
 
 
 @pytest.fixture(scope="module")
-def twin(robot: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
+def processes() -> tuple[str, ...]:
+    return (*NEEDED, "panel")
+
+
+@pytest.fixture(scope="module")
+def twin(robot: str, processes: tuple[str, ...], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
     out, programs = tmp_path_factory.mktemp("out"), tmp_path_factory.mktemp("programs")
     environment = {"GEMELO_ROBOT": f"urdf/{robot}", "GEMELO_PATHS_PROGRAMS": str(programs)}
     with (
-        Stack(broker=BROKER, out=out, processes=(*NEEDED, "panel"), environment=environment) as stack,
+        Stack(broker=BROKER, out=out, processes=processes, environment=environment) as stack,
         pytest.MonkeyPatch.context() as patch,
     ):
         for name, value in stack.deployment.items():
@@ -71,6 +77,14 @@ def arm(twin: Stack) -> Iterator[gemelo.Arm]:
         make_ready(connected)
         connected.move(named="home")
         yield connected
+
+
+@pytest.fixture(scope="module")
+def served(twin: Stack) -> Iterator[Served]:
+    """The page in this process, where a file's `processes` leave it out."""
+    twin.wait_ready(30.0)
+    with served_page() as served:
+        yield served
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from math import pi
+from math import acos, dist, pi
 
 import gemelo
 from services.panel.model.problems import Problem, problem_of
@@ -13,6 +13,7 @@ from services.panel.model.tool_turns import tool_turns
 
 IDLE = 1.0  # [s] after which a solver without work looks whether it is to end
 JUMP = {"rad": pi / 4, "m": 0.05}  # chosen: more of a joint between two points of a drag is another configuration
+FAR, TURNED = 0.1, pi / 4  # [m], [rad] chosen: to a goal so far away, as by a click, the joints go far in any case
 
 
 @dataclass(frozen=True)
@@ -142,8 +143,12 @@ class GoalSolver:
 
     def _arrived(self, before: Goal, joints: Mapping[str, float], wish: PoseWish, problem: Problem | None) -> Goal:
         units = {joint.name: joint.unit for joint in self._arm.description.joints}
-        jumped = tuple(name for name, at in joints.items() if abs(at - before.joints[name]) > JUMP[units[name]])
-        return Goal(joints, wish.pose if wish.is_turned else self._arm.fk(joints), problem, None, jumped)
+        is_far = dist(before.pose.position, wish.pose.position) > FAR or (
+            wish.is_turned and _angle(before.pose, wish.pose) > TURNED
+        )
+        jumped = [name for name, at in joints.items() if abs(at - before.joints[name]) > JUMP[units[name]]]
+        pose = wish.pose if wish.is_turned else self._arm.fk(joints)
+        return Goal(joints, pose, problem, None, () if is_far else tuple(jumped))
 
     def _target(self, wish: PoseWish) -> gemelo.ToolGoal:
         return gemelo.ToolGoal(pose=wish.pose) if wish.is_turned else gemelo.ToolGoal(position=wish.pose.position)
@@ -154,3 +159,9 @@ class GoalSolver:
         except Exception as error:
             return problem_of(error)
         return None
+
+
+def _angle(one: gemelo.Pose, other: gemelo.Pose) -> float:
+    """[rad] by which one is turned against the other."""
+    same = sum(a * b for a, b in zip(one.orientation, other.orientation, strict=True))
+    return 2.0 * acos(min(1.0, abs(same)))

@@ -80,15 +80,13 @@ class Obstacles:
             return
         self._contacts = contacts
         for dot in self._dots:
-            dot.remove()
+            dot.remove()  # with the names on it
         self._dots = []
         for number, contact in enumerate(contacts):
             if len(contact.point) == 3:
                 node, (x, y, z) = f"/contacts/{number}", contact.point
                 self._dots.append(self._server.scene.add_icosphere(node, DOT, TOUCHING, position=(x, y, z)))
-                self._dots.append(
-                    self._server.scene.add_label(f"{node}/names", f"{contact.first} · {contact.second}", visible=True)
-                )
+                self._server.scene.add_label(f"{node}/names", f"{contact.first} · {contact.second}", visible=True)
 
     def _mesh(self, item: SceneObject) -> trimesh.Trimesh:
         match item.shape:

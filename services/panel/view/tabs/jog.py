@@ -9,9 +9,11 @@ import gemelo
 from services.arm.frames.transforms import from_rpy, multiply
 from services.arm.model.description import Joint
 from services.panel.model.jogging import JogWish
+from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
 from services.panel.model.units import jog_speed
 from services.panel.view.kit import Kit, box, esc, note, set_if_new, without_event
+from services.panel.words.words import Words
 
 HOLD_RATE = 20.0  # [Hz] of a held button
 LINEAR, ANGULAR = 0.1, 1.0  # [m/s], [rad/s] of the tool at 100 %
@@ -54,13 +56,7 @@ class JogTab:
 
     def refresh(self, readings: Readings) -> None:
         """What slows the jog."""
-        status = self._operator.bus.jog_status
-        content = ""
-        if status is not None and status.active:
-            told = "<br>".join(esc(self._kit.words.said(limit.message)) for limit in status.limits)
-            share = esc(self._kit.words("jogging", share=round(100 * status.scale)))
-            content = box(f"<b>{share}</b><br>{told}" if told else share, "#1c7ed6")
-        set_if_new(self._status, "content", content)
+        set_if_new(self._status, "content", jog_text(self._operator, self._kit.words))
 
     @property
     def _step(self) -> float:
@@ -130,3 +126,13 @@ class JogTab:
 
         button = self._kit.held(label, keep, rate=HOLD_RATE, needs="jog")
         button.on_click(without_event(press))
+
+
+def jog_text(operator: Operator, words: Words) -> str:
+    """How much of its speed a jog has, and what slows it; empty while nobody jogs."""
+    status = operator.bus.jog_status
+    if status is None or not status.active:
+        return ""
+    told = "<br>".join(esc(words.said(limit.message)) for limit in status.limits)
+    share = esc(words("jogging", share=round(100 * status.scale)))
+    return box(f"<b>{share}</b><br>{told}" if told else share, "#1c7ed6")

@@ -12,6 +12,7 @@ from services.panel.model.motions import PLANNERS, MotionChoice
 from services.panel.model.readings import Readings
 from services.panel.model.units import SHOWN, STEP, meant, slider_range, slider_value, text_of
 from services.panel.view.kit import OWN_CHANGE, Kit, Mirror, box, esc, note, set_if_new, table
+from services.panel.view.tabs.jog import jog_text
 from services.panel.view.tabs.tool_fields import ToolFields
 from services.panel.view.world import World
 
@@ -50,6 +51,7 @@ class MoveTab:
         self._live = kit.gui.add_checkbox(words("live"), False, hint=words("live_hint"))
         self._shown_live = Mirror(self._live)
         self._live.on_update(lambda event: self._switch_live(event))
+        self._watched = kit.line()
         with kit.gui.add_folder(words("how"), expand_by_default=False):
             self._choices()
 
@@ -64,7 +66,7 @@ class MoveTab:
             self._write_sliders()
         self._tool.show(goal)
         self._show_problem()
-        self._shown_live.show(self._operator.live.is_on)
+        self._show_live()
         if motions.version != self._plan_version or motions.is_moving or motions.is_planning:
             self._plan_version = motions.version
             set_if_new(self._plan, "content", self._plan_text())
@@ -117,6 +119,13 @@ class MoveTab:
             self._operator.live.switch(event.target.value)
             if event.target.value:
                 self._operator.follow_measured()
+
+    def _show_live(self) -> None:
+        """While the switch is on: that obstacles are watched, and what slows the arm."""
+        operator, words = self._operator, self._kit.words
+        self._shown_live.show(operator.live.is_on)
+        told = (jog_text(operator, words) or note(esc(words("live_hint")))) if operator.live.is_on else ""
+        set_if_new(self._watched, "content", told)
 
     def _set_by_click(self, is_wanted: bool) -> None:
         """Without a key, for this browser: a finger on a tablet has none."""

@@ -102,8 +102,10 @@ class SceneTab:
             "/object_gizmo", scale=0.12, position=(x, y, z), wxyz=(w, a, b, c), depth_test=False
         )
 
-        @gizmo.on_drag_end
+        @gizmo.on_update
         def _(event: viser.TransformControlsEvent) -> None:
+            if event.phase != "end":
+                return
             at = [float(value) for value in event.target.position]
             w, a, b, c = (float(value) for value in event.target.wxyz)
             self._operator.guarded(lambda: self._operator.arm.scene.move(item.name, at, (a, b, c, w)))
