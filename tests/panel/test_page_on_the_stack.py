@@ -117,7 +117,7 @@ def test_steps_are_put_in_order_stepped_paused_and_run_from_any_and_the_running_
     says(served, "Done.")
     stands_at(arm, "P1")
     assert lit(served) == []
-    arm.speed(0.3)
+    arm.speed(0.6)
     chooses_step(served, 0)
     served.press("run_from")
     until(lambda: lit(served), lambda now: now == ["1"])
@@ -139,7 +139,7 @@ def test_steps_are_put_in_order_stepped_paused_and_run_from_any_and_the_running_
 def test_a_program_that_is_stopped_says_where_and_begins_again_only_when_it_is_told_to(
     served: Served, arm: gemelo.Arm, tour: None
 ) -> None:
-    arm.speed(0.3)
+    arm.speed(0.6)
     served.press("run_from")
     until(lambda: lit(served), lambda now: now == ["2"])
     served.press("stop")
@@ -155,7 +155,7 @@ def test_a_program_that_is_stopped_says_where_and_begins_again_only_when_it_is_t
 def test_an_emergency_stop_in_a_program_says_where_and_after_it_nothing_begins_by_itself(
     served: Served, arm: gemelo.Arm, tour: None
 ) -> None:
-    arm.speed(0.3)
+    arm.speed(0.6)
     served.press("run_from")
     until(lambda: lit(served), lambda now: now == ["2"])
     arm.device.inject("estop")
