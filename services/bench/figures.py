@@ -28,18 +28,20 @@ class Figure(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Goal(msgspec.Struct, frozen=True, kw_only=True):
-    """Upper bounds, in the figure's unit."""
+    """Upper bounds, and the least that a median may be, in the figure's unit."""
 
     median: float | None = None
     p99: float | None = None
+    least: float | None = None  # of the median, where more is better
 
     def is_met(self, median: float, p99: float) -> bool:
-        """True if neither bound is exceeded; `median` and `p99` are in the figure's unit."""
-        return median <= _or_infinity(self.median) and p99 <= _or_infinity(self.p99)
+        """True if no bound is passed; `median` and `p99` are in the figure's unit."""
+        is_enough = self.least is None or median >= self.least
+        return is_enough and median <= _or_infinity(self.median) and p99 <= _or_infinity(self.p99)
 
     def __str__(self) -> str:
-        bounds = (("median", self.median), ("p99", self.p99))
-        return ", ".join(f"{name} <= {bound:.4g}" for name, bound in bounds if bound is not None)
+        bounds = (("median >=", self.least), ("median <=", self.median), ("p99 <=", self.p99))
+        return ", ".join(f"{name} {bound:.4g}" for name, bound in bounds if bound is not None)
 
 
 class NotMeasured(Exception):

@@ -11,6 +11,7 @@ import pytest
 from services.bench import main
 from services.bench.figures import Figure, Goal, NotMeasured, guarded, of_samples, quantile, report_of, text_of
 from services.bench.main import FIGURES, function_of
+from services.bench.panel import DRAG_GOAL, judged_cpu
 from services.bench.stack import Stacks
 
 OF_THE_ISSUES = (
@@ -73,6 +74,15 @@ def test_a_goal_that_is_not_met_is_said():
     figure = of_samples([1.0, 20.0], Goal(p99=10.0))
     assert figure.met is False
     assert "p99 <= 10  NO" in text_of(report_of({"plan_ms": figure}, Path(__file__).parents[2]))
+
+
+def test_a_goal_may_be_a_least_median_and_that_of_the_page_s_cpu_is_one_at_rest_and_one_in_motion():
+    slow, fast = of_samples([19.9], DRAG_GOAL), of_samples([20.1], DRAG_GOAL)
+    assert (slow.met, fast.met, slow.goal) == (False, True, "median >= 20")
+    for rest, moving, met in ((4.0, 14.0, True), (6.0, 14.0, False), (4.0, 16.0, False)):
+        figure = judged_cpu([rest], [moving], {})
+        assert (figure.median, figure.reference, figure.met) == (moving, {"at rest": rest}, met)
+        assert figure.goal == "median <= 15, at rest median <= 5"
 
 
 def test_a_figure_that_cannot_be_measured_says_why():
