@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ipaddress
+import re
 import signal
 import socket
 import subprocess
 import time
+import urllib.request
 
 import psutil
 import pytest
@@ -173,10 +175,14 @@ def test_ctrl_c_ends_everything_with_zero_and_leaves_nothing_behind(tmp_path):
 def test_make_up_welcomes_the_user_and_a_sigterm_ends_it(tmp_path):
     with Stack(broker="amqtt", out=tmp_path, viewer="web", command=("make", "--silent", "up")) as stack:
         deadline = time.monotonic() + 15.0
-        while "gemelo is up" not in stack.console() and time.monotonic() < deadline:
+        while "stop it" not in stack.console() and time.monotonic() < deadline:
             time.sleep(0.1)
-        assert "gemelo is up: every process is ready." in stack.console()
-        assert f"http://127.0.0.1:{stack.deployment['GEMELO_VIEWER_WEB_PORT']}" in stack.console()
+        welcome = stack.console().partition("gemelo is up: every process is ready.")[2]
+        first, *others = re.findall(r"http://\S+", welcome)
+        assert first == f"http://127.0.0.1:{stack.deployment['GEMELO_PANEL_PORT']}"
+        with urllib.request.urlopen(first, timeout=5.0) as page:
+            assert page.status == 200
+        assert any(stack.deployment["GEMELO_VIEWER_WEB_PORT"] in other for other in others)
         family = [psutil.Process(pid) for pid in stack.pids().values()]
         family += [child for each in family for child in each.children(recursive=True)]
         stack.server.send_signal(signal.SIGTERM)
