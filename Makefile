@@ -10,7 +10,7 @@ side_by_side := $(addprefix tests/,arm bench chaos demo firmware logger planner 
 folders := $(filter-out $(side_by_side) tests/panel tests/stack,$(patsubst %/,%,$(wildcard tests/*/)))
 # Of the page and of whole stacks those that measure no time: they hold steps, words and files.
 patient := $(patsubst %,tests/panel/test_%.py,camera_box cameras model own_pages goals_on_the_stack \
-	page_on_the_stack picks pointing quiet_page) $(patsubst %,tests/stack/test_%.py,black_box camera camera_mount clocks_apart configuration control device imported_arm locked_broker my_own_arm old_dialects picks \
+	page_on_the_stack picks pointing quiet_page six_joints_on_the_stack) $(patsubst %,tests/stack/test_%.py,black_box camera camera_mount clocks_apart configuration control device imported_arm locked_broker my_own_arm old_dialects picks \
 	plan_files planning provisioning serial_wire several_arms six_joints)
 one_by_one := $(patsubst %,tests/stack/test_%.py,chaos hostile_viewer jogging links stops)
 # They wait for a state, for as long as it takes; the longest first, so that the browsers are mostly on one side.
