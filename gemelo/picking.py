@@ -64,7 +64,7 @@ class Picked(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Way:
+class Approach:
     """How to come to a point from above."""
 
     above: Mapping[str, float]  # joint values at the tool's pose `APPROACH` above
@@ -166,7 +166,7 @@ def named(arm: Arm, eyes: Eyes, name: str, to: str) -> tuple[Thing, Place, Gripp
         raise BadArgument(str(error)) from error
 
 
-def _way_to(arm: Arm, thing: Thing, seen: Seen, tool: Point, gripper: Gripper) -> Way:
+def _way_to(arm: Arm, thing: Thing, seen: Seen, tool: Point, gripper: Gripper) -> Approach:
     """The configuration above the thing at which the jaws turn it least; raises `Refused`."""
     size, center = body_of(thing)
     body = compose((seen.pose.position, seen.pose.orientation), center)
@@ -186,7 +186,7 @@ def _way_to(arm: Arm, thing: Thing, seen: Seen, tool: Point, gripper: Gripper) -
             f"wide there, and they open to {1e3 * gripper.open:g} mm: turn it",
             check="grasp", subject=thing.name, value=width, limit=gripper.open,
         )  # fmt: skip
-    return Way(joints, turned)
+    return Approach(joints, turned)
 
 
 def _configurations_above(
@@ -221,7 +221,7 @@ def _configuration_above(arm: Arm, tool: Point, yaw: float | None) -> Mapping[st
     return arm.ik(position=above, along=DOWN)[0]
 
 
-def _yaw_at(arm: Arm, place: Place, seen: Seen, way: Way) -> float | None:
+def _yaw_at(arm: Arm, place: Place, seen: Seen, way: Approach) -> float | None:
     """[rad] of the jaws at a place where the thing's turn matters; None where it does not."""
     if not isinstance(place, PosePlace) or place.yaw is None:
         return None
@@ -240,7 +240,7 @@ def _spot(eyes: Eyes, place: Place, camera: str) -> Point:
     return compose((seen.pose.position, seen.pose.orientation), (place.offset, IDENTITY[1]))[0]
 
 
-def _take(hand: Hand, thing: Thing, seen: Seen, way: Way) -> bool:
+def _take(hand: Hand, thing: Thing, seen: Seen, way: Approach) -> bool:
     """True if the jaws have closed on something; the tool is above again in either case."""
     hand.grip("open")
     hand.tell("above it")
@@ -257,7 +257,7 @@ def _take(hand: Hand, thing: Thing, seen: Seen, way: Way) -> bool:
     return True
 
 
-def _turn_with_the_jaws(arm: Arm, thing: Thing, seen: Seen, way: Way) -> None:
+def _turn_with_the_jaws(arm: Arm, thing: Thing, seen: Seen, way: Approach) -> None:
     """What closing jaws do to a thing that stands askew between them."""
     _, center = body_of(thing)
     pose = (seen.pose.position, from_axis_angle((0.0, 0.0, 1.0), yaw_of(seen.pose.orientation) + way.turned))

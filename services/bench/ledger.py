@@ -47,7 +47,7 @@ POPULATIONS: dict[str, Weakness] = {  # share of the stated torque that a motor 
 }
 
 
-class Seen(NamedTuple):
+class StateAfterMove(NamedTuple):
     """One state after a move."""
 
     confidence: float  # of the arm, 0 to 1
@@ -64,9 +64,9 @@ def ledger() -> Figure:
     return Figure(median=rounded(share), goal=">= 95", met=share >= 95.0, note=note)
 
 
-def simulate(moves: int, weakness: Weakness, seed: int) -> list[Seen]:
+def simulate(moves: int, weakness: Weakness, seed: int) -> list[StateAfterMove]:
     """So many moves of arms whose motors are drawn from `weakness`."""
-    rng, seen = random.Random(seed), list[Seen]()
+    rng, seen = random.Random(seed), list[StateAfterMove]()
     while len(seen) < moves:
         arm, motors = _arm(rng), [_weakened(joint, weakness(rng)) for joint in rm1().joints]
         rig: VirtualArm | None = None
@@ -77,7 +77,7 @@ def simulate(moves: int, weakness: Weakness, seed: int) -> list[Seen]:
     return seen[:moves]
 
 
-def text_of(seen: Sequence[Seen]) -> str:
+def text_of(seen: Sequence[StateAfterMove]) -> str:
     """How many states fell into each range of confidence, and in how many no step was lost."""
     rows = []
     for low, high in pairwise(EDGES):
@@ -88,7 +88,7 @@ def text_of(seen: Sequence[Seen]) -> str:
     return table(("confidence of the arm", "states", "no step lost", "share", "mean confidence"), rows)
 
 
-def _row(name: str, seen: Sequence[Seen]) -> tuple[str, ...]:
+def _row(name: str, seen: Sequence[StateAfterMove]) -> tuple[str, ...]:
     if not seen:
         return name, "0", "-", "-", "-"
     kept = sum(not one.is_lost for one in seen)
@@ -142,7 +142,7 @@ def _verified(arm: Arm, motors: Sequence[Motor], before: VirtualArm | None, rng:
     return rig
 
 
-def _moved(rig: VirtualArm, rng: random.Random) -> Seen:
+def _moved(rig: VirtualArm, rng: random.Random) -> StateAfterMove:
     goal = tuple(random_place(joint, rng, REACH) for joint in rig.arm.joints)
     trajectory = smooth_move(rig.arm, rig.position, goal, 1.0 + rng.random() ** 2)
     name = f"move {rig.now_us}"
@@ -153,7 +153,7 @@ def _moved(rig: VirtualArm, rng: random.Random) -> Seen:
     rig.run(0.24)  # the ledger is told five times a second
     told = rig.messages(STEP_LEDGER)[-1]
     rig.published.clear()
-    return Seen(told.arm_confidence, any(_is_lost(rig, index) for index in range(len(rig.arm.joints))))
+    return StateAfterMove(told.arm_confidence, any(_is_lost(rig, index) for index in range(len(rig.arm.joints))))
 
 
 def _is_lost(rig: VirtualArm, index: int) -> bool:

@@ -49,7 +49,7 @@ def run_echo(options: Options) -> ExitCode:
     key, _, wanted = options.action.partition(".")
     action = action_of(key)
     part, _, path = wanted.partition(".")
-    shown = Shown(action, part, path, csv_lines() if options.csv else json_line if options.json else None)
+    shown = ActionView(action, part, path, csv_lines() if options.csv else json_line if options.json else None)
     if options.csv and not part:
         raise usage(f"--csv has the columns of one part: write {' or '.join(f'{key}.{each}' for each in PARTS)}")
     with connect() as session:
@@ -82,7 +82,7 @@ class Said(NamedTuple):
         return f"{self.part}{of_goal}:\n{told}---"
 
 
-class Shown:
+class ActionView:
     """What is printed of an action, and how; an empty `part` is all of them, `form` None is text for a person.
 
     Raises `CommandError` for a part or a field that is none.
@@ -131,7 +131,7 @@ def _whole(session: Session, action: Action[Any, Any, Any], begin: str) -> str:
     return found[0]
 
 
-def echo(session: Session, action: Action[Any, Any, Any], count: int | None, shown: Shown) -> ExitCode:
+def echo(session: Session, action: Action[Any, Any, Any], count: int | None, shown: ActionView) -> ExitCode:
     """Prints what becomes of each goal, its feedback and its result.
 
     Ends after `count` goals have ended, or so many lines of the only part that is shown.

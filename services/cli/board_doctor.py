@@ -28,7 +28,7 @@ class Heard(NamedTuple):
     status: bool  # gemelo's firmware has said who it is
 
 
-class Finding(NamedTuple):
+class Diagnosis(NamedTuple):
     """The likely cause, and what to do."""
 
     cause: str
@@ -95,40 +95,40 @@ def listen(line: Line, baud: int, seconds: float) -> Heard:
     return Heard(baud, bytes(data), False)
 
 
-def diagnose(heard: list[Heard]) -> Finding:
+def diagnose(heard: list[Heard]) -> Diagnosis:
     """The likely cause of what was heard at each rate, and the remedy."""
     for each in heard:
         if each.status:
-            return Finding(
+            return Diagnosis(
                 "gemelo's firmware runs and answers", "`gemelo device provision` tells it its networks", True
             )
     everything = b"\n".join(each.data for each in heard)
     for pattern, cause, remedy in SIGNS:
         if re.search(pattern, everything):
-            return Finding(cause, remedy)
+            return Diagnosis(cause, remedy)
     starts = max(len(START.findall(each.data)) for each in heard)
     if starts >= LOOP:
-        return Finding(
+        return Diagnosis(
             f"it starts again and again, {starts} times in {LISTENING:g} s",
             "disconnect all but USB and look again; then its supply, then flash it anew",
         )
     return _by_amount(heard, starts)
 
 
-def _by_amount(heard: list[Heard], starts: int) -> Finding:
+def _by_amount(heard: list[Heard], starts: int) -> Diagnosis:
     spoken = [each for each in heard if len(each.data) >= SPOKEN]
     if not spoken:
-        return Finding(
+        return Diagnosis(
             "it says nothing",
             "press EN while this listens; then: is this its port, is the cable one for data, is it the socket marked "
             "UART, and is EN held low by something wired to it?",
         )
     if starts:
-        return Finding("its boot loader runs, gemelo's firmware does not answer", f"flash it anew: {MANUAL}")
+        return Diagnosis("its boot loader runs, gemelo's firmware does not answer", f"flash it anew: {MANUAL}")
     if any(_share_of_text(each.data) >= READABLE for each in spoken):
-        return Finding("another firmware speaks there", f"flash gemelo's: {MANUAL}, Build and flash")
+        return Diagnosis("another firmware speaks there", f"flash gemelo's: {MANUAL}, Build and flash")
     rates = ", ".join(str(each.baud) for each in heard)
-    return Finding(f"what it says is no text at {rates} baud", "another --baud, or a bad cable or ground")
+    return Diagnosis(f"what it says is no text at {rates} baud", "another --baud, or a bad cable or ground")
 
 
 def lines_of(heard: list[Heard], most: int = 6) -> list[str]:

@@ -41,7 +41,7 @@ class Plugged:
 
 
 @dataclass(frozen=True)
-class Seen:
+class CameraReport:
     """What a camera has said of itself."""
 
     image: CameraImage | None = None
@@ -113,14 +113,14 @@ def plugged() -> list[Plugged]:
     ]
 
 
-def listing(cell: Cell, devices: list[Plugged], seen: dict[str, Seen], deployment: Deployment) -> str:
+def listing(cell: Cell, devices: list[Plugged], seen: dict[str, CameraReport], deployment: Deployment) -> str:
     """What is plugged in, then what the cell file asks for."""
     here = table(("plugged in", "name"), [(each.device, each.name) for each in devices])
     parts = [here if devices else "no camera is plugged in (/dev/video*)"]
     if not deployment.cell:
         return "\n\n".join([*parts, NO_CELL.format("deploy/local.toml")])
     headings = ("camera", "source", "size [px]", "asked [Hz]", "gets [Hz]", "lens", "place", "condition")
-    rows = [_row(camera, seen.get(camera.name, Seen())) for camera in cell.cameras]
+    rows = [_row(camera, seen.get(camera.name, CameraReport())) for camera in cell.cameras]
     said = [each.status.text for each in seen.values() if each.status is not None and each.status.text]
     return "\n\n".join([*parts, "\n".join([table(headings, rows), *said])])
 
@@ -162,7 +162,7 @@ def on_terminal(jpeg: bytes, columns: int, rows: int) -> str:
     return "\n".join(lines)
 
 
-def _show(seen: Seen, name: str, save: str) -> None:
+def _show(seen: CameraReport, name: str, save: str) -> None:
     image = seen.image
     if image is None:
         raise CommandError(_why_no_image(seen, name))
@@ -179,13 +179,13 @@ def _show(seen: Seen, name: str, save: str) -> None:
     print(f"found: {found or 'nothing'}")
 
 
-def _why_no_image(seen: Seen, name: str) -> str:
+def _why_no_image(seen: CameraReport, name: str) -> str:
     if seen.status is None:
         return f'camera "{name}" says nothing: is the process `camera` running? its log is out/logs/camera.log'
     return seen.status.text or f'camera "{name}" is {seen.status.condition}, and gives no image within {PATIENCE:g} s'
 
 
-def _seen_of(robot: Robot, cell: Cell) -> dict[str, Seen]:
+def _seen_of(robot: Robot, cell: Cell) -> dict[str, CameraReport]:
     """Of every camera; empty where no router listens."""
     try:
         with connect(robot) as session:
@@ -196,7 +196,7 @@ def _seen_of(robot: Robot, cell: Cell) -> dict[str, Seen]:
         return {}
 
 
-def _seen(session: Session, name: str, needs_image: bool = False) -> Seen:
+def _seen(session: Session, name: str, needs_image: bool = False) -> CameraReport:
     """What comes within `PATIENCE`."""
     heard: dict[str, Any] = {}
     subscriptions: list[Any] = [
@@ -217,10 +217,10 @@ def _seen(session: Session, name: str, needs_image: bool = False) -> Seen:
             break  # it says why nothing comes
     for each in subscriptions:
         each.close()
-    return Seen(**heard)
+    return CameraReport(**heard)
 
 
-def _row(camera: CameraRecord, seen: Seen) -> tuple[str, ...]:
+def _row(camera: CameraRecord, seen: CameraReport) -> tuple[str, ...]:
     status, info = seen.status, seen.info
     is_streaming = status is not None and status.condition is CameraCondition.STREAMING
     return (
@@ -235,15 +235,15 @@ def _row(camera: CameraRecord, seen: Seen) -> tuple[str, ...]:
     )
 
 
-def _listed(cell: Cell, devices: list[Plugged], seen: dict[str, Seen]) -> dict[str, object]:
+def _listed(cell: Cell, devices: list[Plugged], seen: dict[str, CameraReport]) -> dict[str, object]:
     cameras = [
         {
             "name": camera.name,
             "source": camera.source,
             "size": camera.size,
             "fps": camera.fps,
-            "status": seen.get(camera.name, Seen()).status,
-            "info": seen.get(camera.name, Seen()).info,
+            "status": seen.get(camera.name, CameraReport()).status,
+            "info": seen.get(camera.name, CameraReport()).info,
         }
         for camera in cell.cameras
     ]

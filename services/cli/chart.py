@@ -16,7 +16,7 @@ HEADROOM = 0.05  # of the span, above and below the curves
 FLAT = 1e-3  # of a value, the least span around it
 
 
-class Curve(NamedTuple):
+class ChartCurve(NamedTuple):
     """One number over time; what is not finite is a gap."""
 
     name: str
@@ -29,7 +29,7 @@ class Curve(NamedTuple):
 
 
 def chart(
-    curves: Sequence[Curve],
+    curves: Sequence[ChartCurve],
     start: float,
     end: float,
     columns: int,
@@ -60,7 +60,7 @@ def chart(
     return "\n".join([*lines, *_time_axis(start - end, width)])
 
 
-def _headline(curve: Curve, unit: str, colour: str) -> str:
+def _headline(curve: ChartCurve, unit: str, colour: str) -> str:
     name = f"{colour}{curve.name}\x1b[0m" if colour else curve.name
     of = f" [{unit}]" if unit else ""
     values = curve.values

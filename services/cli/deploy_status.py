@@ -20,7 +20,7 @@ from services.cli.text_table import table
 from services.credentials.expiry import expiry
 from services.hosts.certificates import Certificate, days_by_host, endings, in_days, older, renewal, shown_at
 from services.hosts.layout import BROKER, ROLE_OF, ROUTER
-from services.hosts.status import SeenNode, SeenRobot, ServiceStatus, Standing, is_well, site_status
+from services.hosts.status import SeenNode, SeenRobot, ServiceState, ServiceStatus, is_well, site_status
 from services.runtime.clock_offset import ClockOffset
 from services.runtime.deployment import load_deployment
 from services.runtime.errors import BusError, NoAnswer, Refused
@@ -60,7 +60,7 @@ def summary(found: Iterable[ServiceStatus]) -> str:
     """One sentence about all, and one where hosts have different versions."""
     rows = tuple(found)
     wrong = [f"{each.service} of {each.robot or 'the site'} is {each.standing}" for each in rows
-             if each.standing is not Standing.READY]  # fmt: skip
+             if each.standing is not ServiceState.READY]  # fmt: skip
     lines = ["; ".join(wrong) if wrong else f"all {len(rows)} are ready"]
     versions = {each.version: each for each in rows if each.version}
     if len(versions) > 1:
@@ -93,7 +93,7 @@ def certificates_told(site: Site, found: Iterable[ServiceStatus], deployment: De
     days = days_by_host(running)
     told = (f"{host} {days.get(host, 'not known')}" for host in site.hosts)
     yield f"certificates: {', '.join(told)}, yours {in_days(expiry(own))}"
-    silent = {each.host for each in rows if each.standing is Standing.SILENT}
+    silent = {each.host for each in rows if each.standing is ServiceState.SILENT}
     here = made_here(site)
     near = [*endings((*running, Certificate("this host", own.stem, expiry(own))))]
     near += [f"{each}, by the file in {said_folder(site)}" for each in endings(c for c in here if c.host in silent)]

@@ -11,7 +11,7 @@ from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.provision import BAUD, open_line
 from services.cli.terminal import LiveBlock
-from services.cli.update_transfer import BoardStatus, SerialWire, Transfer, Wire, await_status, mqtt_wire
+from services.cli.update_transfer import SerialWire, Transfer, UpdateStatus, Wire, await_status, mqtt_wire
 from services.credentials.private_files import AccessError, require_private
 from services.mqtt.access import gateway_access
 from services.runtime.deployment import load_deployment, project_root
@@ -117,7 +117,7 @@ def update(wire: Wire, image: bytes, signature: bytes) -> ExitCode:
     return outcome(before, after)
 
 
-def outcome(before: BoardStatus, after: BoardStatus | None) -> ExitCode:
+def outcome(before: UpdateStatus, after: UpdateStatus | None) -> ExitCode:
     """Prints what runs now; raises `CommandError` if that is not the new firmware."""
     if after is None:
         raise CommandError(

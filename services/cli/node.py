@@ -74,7 +74,7 @@ def living(session: Session) -> list[str]:
     return [name for name in sorted(session.node.alive()) if not name.startswith("cli-")]
 
 
-class Standing(msgspec.Struct, frozen=True, kw_only=True):
+class NodeState(msgspec.Struct, frozen=True, kw_only=True):
     """How a node is; `info` is None for one that does not answer."""
 
     node: str
@@ -82,7 +82,7 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
     clock: ClockOffset | None = None  # against this host's
 
 
-def standings(session: Session) -> list[Standing]:
+def standings(session: Session) -> list[NodeState]:
     """Of every living node."""
     from services.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
     from services.runtime.node_clock import ask_about
@@ -92,19 +92,19 @@ def standings(session: Session) -> list[Standing]:
         try:
             info, clock = ask_about(session.node, name, TIMEOUT)
         except NoAnswer:  # it hangs, or has just ended
-            found.append(Standing(node=name))
+            found.append(NodeState(node=name))
         else:
-            found.append(Standing(node=name, info=info, clock=clock))
+            found.append(NodeState(node=name, info=info, clock=clock))
     return found
 
 
-def listing(found: Sequence[Standing]) -> str:
+def listing(found: Sequence[NodeState]) -> str:
     """The table for a person."""
     headings = ("node", "robot", "host", "pid", "version", "started [local time]", "ready", "clock")
     return table(headings, [_cells(each) for each in found])
 
 
-def _cells(each: Standing) -> Sequence[str]:
+def _cells(each: NodeState) -> Sequence[str]:
     info = each.info
     if info is None:
         return (each.node, "-", "-", "-", "-", "-", "does not answer", "-")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from schemas.message import Message
 from schemas.topics import TOPICS, Topic
-from services.cli.chart import COLOURS, Curve, chart
+from services.cli.chart import COLOURS, ChartCurve, chart
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.field_path import FieldPath, leaves
 from services.cli.living_topics import connected, known_topic, topic_on
@@ -129,10 +129,10 @@ class Plot:
             chart(curves, now - self._window, now, columns, each, unit, is_coloured) for unit, curves in panels
         )
 
-    def _panels(self, is_coloured: bool) -> Iterator[tuple[str, list[Curve]]]:
+    def _panels(self, is_coloured: bool) -> Iterator[tuple[str, list[ChartCurve]]]:
         by_unit = sorted(self._curves.items(), key=lambda item: item[1].unit)
         for unit, group in groupby(by_unit, key=lambda item: item[1].unit):
-            curves = [Curve(name, sample.points) for name, sample in group]
+            curves = [ChartCurve(name, sample.points) for name, sample in group]
             yield from [(unit, curves)] if is_coloured else [(unit, [curve]) for curve in curves]
 
 

@@ -118,7 +118,7 @@ class BoardStatus(msgspec.Struct, frozen=True):
 def provision(port: str, baud: int, credentials: Credentials) -> ExitCode:
     """Sends the credentials and prints the answer; raises `CommandError` if the board refuses or is silent."""
     with open_line(port, baud) as line:
-        exchange = Exchange(line)
+        exchange = BoardExchange(line)
         answer = exchange.send(credentials.text())
         if not answer.accepted:
             raise CommandError(f"the device refused: {answer.reason or 'without a reason'}")
@@ -132,7 +132,7 @@ def provision(port: str, baud: int, credentials: Credentials) -> ExitCode:
     return ExitCode.OK
 
 
-class Exchange:
+class BoardExchange:
     """The exchange of frames with one board."""
 
     def __init__(self, line: Line) -> None:

@@ -16,7 +16,7 @@ LARGEST = 256  # [bytes] of a message
 FARTHEST = 1.0e6  # [deg] of one message
 
 
-class Refused(ValueError):
+class RefusedMessage(ValueError):
     """A message that is not followed; the text says why."""
 
 
@@ -43,7 +43,7 @@ class RaIntake:
         return tuple(_position(joint, steps) for joint, steps in zip(self._joints, self._target, strict=True))
 
     def take(self, payload: bytes, stands: Sequence[int]) -> Wanted:
-        """A message, while the arm stands at `stands` [steps]; raises `Refused`, and what was asked before stays."""
+        """A message, while the arm stands at `stands` [steps]; raises `RefusedMessage`, and the target before stays."""
         wanted = self._read(payload)
         if wanted.moves is None:
             return wanted
@@ -74,12 +74,14 @@ class RaIntake:
         found = _object(payload)
         output = found.get(OUTPUT)
         if output is not None and (isinstance(output, str) or output not in (0, 1)):
-            raise Refused(f'"{OUTPUT}" is {output!r}: write 0 or 1')
+            raise RefusedMessage(f'"{OUTPUT}" is {output!r}: write 0 or 1')
         missing = [name for name in self._names if name not in found]
         if len(missing) == len(self._names) and output is not None:
             return Wanted(None, bool(output))
         if missing:
-            raise Refused(f"{', '.join(missing)} missing: the sketch moves only by {', '.join(self._names)} together")
+            raise RefusedMessage(
+                f"{', '.join(missing)} missing: the sketch moves only by {', '.join(self._names)} together"
+            )
         moves = zip(self._joints, self._names, strict=True)
         steps = tuple(_degrees(found[name], name) * joint.steps.steps_per_turn / 360 for joint, name in moves)
         return Wanted(steps, None if output is None else bool(output))
@@ -87,21 +89,21 @@ class RaIntake:
 
 def _object(payload: bytes) -> dict[str, object]:
     if len(payload) > LARGEST:
-        raise Refused(f"{len(payload)} bytes, more than the {LARGEST} of a sketch's buffer")
+        raise RefusedMessage(f"{len(payload)} bytes, more than the {LARGEST} of a sketch's buffer")
     try:
         found = json.loads(payload)
     except (ValueError, RecursionError) as error:
-        raise Refused(f"no JSON: {payload[:40]!r}: {error}") from error
+        raise RefusedMessage(f"no JSON: {payload[:40]!r}: {error}") from error
     if not isinstance(found, dict):
-        raise Refused(f"no JSON object: {payload[:40]!r}")
+        raise RefusedMessage(f"no JSON object: {payload[:40]!r}")
     return found
 
 
 def _degrees(value: object, name: str) -> Fraction:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise Refused(f'"{name}" is {value!r}: write a number of degrees')
+        raise RefusedMessage(f'"{name}" is {value!r}: write a number of degrees')
     if not (math.isfinite(value) and abs(value) <= FARTHEST) if isinstance(value, float) else abs(value) > FARTHEST:
-        raise Refused(f'"{name}" is {value!s:.20}: no joint turns that far in one message')
+        raise RefusedMessage(f'"{name}" is {value!s:.20}: no joint turns that far in one message')
     return Fraction(value)
 
 
@@ -115,7 +117,7 @@ def _require_within(joint: Joint, steps: Fraction) -> None:
         return
     limit = joint.lower if position < joint.lower else joint.upper
     too_far = abs(position - limit) / joint.steps.travel_per_turn * 360.0
-    raise Refused(
+    raise RefusedMessage(
         f'joint "{joint.name}" ({joint.wire_name}) would be at {position:.4f} {joint.unit}, beyond its limit of '
         f"{limit:.4f} {joint.unit}: {too_far:.3f} degrees too far"
     )

@@ -21,10 +21,9 @@ from schemas.topics import (
 )
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options
-from services.cli.ra_intake import OUTPUT, RaIntake, Refused
+from services.cli.ra_intake import OUTPUT, RaIntake, RefusedMessage
 from services.cli.session import Session, connect, share_control
-from services.runtime.errors import NoAnswer
-from services.runtime.errors import Refused as RefusedRequest
+from services.runtime.errors import NoAnswer, Refused
 
 JOINTS, STATES, READINGS = "ra/juntas", "ra/estados", "ra/sensores"
 PERIOD = 0.05  # [s] between two targets; the gateway brakes after 0.5 s without one
@@ -104,7 +103,7 @@ class Listener:
     def _take(self, payload: bytes) -> None:
         try:
             wanted = self._intake.take(payload, self._stands())
-        except Refused as refused:
+        except RefusedMessage as refused:
             print(f"refused: {refused}", flush=True)
             return
         self._is_following = self._is_following or wanted.moves is not None
@@ -112,10 +111,10 @@ class Listener:
             self._switch(wanted.output)
 
     def _stands(self) -> tuple[int, ...]:
-        """[steps]; raises `Refused` while the arm cannot be moved."""
+        """[steps]; raises `RefusedMessage` while the arm cannot be moved."""
         state, status = self._state.message, self._status.message
         if state is None or status is None or not status.online or status.reason:
-            raise Refused(status.reason if status is not None else "nothing is heard of the device")
+            raise RefusedMessage(status.reason if status is not None else "nothing is heard of the device")
         if not self._is_following:
             self._intake.forget_if_elsewhere(state.steps)
         return state.steps
@@ -137,7 +136,7 @@ class Listener:
         request = DeviceCommandRequest(command=OutputCommand(output=OUTPUT, on=on))
         try:
             answer = self._session.node.call(DEVICE_COMMAND, request)
-        except (RefusedRequest, NoAnswer) as error:
+        except (Refused, NoAnswer) as error:
             print(f"refused: {OUTPUT}: {error}", flush=True)
             return
         if not answer.accepted:

@@ -31,7 +31,7 @@ KNOCK = 0.5  # [s] between two questions who is there
 SYNC_REPLY, COMMAND, STATUS, FOR_EVER = 7, 3, 11, (1 << 64) - 1  # of firmware/PROTOCOL.md
 
 
-class BoardStatus(msgspec.Struct, frozen=True):
+class UpdateStatus(msgspec.Struct, frozen=True):
     """The fields of the JSON of `status` that count here."""
 
     online: bool
@@ -51,7 +51,7 @@ class Wire(Protocol):
     def knock(self) -> None:
         """Asks for `status` where that does not come by itself."""
 
-    def take(self, patience: float) -> UpdateAck | BoardStatus | None:
+    def take(self, patience: float) -> UpdateAck | UpdateStatus | None:
         """What the device has said next; None if that is nothing in `patience` [s]."""
 
 
@@ -100,7 +100,7 @@ class Transfer:
             said = self._wire.take(left)
             if isinstance(said, UpdateAck) and said.session == self._session:
                 return said
-            if isinstance(said, BoardStatus) and said.online and said.boot_id != self._boot_id:
+            if isinstance(said, UpdateStatus) and said.online and said.boot_id != self._boot_id:
                 raise CommandError("the device has restarted in the middle of it: give the same command again")
         return None
 
@@ -111,7 +111,7 @@ class Transfer:
         )
 
 
-def await_status(wire: Wire, patience: float, is_wanted: Callable[[BoardStatus], bool]) -> BoardStatus | None:
+def await_status(wire: Wire, patience: float, is_wanted: Callable[[UpdateStatus], bool]) -> UpdateStatus | None:
     """The next status that is wanted; None if there is none in `patience` [s]."""
     deadline, next_knock = time.monotonic() + patience, 0.0
     while (now := time.monotonic()) < deadline:
@@ -119,7 +119,7 @@ def await_status(wire: Wire, patience: float, is_wanted: Callable[[BoardStatus],
             wire.knock()
             next_knock = now + KNOCK
         said = wire.take(min(deadline, next_knock) - now)
-        if isinstance(said, BoardStatus) and said.online and is_wanted(said):
+        if isinstance(said, UpdateStatus) and said.online and is_wanted(said):
             return said
     return None
 
@@ -129,7 +129,7 @@ class SerialWire:
 
     def __init__(self, line: Line) -> None:
         self._line, self._packets = line, PacketDecoder()
-        self._said: list[UpdateAck | BoardStatus] = []
+        self._said: list[UpdateAck | UpdateStatus] = []
 
     def send(self, frame: bytes) -> None:
         self._line.write(packet(frame))
@@ -137,7 +137,7 @@ class SerialWire:
     def knock(self) -> None:
         self._line.write(packet(sync_frame(0)))
 
-    def take(self, patience: float) -> UpdateAck | BoardStatus | None:
+    def take(self, patience: float) -> UpdateAck | UpdateStatus | None:
         deadline = time.monotonic() + patience
         while not self._said and time.monotonic() < deadline:
             for frame in self._packets.feed(self._line.read(4096)):
@@ -158,7 +158,7 @@ class MqttWire:
 
     def __init__(self, client: MqttClient, device: str) -> None:
         self._client, self._device = client, device
-        self._said: queue.SimpleQueue[UpdateAck | BoardStatus] = queue.SimpleQueue()
+        self._said: queue.SimpleQueue[UpdateAck | UpdateStatus] = queue.SimpleQueue()
         client.on_message = self._on_message
 
     def send(self, frame: bytes) -> None:
@@ -167,7 +167,7 @@ class MqttWire:
     def knock(self) -> None:
         """Its status is kept by the broker, and comes with every new start."""
 
-    def take(self, patience: float) -> UpdateAck | BoardStatus | None:
+    def take(self, patience: float) -> UpdateAck | UpdateStatus | None:
         try:
             return self._said.get(timeout=max(0.0, patience))
         except queue.Empty:
@@ -180,13 +180,13 @@ class MqttWire:
 
 
 _HEADER, _STATUS = struct.Struct("<BBBBI"), struct.Struct("<IQBBH")
-_KINDS: dict[JsonFrame, type[UpdateAck | BoardStatus]] = {
+_KINDS: dict[JsonFrame, type[UpdateAck | UpdateStatus]] = {
     JsonFrame.UPDATE_ACK: UpdateAck,
-    JsonFrame.STATUS: BoardStatus,
+    JsonFrame.STATUS: UpdateStatus,
 }
 
 
-def _read(text: bytes, kind: JsonFrame) -> UpdateAck | BoardStatus | None:
+def _read(text: bytes, kind: JsonFrame) -> UpdateAck | UpdateStatus | None:
     """None for what is neither."""
     if kind not in _KINDS:
         return None

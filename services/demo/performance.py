@@ -10,7 +10,7 @@ from gemelo import topics
 from schemas.device import DeviceMode, DeviceState
 from services.demo.ledger import Ledger
 from services.demo.report import Move
-from services.demo.script import SINE_RATE, SINE_TIME, Sine, Stop, sine_of, tour
+from services.demo.script import SINE_RATE, SINE_TIME, Sine, TourMove, sine_of, tour
 
 REST = 5.0  # [s] that the arm may take to come to rest after the stream
 SINE_REACHED = 0.9  # of both amplitudes, or the sine was not followed
@@ -56,7 +56,7 @@ class Performance:
         reason += f"not followed by {', '.join(lazy)}" if lazy else ""
         return Move(name="sine, streamed at 10 Hz", succeeded=not reason, reason=reason, took_s=took)
 
-    def go(self, stop: Stop) -> Move:
+    def go(self, stop: TourMove) -> Move:
         """Plans and follows one goal; the move has the reason if it failed."""
         try:
             motion = self._arm.move(**stop.target)

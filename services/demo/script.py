@@ -21,7 +21,7 @@ POSE_TOUR = ((0.60, 0.60, 0.30), (0.40, 0.60, 0.50), (0.55, 0.35, 0.20))
 
 
 @dataclass(frozen=True)
-class Stop:
+class TourMove:
     """One planned move of the tour."""
 
     name: str
@@ -51,19 +51,19 @@ def sine_of(joint: Joint, start: float) -> Sine:
     return Sine(joint.name, centre, amplitude)
 
 
-def tour(arm: Arm) -> tuple[Stop, ...]:
+def tour(arm: Arm) -> tuple[TourMove, ...]:
     """Every named state, home, some joint goals and tool positions; the last goal has step counts other than zero."""
-    named = [Stop(f"named {name}", Target(named=name)) for name in arm.named_states if name != "home"]
+    named = [TourMove(f"named {name}", Target(named=name)) for name in arm.named_states if name != "home"]
     joints = [
-        Stop(f"joints {number}", Target(joints=positions_at(arm, shares)))
+        TourMove(f"joints {number}", Target(joints=positions_at(arm, shares)))
         for number, shares in enumerate(JOINT_TOUR, 1)
     ]
     poses = [
-        Stop(f"tool {number}", Target(position=tool_at(arm, positions_at(arm, shares))))
+        TourMove(f"tool {number}", Target(position=tool_at(arm, positions_at(arm, shares))))
         for number, shares in enumerate(POSE_TOUR, 1)
     ]
     home = Target(joints=arm.reference_position)
-    return (*named, Stop("home", home), *joints, *poses)
+    return (*named, TourMove("home", home), *joints, *poses)
 
 
 def positions_at(arm: Arm, shares: tuple[float, ...]) -> tuple[float, ...]:

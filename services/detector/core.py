@@ -26,7 +26,7 @@ from services.detector.regions import (
     rows_of,
     unclear_region,
 )
-from services.detector.user_models import BadModel, Found, Standing, UserModel, standing
+from services.detector.user_models import BadModel, Found, PlacedThing, UserModel, standing
 from services.vision.boxes import (
     BoxFit,
     ColourImage,
@@ -241,7 +241,7 @@ def _by_model(cell: Cell, models: Mapping[Path, UserModel]) -> dict[Path, list[t
     return found
 
 
-def _class_item(view: View, thing: OnnxThing, found: Found, plane: Array, place: Standing) -> Detection:
+def _class_item(view: View, thing: OnnxThing, found: Found, plane: Array, place: PlacedThing) -> Detection:
     left, upper, right, lower = found.sides
     pose = plane @ place.plane_from_box
     return Detection(

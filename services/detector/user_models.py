@@ -46,7 +46,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Standing:
+class PlacedThing:
     """Where a thing stands whose box in the image is known."""
 
     plane_from_box: Array  # (4, 4) of the middle of the thing
@@ -168,7 +168,7 @@ def _required_header(path: Path, size: int) -> Header:
     return header
 
 
-def standing(found: Found, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Standing | None:
+def standing(found: Found, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> PlacedThing | None:
     """Where on the plane a thing of edges `size` (3,) [m] stands that fills the box; None if none of that size does.
 
     How it is turned is only known as far as the box's shape says it: a square one stands along the axes.
@@ -185,7 +185,7 @@ def standing(found: Found, model: CameraModel, camera_from_plane: Array, size: S
     covariance = np.linalg.inv(slope.T @ slope) * max(error, PIXELS) ** 2
     pose = flat(values)
     pose[2, 3] = size[2] / 2.0
-    return Standing(pose, float(np.sqrt(covariance[0, 0] + covariance[1, 1])))
+    return PlacedThing(pose, float(np.sqrt(covariance[0, 0] + covariance[1, 1])))
 
 
 def _fit(

@@ -18,7 +18,7 @@ from services.runtime.clock_offset import ClockOffset
 DEVICE, VIEWER, VISUALIZER, GATEWAY = "virtual_esp32", "viewer", "visualizer", "stepper_gateway"
 
 
-class Standing(StrEnum):
+class ServiceState(StrEnum):
     """How one service is."""
 
     READY = "ready"
@@ -35,7 +35,7 @@ class ServiceStatus(msgspec.Struct, frozen=True, kw_only=True):
     host: str  # of the site's file; empty: of none
     robot: str  # empty: of the whole site
     service: str
-    standing: Standing
+    standing: ServiceState
     reason: str = ""
     machine: str = ""  # the name that its host gives itself; empty: not on the bus
     version: str = ""
@@ -73,7 +73,7 @@ def site_status(
 
 def is_well(found: tuple[ServiceStatus, ...]) -> bool:
     """True if all that the file has is ready, and nothing else is there."""
-    return all(each.standing is Standing.READY for each in found)
+    return all(each.standing is ServiceState.READY for each in found)
 
 
 def _expected(
@@ -96,17 +96,17 @@ def _expected(
 def _node(site: Site, host: str, robot: str, service: str, seen: SeenNode | None) -> ServiceStatus:
     if seen is None:
         return ServiceStatus(
-            host=host, robot=robot, service=service, standing=Standing.SILENT, reason="it is not on the bus"
+            host=host, robot=robot, service=service, standing=ServiceState.SILENT, reason="it is not on the bus"
         )
     if seen.info is None:
         reason = "it is on the bus, and does not answer"
-        return ServiceStatus(host=host, robot=robot, service=service, standing=Standing.SILENT, reason=reason)
+        return ServiceStatus(host=host, robot=robot, service=service, standing=ServiceState.SILENT, reason=reason)
     info, clock = seen.info, seen.clock
-    standing, reason = Standing.READY, ""
+    standing, reason = ServiceState.READY, ""
     if other := _other_host(site, host, info.host):
-        standing, reason = Standing.ELSEWHERE, f"it runs on {other}; the file has it on {host}"
+        standing, reason = ServiceState.ELSEWHERE, f"it runs on {other}; the file has it on {host}"
     elif not info.ready:
-        standing, reason = Standing.NOT_READY, info.problem or "it does not say why"
+        standing, reason = ServiceState.NOT_READY, info.problem or "it does not say why"
     return ServiceStatus(
         host=host, robot=robot, service=service, standing=standing, reason=reason, machine=info.host,
         version=info.version, pid=info.pid, clock_offset=None if clock is None else clock.offset,
@@ -121,27 +121,31 @@ def _other_host(site: Site, host: str, machine: str) -> str:
     return next((name for name, each in site.hosts.items() if machine in (name, each.address)), "")
 
 
-def _from_others(service: str, robot: str, seen: Mapping[str, SeenRobot]) -> tuple[Standing, str]:
+def _from_others(service: str, robot: str, seen: Mapping[str, SeenRobot]) -> tuple[ServiceState, str]:
     """What is not on the bus, by those that need it."""
     at = seen.get(robot, SeenRobot())
     match service:
         case _ if service == ROUTER:
-            return Standing.READY, ""  # all this came through it
+            return ServiceState.READY, ""  # all this came through it
         case _ if service == BROKER:
             devices = [each.device for each in seen.values() if each.device is not None]
             if any(each.online for each in devices):
-                return Standing.READY, ""
+                return ServiceState.READY, ""
             why = next((each.reason for each in devices if each.reason), "no gateway says anything of its device")
-            return Standing.UNKNOWN, why
+            return ServiceState.UNKNOWN, why
         case _ if service == DEVICE:
             if at.device is None:
-                return Standing.UNKNOWN, f"{GATEWAY} says nothing of it"
-            return (Standing.READY, "") if at.device.online else (Standing.SILENT, at.device.reason or "it is offline")
+                return ServiceState.UNKNOWN, f"{GATEWAY} says nothing of it"
+            return (
+                (ServiceState.READY, "")
+                if at.device.online
+                else (ServiceState.SILENT, at.device.reason or "it is offline")
+            )
         case _:
             shown = at.nodes.get(VISUALIZER)
             if service != VIEWER or shown is None or shown.info is None:
-                return Standing.UNKNOWN, f"{VISUALIZER} says nothing of it"
-            return (Standing.READY, "") if shown.info.ready else (Standing.UNKNOWN, shown.info.problem)
+                return ServiceState.UNKNOWN, f"{VISUALIZER} says nothing of it"
+            return (ServiceState.READY, "") if shown.info.ready else (ServiceState.UNKNOWN, shown.info.problem)
 
 
 def _not_expected(site: Site, seen: Mapping[str, SeenRobot]) -> Iterator[ServiceStatus]:
@@ -154,7 +158,8 @@ def _not_expected(site: Site, seen: Mapping[str, SeenRobot]) -> Iterator[Service
                 continue
             info, clock = node.info or NodeInfo(), node.clock
             yield ServiceStatus(
-                host="", robot=robot, service=name, standing=Standing.NOT_EXPECTED, reason=reason, machine=info.host,
+                host="", robot=robot, service=name, standing=ServiceState.NOT_EXPECTED, reason=reason,
+                machine=info.host,
                 version=info.version, pid=info.pid, clock_offset=None if clock is None else clock.offset,
                 clock_bound=0.0 if clock is None else clock.bound,
             )  # fmt: skip

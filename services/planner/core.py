@@ -74,7 +74,7 @@ class Planner:
         self._waypoints = WaypointPlanner(arm, self._goals, self.checker, self._collision_refusals, self._search)
 
     def set_world(self, world: World) -> None:
-        """What later plans heed; a plan that is being made is held against it at its end."""
+        """Sets the scene of later plans; a plan that is being made is held against it at its end."""
         self.checker.newest = world
 
     def prepare(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from services.bench.ledger import LEVEL, POPULATIONS, SEED, Seen, simulate, text_of
+from services.bench.ledger import LEVEL, POPULATIONS, SEED, StateAfterMove, simulate, text_of
 
 MOVES = 150
 
@@ -21,5 +21,5 @@ def test_of_all_states_that_it_calls_sure_95_percent_have_lost_no_step(name: str
 
 
 def test_every_state_stands_in_one_row_of_the_table() -> None:
-    rows = text_of([Seen(c, False) for c in (0.0, 0.5, 0.79, 0.8, 0.9, 0.95, 0.99, 1.0)]).splitlines()[2:-2]
+    rows = text_of([StateAfterMove(c, False) for c in (0.0, 0.5, 0.79, 0.8, 0.9, 0.95, 0.99, 1.0)]).splitlines()[2:-2]
     assert [row.split()[3] for row in rows] == ["1", "2", "1", "1", "1", "2"]

@@ -483,7 +483,7 @@ def test_a_goal_of_somebody_else_is_cancelled_and_one_that_is_none_is_named(sess
 
 def test_a_goal_is_followed_to_its_result(session, connected, stack, planner, capsys):
     motion = connected.start(joints=dict(zip(session.arm.joint_names, (0.0, 0.0, 0.0), strict=True)))
-    shown = action_watch.Shown(FOLLOW_JOINT_TRAJECTORY)
+    shown = action_watch.ActionView(FOLLOW_JOINT_TRAJECTORY)
     assert action_watch.echo(session, FOLLOW_JOINT_TRAJECTORY, 1, shown) is ExitCode.OK
     said = capsys.readouterr().out
     assert f"goal {motion.goal_id} of" in said
@@ -497,7 +497,7 @@ def test_a_part_of_an_action_and_a_field_of_it_are_followed(
     goal = dict(zip(arm.joint_names, (0.0, 0.0, 0.0), strict=True))
 
     def followed(part: str, path: str, form) -> list[str]:
-        shown = action_watch.Shown(FOLLOW_JOINT_TRAJECTORY, part, path, form)
+        shown = action_watch.ActionView(FOLLOW_JOINT_TRAJECTORY, part, path, form)
         with Node("cli-3", deployment, robot="rm1", bus=MemoryBus(network)) as node:
             connected.start(joints=goal)
             session = Session(deployment, arm, node)

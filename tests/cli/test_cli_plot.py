@@ -15,7 +15,7 @@ from schemas.joints import JointState, StepErrors
 from schemas.message import Message
 from schemas.topics import JOINT_STATES, STEP_ERRORS, Delivery, Topic
 from services.cli import living_topics
-from services.cli.chart import ACROSS, BLANK, DOTS, DOWN, LABEL, Curve, chart
+from services.cli.chart import ACROSS, BLANK, DOTS, DOWN, LABEL, ChartCurve, chart
 from services.cli.errors import CommandError, ExitCode
 from services.cli.field_path import FieldPath
 from services.cli.main import run
@@ -52,7 +52,7 @@ def numbers(text: str) -> list[tuple[int, float]]:
 @given(st.lists(VALUES, min_size=1, max_size=40))
 def test_every_point_is_a_dot_within_the_panel_and_the_highest_is_above_the_lowest(values: list[float]) -> None:
     points = [(float(index), value) for index, value in enumerate(values)]
-    text = chart([Curve("a.b", points)], 0.0, float(max(len(values) - 1, 1)), COLUMNS, ROWS)
+    text = chart([ChartCurve("a.b", points)], 0.0, float(max(len(values) - 1, 1)), COLUMNS, ROWS)
     drawn = dots(text)
     assert {x for x, _ in drawn} <= set(range((COLUMNS - LABEL - 2) * ACROSS))
     assert {y for _, y in drawn} <= set(range(ROWS * DOWN))
@@ -63,7 +63,7 @@ def test_every_point_is_a_dot_within_the_panel_and_the_highest_is_above_the_lowe
 
 @given(VALUES, st.floats(1e-3, 1e6))
 def test_the_numbers_of_the_axis_are_where_their_values_are_drawn(low: float, span: float) -> None:
-    text = chart([Curve("a.b", [(0.0, low), (10.0, low + span)])], 0.0, 10.0, COLUMNS, ROWS)
+    text = chart([ChartCurve("a.b", [(0.0, low), (10.0, low + span)])], 0.0, 10.0, COLUMNS, ROWS)
     told = numbers(text)
     assert told
     assert [row for row, _ in told] == sorted((row for row, _ in told))
@@ -80,12 +80,12 @@ def test_a_gap_is_not_joined() -> None:
     whole = [(float(index), 1.0 + index % 2) for index in range(11)]
     gap = [(time, math.nan if 3.0 <= time <= 7.0 else value) for time, value in whole]
     middle = range((COLUMNS - LABEL - 2) * ACROSS * 4 // 10, (COLUMNS - LABEL - 2) * ACROSS * 6 // 10)
-    assert any(x in middle for x, _ in dots(chart([Curve("a.b", whole)], 0.0, 10.0, COLUMNS, ROWS)))
-    assert not any(x in middle for x, _ in dots(chart([Curve("a.b", gap)], 0.0, 10.0, COLUMNS, ROWS)))
+    assert any(x in middle for x, _ in dots(chart([ChartCurve("a.b", whole)], 0.0, 10.0, COLUMNS, ROWS)))
+    assert not any(x in middle for x, _ in dots(chart([ChartCurve("a.b", gap)], 0.0, 10.0, COLUMNS, ROWS)))
 
 
 def test_a_panel_names_its_curve_with_unit_newest_value_and_range_and_counts_the_time_back() -> None:
-    text = chart([Curve("joint_states.position[0]", [(0.0, -0.5), (10.0, 0.25)])], 0.0, 10.0, COLUMNS, ROWS, "rad")
+    text = chart([ChartCurve("joint_states.position[0]", [(0.0, -0.5), (10.0, 0.25)])], 0.0, 10.0, COLUMNS, ROWS, "rad")
     lines = text.splitlines()
     assert lines[0] == "joint_states.position[0] [rad]: 0.25, from -0.5 to 0.25"
     assert "-10 s" in lines[-1]

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.cli.ra_intake import RaIntake, Refused
+from services.cli.ra_intake import RaIntake, RefusedMessage
 from services.virtual_arm.virtual_arm import VirtualArm, rm1
 
 STANDS = (0, 0, 0)
@@ -45,7 +45,7 @@ def test_no_remainder_of_any_message_is_lost(moves: list[tuple[float, float, flo
     intake, wanted = RaIntake(rm1()), [Fraction(0)] * 3
     ratios = [joint.steps.steps_per_turn / 360 for joint in rm1().joints]
     for move in moves:
-        with contextlib.suppress(Refused):
+        with contextlib.suppress(RefusedMessage):
             intake.take(said(*move), STANDS)
             wanted = [a + Fraction(b) * ratio for a, b, ratio in zip(wanted, move, ratios, strict=True)]
     assert intake._target is None or list(intake._target) == wanted
@@ -55,7 +55,7 @@ def test_a_message_beyond_a_limit_is_refused_and_what_was_asked_before_stays() -
     intake = RaIntake(rm1())
     intake.take(said(90.0, 0.0, 0.0), STANDS)
     before = intake.target
-    with pytest.raises(Refused, match=r'joint "brazo_joint" \(q1\).*beyond its limit of 2\.9500 rad: 10\.97'):
+    with pytest.raises(RefusedMessage, match=r'joint "brazo_joint" \(q1\).*beyond its limit of 2\.9500 rad: 10\.97'):
         intake.take(said(90.0, 0.0, 0.0), STANDS)
     assert intake.target == before
 
@@ -75,7 +75,7 @@ def test_a_message_beyond_a_limit_is_refused_and_what_was_asked_before_stays() -
     ],
 )
 def test_what_cannot_be_followed_is_refused_with_the_reason(payload: bytes, reason: str) -> None:
-    with pytest.raises(Refused, match=reason):
+    with pytest.raises(RefusedMessage, match=reason):
         RaIntake(rm1()).take(payload, STANDS)
 
 
@@ -96,5 +96,5 @@ def test_after_a_stop_the_next_message_counts_from_where_the_arm_is() -> None:
 @settings(max_examples=150)
 @given(st.binary(max_size=300) | st.text(max_size=60).map(lambda text: json.dumps({"q1": text}).encode()))
 def test_any_bytes_are_followed_or_refused(payload: bytes) -> None:
-    with contextlib.suppress(Refused):
+    with contextlib.suppress(RefusedMessage):
         RaIntake(rm1()).take(payload, STANDS)

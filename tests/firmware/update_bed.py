@@ -28,7 +28,7 @@ from services.arm.model.description import load_arm
 from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.cli.provision import BAUD, open_line
-from services.cli.update_transfer import BoardStatus, SerialWire, Wire, await_status
+from services.cli.update_transfer import SerialWire, UpdateStatus, Wire, await_status
 from services.mqtt.access import BrokerAccess
 from services.runtime.firmware_update import UpdateAck
 from services.runtime.process.readiness import Readiness
@@ -145,5 +145,5 @@ class LossyWire:
     def knock(self) -> None:
         self._wire.knock()
 
-    def take(self, patience: float) -> UpdateAck | BoardStatus | None:
+    def take(self, patience: float) -> UpdateAck | UpdateStatus | None:
         return self._wire.take(patience)

@@ -15,7 +15,7 @@ from schemas.topics import DEVICE_STATUS
 from services.cli.deploy_status import summary
 from services.cli.main import run
 from services.hosts.checks import load_site
-from services.hosts.status import SeenNode, SeenRobot, Standing, is_well, site_status
+from services.hosts.status import SeenNode, SeenRobot, ServiceState, is_well, site_status
 from services.runtime.clock_offset import ClockOffset
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
@@ -52,7 +52,7 @@ def test_a_site_that_is_as_its_file_says_is_well_and_every_clock_is_told():
 @given(st.sets(st.sampled_from(sorted(HOST))))
 def test_exactly_what_is_silent_is_named(silent):
     found = status({name: each for name, each in all_well().items() if name not in silent})
-    named = {name for name, each in found.items() if each.standing is Standing.SILENT}
+    named = {name for name, each in found.items() if each.standing is ServiceState.SILENT}
     assert named == silent
     assert is_well(tuple(found.values())) == (not silent)
     for name in silent:
@@ -62,36 +62,36 @@ def test_exactly_what_is_silent_is_named(silent):
 @given(st.sets(st.sampled_from(sorted(SERVICES))))
 def test_exactly_what_the_file_does_not_have_is_named(besides):
     found = status(all_well() | {name: node("attic") for name in besides - set(HOST)})
-    named = {name for name, each in found.items() if each.standing is Standing.NOT_EXPECTED}
+    named = {name for name, each in found.items() if each.standing is ServiceState.NOT_EXPECTED}
     assert named == besides - set(HOST)
 
 
 def test_a_robot_that_the_file_does_not_have_is_named_and_people_and_programs_are_not():
     other = SeenRobot({"planner": node("attic"), "my_program": node("attic")})
     found = site_status(SITE, {"rm1": SeenRobot(all_well(), ONLINE), "parol6": other})
-    (named,) = (each for each in found if each.standing is Standing.NOT_EXPECTED)
+    (named,) = (each for each in found if each.standing is ServiceState.NOT_EXPECTED)
     assert (named.robot, named.service, named.machine) == ("parol6", "planner", "attic")
     assert named.reason == "the file has no robot parol6"
 
 
 def test_why_a_service_is_not_ready_is_told_in_its_own_words():
     found = status(all_well() | {"logger": node("brain", ready=False, problem="the disk is full")})
-    assert (found["logger"].standing, found["logger"].reason) == (Standing.NOT_READY, "the disk is full")
+    assert (found["logger"].standing, found["logger"].reason) == (ServiceState.NOT_READY, "the disk is full")
 
 
 def test_a_service_that_hangs_and_one_on_another_host_are_told_apart():
     found = status(all_well() | {"planner": SeenNode(), "logger": node("cell")})
-    assert (found["planner"].standing, found["planner"].reason[-15:]) == (Standing.SILENT, "does not answer")
-    assert found["logger"].standing is Standing.ELSEWHERE
+    assert (found["planner"].standing, found["planner"].reason[-15:]) == (ServiceState.SILENT, "does not answer")
+    assert found["logger"].standing is ServiceState.ELSEWHERE
     assert found["logger"].reason == "it runs on cell; the file has it on brain"
 
 
 def test_what_is_not_on_the_bus_is_judged_by_who_needs_it():
     away = status(all_well(), DeviceStatus(reason="the broker at 10.0.0.11 does not answer"))
-    assert (away["virtual_esp32"].standing, away["broker"].standing) == (Standing.SILENT, Standing.UNKNOWN)
+    assert (away["virtual_esp32"].standing, away["broker"].standing) == (ServiceState.SILENT, ServiceState.UNKNOWN)
     assert away["broker"].reason == "the broker at 10.0.0.11 does not answer"
     silent = status({}, None)
-    assert silent["virtual_esp32"].standing is silent["broker"].standing is Standing.UNKNOWN
+    assert silent["virtual_esp32"].standing is silent["broker"].standing is ServiceState.UNKNOWN
 
 
 def test_two_versions_are_told():

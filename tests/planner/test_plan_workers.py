@@ -26,7 +26,7 @@ from services.planner.core import Planner
 from services.planner.workers import worker
 from services.planner.workers import workers as module
 from services.planner.workers.jobs import Job
-from services.planner.workers.process import Process
+from services.planner.workers.process import PlannerProcess
 from services.planner.workers.workers import Workers
 from tests.planner.native.scenes import star_mesh, stl_of
 
@@ -103,13 +103,13 @@ def test_a_change_of_the_scene_reaches_a_process_that_has_nothing_to_do(stack: S
     stack.ask(EASY)
     assert stack.answer().code is PlanCode.SUCCESS
     shown: SimpleQueue[PlanningScene] = SimpleQueue()
-    show = Process.show
+    show = PlannerProcess.show
 
-    def seen(process: Process, scene: PlanningScene, *others: Callable[[], None]) -> None:
+    def seen(process: PlannerProcess, scene: PlanningScene, *others: Callable[[], None]) -> None:
         show(process, scene, *others)
         shown.put(scene)
 
-    monkeypatch.setattr(Process, "show", seen)
+    monkeypatch.setattr(PlannerProcess, "show", seen)
     stack.scene = PlanningScene(version=2)
     while shown.get(timeout=PATIENCE) is not stack.scene:
         pass
@@ -173,15 +173,15 @@ def test_a_plan_whose_process_dies_meanwhile_is_made_again_in_the_time_that_is_l
 def test_a_plan_that_ends_two_processes_is_refused_and_the_next_made(stack: Stack, monkeypatch: pytest.MonkeyPatch):
     stack.ask(EASY)
     assert stack.answer().code is PlanCode.SUCCESS
-    plan = Process.plan
+    plan = PlannerProcess.plan
 
-    def killed(process: Process, *others: Any) -> PlanResponse:
+    def killed(process: PlannerProcess, *others: Any) -> PlanResponse:
         for worker_process in planning_processes():
             worker_process.kill()
         return plan(process, *others)
 
     with monkeypatch.context() as killing:
-        killing.setattr(Process, "plan", killed)
+        killing.setattr(PlannerProcess, "plan", killed)
         stack.ask(EASY)
         response = stack.answer()
     assert response.code is PlanCode.FAILURE

@@ -19,7 +19,7 @@ from services.stepper_gateway.motion.knot_sources import PathKnots
 from services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot, whole_steps
 from services.stepper_gateway.motion.limits import Limits
 from services.stepper_gateway.motion.path_joining import JoinedPath, join_path
-from services.stepper_gateway.motion.paths import Path, RoundedPath, SampledPath, profile
+from services.stepper_gateway.motion.paths import RoundedPath, SampledPath, TimedPath, profile
 from services.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.harness import ROOT, move
 
@@ -33,7 +33,7 @@ def corners(*rows: Vector, spacing: float = 1.0) -> JointTrajectory:
     return JointTrajectory(joint_names=rm1().joint_names, points=points)
 
 
-def derivative(path: Path, t: float, field: int, joint: int, h: float = 1e-5) -> float:
+def derivative(path: TimedPath, t: float, field: int, joint: int, h: float = 1e-5) -> float:
     return (path.at(t + h)[field][joint] - path.at(t - h)[field][joint]) / (2 * h)
 
 

@@ -18,7 +18,7 @@ from services.arm.errors import DescriptionError
 from services.arm.model.description import load_arm
 from services.arm.motors.relative_moves import Ramp, ramp_of
 from services.stepper_gateway.links.foreign.ra_messages import (
-    BadMessage,
+    BadRaMessage,
     degrees,
     joints_message,
     read_sensors,
@@ -104,9 +104,9 @@ def test_the_old_publisher_at_10_hz_loses_what_the_sketch_has_not_done_in_time()
      b'{"ultra": ' + b"9" * 400 + b"}", b"[" * 200],
 )  # fmt: skip
 def test_what_is_no_reading_is_refused_with_a_sentence(payload: bytes) -> None:
-    with pytest.raises(BadMessage):
+    with pytest.raises(BadRaMessage):
         read_sensors(payload)
-    with pytest.raises(BadMessage):
+    with pytest.raises(BadRaMessage):
         read_states(payload)
 
 
@@ -114,7 +114,7 @@ def test_what_is_no_reading_is_refused_with_a_sentence(payload: bytes) -> None:
 @given(st.binary(max_size=300) | st.text(max_size=100).map(lambda text: json.dumps({"ultra": text}).encode()))
 def test_any_bytes_are_read_or_refused(payload: bytes) -> None:
     for read in (read_sensors, read_states):
-        with contextlib.suppress(BadMessage):
+        with contextlib.suppress(BadRaMessage):
             assert read(payload).values
 
 

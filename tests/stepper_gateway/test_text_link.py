@@ -21,7 +21,7 @@ from schemas.robot import Dialect
 from services.arm.model.description import Arm, heard_by_the_board, load_arm
 from services.stepper_gateway.links.foreign.text_exchange import RETRIES, TextExchange
 from services.stepper_gateway.links.foreign.text_link import TextLink
-from services.stepper_gateway.links.foreign.text_messages import Answer, AnswerReader, line_of, read_answer
+from services.stepper_gateway.links.foreign.text_messages import AnswerReader, LineAnswer, line_of, read_answer
 from services.stepper_gateway.main import baud_of, open_device
 from services.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.dialects import robot_with
@@ -157,11 +157,11 @@ def test_an_answer_to_a_line_that_counts_as_lost_is_late() -> None:
     exchange = exchange_of(2)
     exchange.again(1.0)
     assert exchange.counts.lost == 1
-    assert exchange.on_answer(Answer(1, 5), 1.1)
+    assert exchange.on_answer(LineAnswer(1, 5), 1.1)
     assert (exchange.counts.late, exchange.counts.doubled) == (1, 0)
-    assert not exchange.on_answer(Answer(1, 5), 1.2)
+    assert not exchange.on_answer(LineAnswer(1, 5), 1.2)
     assert exchange.counts.doubled == 1
-    exchange.on_answer(Answer(77, 5), 1.2)
+    exchange.on_answer(LineAnswer(77, 5), 1.2)
     assert exchange.counts.strange == 1
 
 
@@ -180,11 +180,11 @@ def test_numbers_wrap_at_32_bits_and_time_stamps_do_too() -> None:
     exchange = TextExchange(first_seq=(1 << 32) - 1)
     assert exchange.sent(b"a", 0.0) == (1 << 32) - 1
     assert exchange.sent(b"b", 0.0) == 0
-    exchange.on_answer(Answer((1 << 32) - 1, (1 << 32) - 10), 0.1)
-    exchange.on_answer(Answer(0, 5), 0.1)
+    exchange.on_answer(LineAnswer((1 << 32) - 1, (1 << 32) - 10), 0.1)
+    exchange.on_answer(LineAnswer(0, 5), 0.1)
     assert exchange.counts.backwards == 0
     exchange.sent(b"c", 0.2)
-    exchange.on_answer(Answer(1, 2), 0.3)
+    exchange.on_answer(LineAnswer(1, 2), 0.3)
     assert exchange.counts.backwards == 1, "the board has started anew"
 
 
@@ -205,7 +205,7 @@ def test_any_bytes_are_answers_or_counted_and_take_no_memory(pieces: list[bytes]
             assert 0 <= answer.seq < 1 << 32
     assert len(reader._rest) <= 64
     reader.feed(b">")
-    assert reader.feed(b"<ACK,9,1>\n") == [Answer(9, 1)], "what came before does not spoil what follows"
+    assert reader.feed(b"<ACK,9,1>\n") == [LineAnswer(9, 1)], "what came before does not spoil what follows"
 
 
 @pytest.mark.parametrize(

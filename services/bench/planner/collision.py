@@ -42,7 +42,7 @@ def state_check_us() -> Figure:
     reference = {
         "pinocchio + coal, same scene": coal_us(arm),
         "services.arm.kinematics, self only": self_us(arm),
-        "motion core, one posture a call": single_us(core, rows),
+        "motion core, one configuration a call": single_us(core, rows),
         "rm1, motion core": batch_us(rm1()),
         "rm1, pinocchio + coal, same scene": coal_us(rm1()),
     }

@@ -89,7 +89,7 @@ def look(
     seconds: float,
     cancel: CancelFlag | None,
 ) -> tuple[int, Array]: ...
-def doubts(
+def unresolved(
     world: World, kernel: Kernel, rows: Array, margin: float, finest: float
 ) -> list[tuple[float, float, Integers]]: ...
 def plan(

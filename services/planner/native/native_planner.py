@@ -126,7 +126,7 @@ class NativePlanner:
     def unresolved_intervals(self, rows: ArrayLike) -> list[UnresolvedInterval]:
         """Where the polyline through `rows` (m, n) [rad] or [m] is not known to keep the margin, in order."""
         compiled_scene = self._scene
-        found = motion.doubts(compiled_scene.world, self._kernel, self._rows(rows), self.margin, COARSE)
+        found = motion.unresolved(compiled_scene.world, self._kernel, self._rows(rows), self.margin, COARSE)
         name_of = compiled_scene.name_of
         return [
             UnresolvedInterval(

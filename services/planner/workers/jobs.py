@@ -16,7 +16,7 @@ LENGTH = struct.Struct("<I")
 
 
 class Show(msgspec.Struct, frozen=True, tag=True):
-    """What later plans are to heed: seconds of work where there is a large mesh, and none of a plan's time."""
+    """The scene of later plans: seconds of work where there is a large mesh, and none of a plan's time."""
 
     scene: PlanningScene
 

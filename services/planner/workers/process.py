@@ -50,7 +50,7 @@ class WorkerDied(Exception):
     """The process has ended."""
 
 
-class Process:
+class PlannerProcess:
     """For one thread, but `end`."""
 
     def __init__(self, folder: Path, project: Path) -> None:

@@ -27,7 +27,7 @@ from services.arm.model.gripper import JAWS
 from services.planner.core import LONGEST
 from services.planner.workers.jobs import Job
 from services.planner.workers.pending_plan import Answer, Cancelled, OnInputs, PendingPlan
-from services.planner.workers.process import Late, Process, WorkerDied, nothing
+from services.planner.workers.process import Late, PlannerProcess, WorkerDied, nothing
 
 MOST = 2  # processes; chosen: as many as small computers have cores for it
 LATEST = 0.08  # of the allowed time, beyond it, when the plan is answered whatever its process does; chosen: little
@@ -57,7 +57,7 @@ class Workers:
         self._folder, self._project = folder, project
         self._present, self._scene = present, scene
         self._tasks: SimpleQueue[PendingPlan | None] = SimpleQueue()
-        self._processes: list[Process] = []
+        self._processes: list[PlannerProcess] = []
         self._threads: list[threading.Thread] = []
         self._pending_plans: dict[str, PendingPlan] = {}
         self._numbers = itertools.count(1)
@@ -130,13 +130,13 @@ class Workers:
         answer(response)
 
     def _start_one(self) -> None:
-        process = Process(self._folder, self._project)
+        process = PlannerProcess(self._folder, self._project)
         thread = threading.Thread(target=self._work, args=(process,), daemon=True, name="planner worker")
         self._processes.append(process)
         self._threads.append(thread)
         thread.start()
 
-    def _work(self, process: Process) -> None:
+    def _work(self, process: PlannerProcess) -> None:
         prepared: PlanningScene | None = None
         while True:
             scene = self._scene()
@@ -156,13 +156,13 @@ class Workers:
                 prepared = None
         process.close()
 
-    def _prepare(self, process: Process, scene: PlanningScene) -> None:
+    def _prepare(self, process: PlannerProcess, scene: PlanningScene) -> None:
         """Waits for it and its scene, before a plan would have to; what keeps it from that the next plan says."""
         with suppress(TimeoutError, WorkerDied):
             process.be_ready()
             process.show(scene)
 
-    def _answer(self, process: Process, pending_plan: PendingPlan) -> bool:
+    def _answer(self, process: PlannerProcess, pending_plan: PendingPlan) -> bool:
         """True if the process is still at a plan that has been answered because its time was over."""
         try:
             pending_plan.end(self._planned(process, pending_plan))
@@ -171,7 +171,7 @@ class Workers:
             return True
         return False
 
-    def _planned(self, process: Process, pending_plan: PendingPlan) -> PlanResponse | None:
+    def _planned(self, process: PlannerProcess, pending_plan: PendingPlan) -> PlanResponse | None:
         """A plan in the scene as it is at the plan's end; None for one that was cancelled."""
         request, deaths = pending_plan.request, 0
         for _ in range(AGAIN):

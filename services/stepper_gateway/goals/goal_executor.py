@@ -20,7 +20,7 @@ from services.stepper_gateway.moment import Moment, next_beat
 from services.stepper_gateway.motion.commanded_path import PathPoint
 from services.stepper_gateway.motion.knot_sources import PathKnots
 from services.stepper_gateway.motion.motion_controller import MotionController
-from services.stepper_gateway.motion.paths import Path
+from services.stepper_gateway.motion.paths import TimedPath
 from services.stepper_gateway.outputs import GoalExecuting, GoalFinished, GoalProgress
 
 HELD = {  # by the detail of the device's event
@@ -232,7 +232,7 @@ class GoalExecutor:
         feedback = execution.feedback(point, state, positions, moment.unix)
         self._device.out.put(GoalProgress(execution.goal_id, feedback))
 
-    def _start_waiting(self, moment: Moment, path: Path | None = None) -> None:
+    def _start_waiting(self, moment: Moment, path: TimedPath | None = None) -> None:
         """Begin the goal that waits if its time has come; `path` is known if it was accepted this very moment."""
         execution, controller = self._waiting, self._controller
         if execution is None or execution.goal.trajectory.stamp > moment.unix:

@@ -15,7 +15,7 @@ from services.stepper_gateway.goals.trajectory_checks import Tolerances, ordered
 from services.stepper_gateway.motion.knots import Knot, whole_steps
 from services.stepper_gateway.motion.limits import Limits
 from services.stepper_gateway.motion.path_joining import join_path
-from services.stepper_gateway.motion.paths import Path, RoundedPath, SampledPath, profile
+from services.stepper_gateway.motion.paths import RoundedPath, SampledPath, TimedPath, profile
 from services.stepper_gateway.parameters import GatewayParameters
 
 SAME_VELOCITY = 1e-9  # [rad/s] or [m/s] chosen: rounding of a velocity that was computed
@@ -80,7 +80,9 @@ class GoalValidator:
         require_points_within(trajectory, self._joints)
         return ValidatedGoal(trajectory, path_bounds, end_bounds, late, PlannedIn.of(goal))
 
-    def path(self, goal: ValidatedGoal, motion_start: MotionStart, now: int, parameters: GatewayParameters) -> Path:
+    def path(
+        self, goal: ValidatedGoal, motion_start: MotionStart, now: int, parameters: GatewayParameters
+    ) -> TimedPath:
         """The path from where the arm is, all of it within the limits; raises `GoalRejected`."""
         trajectory = goal.trajectory
         offset = max(0.0, (now - trajectory.stamp) * 1e-9) if trajectory.stamp else 0.0
@@ -98,7 +100,7 @@ class GoalValidator:
             raise invalid("no way from the arm's present motion onto the trajectory stays within the joint limits")
         return joined
 
-    def _single_point(self, point: TrajectoryPoint, start: Knot, offset: float) -> Path:
+    def _single_point(self, point: TrajectoryPoint, start: Knot, offset: float) -> TimedPath:
         """Straight there in exactly the time given, jerk-limited: a goal without a planner."""
         target = Knot.at_rest(point.positions)
         fastest = profile(start, target, self._limits)
@@ -141,7 +143,7 @@ class GoalValidator:
                 )
 
 
-def _path(trajectory: JointTrajectory, start: Knot, offset: float, corner: float) -> Path:
+def _path(trajectory: JointTrajectory, start: Knot, offset: float, corner: float) -> TimedPath:
     if not trajectory.points[0].velocities:
         return RoundedPath(trajectory, start.position, corner, offset)
     beginning = TrajectoryPoint(

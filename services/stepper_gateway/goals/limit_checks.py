@@ -7,7 +7,7 @@ from services.arm.model.description import Joint
 from services.stepper_gateway.goals.rejections import invalid
 from services.stepper_gateway.motion.knot_sources import KNOT_TIME
 from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.paths import Path
+from services.stepper_gateway.motion.paths import TimedPath
 from services.stepper_gateway.parameters import GatewayParameters
 
 SLACK = 1e-9  # [rad] or [m]: rounding of a limit that was computed
@@ -21,7 +21,9 @@ def require_points_within(trajectory: JointTrajectory, joints: tuple[Joint, ...]
                 raise invalid(f"{beyond(joint, position)} at point {index} ({point.time_from_start:.3f} s)")
 
 
-def require_path_within(path: Path, joints: tuple[Joint, ...], parameters: GatewayParameters, tick_hz: int) -> None:
+def require_path_within(
+    path: TimedPath, joints: tuple[Joint, ...], parameters: GatewayParameters, tick_hz: int
+) -> None:
     """The path between the points too, at twice the knots' rate; raises `GoalRejected`."""
     bounds = [_Bound(joint, parameters, tick_hz) for joint in joints]
     count = max(1, int(path.duration / (KNOT_TIME / 2)) + 1)

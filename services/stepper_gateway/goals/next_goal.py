@@ -12,7 +12,7 @@ from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.knot_sources import PathKnots
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.motion_controller import MotionController
-from services.stepper_gateway.motion.paths import Path
+from services.stepper_gateway.motion.paths import TimedPath
 
 CANCELED = GoalEnding(GoalStatusCode.CANCELED, FollowErrorCode.CANCELED, "the arm decelerated on its path")
 
@@ -50,7 +50,7 @@ class NextGoal:
         end = present.goal.target
         return MotionStart(Knot.at_rest(end), end, end, is_sent=True)
 
-    def put(self, execution: ActiveGoal, path: Path, present: ActiveGoal) -> None:
+    def put(self, execution: ActiveGoal, path: TimedPath, present: ActiveGoal) -> None:
         """Let it follow: in the stream where knots can still be added, else as soon as the arm rests."""
         self.goal = execution
         transmission, stream = self._controller.transmission, present.stream

@@ -29,7 +29,7 @@ PATIENCE = 3.0  # [s] beyond the travel time until a goal is given up; chosen: a
 
 
 @dataclass
-class Grip:
+class ActiveGrip:
     """A goal under way; times in [s] monotonic."""
 
     goal_id: str
@@ -53,7 +53,7 @@ class GripperExecutor:
         self._metres = METRES[gripper_unit(device.arm)]  # [m] of the sensor's unit
         self._sensor = getattr(self._gripper, "sensor", "")
         self._reading, self._read = 0.0, -1e9  # [m], [s] monotonic
-        self._grip: Grip | None = None
+        self._grip: ActiveGrip | None = None
         self._stalled = False
         self._due = 0.0  # [s] monotonic, of the next state
 
@@ -71,7 +71,7 @@ class GripperExecutor:
         now = moment.monotonic
         arrival = now + jaws.travel_time(goal.position)
         self._stalled = False
-        self._grip = Grip(goal_id, goal.position, now, arrival, arrival + PATIENCE)
+        self._grip = ActiveGrip(goal_id, goal.position, now, arrival, arrival + PATIENCE)
         self._commands.have_sent(*jaws.sending(goal.position), self._answer_to(goal_id), moment)
         return GoalVerdict(True)
 
@@ -163,7 +163,7 @@ class GripperExecutor:
 
         return on_answer
 
-    def _follow(self, grip: Grip, jaws: Jaws, moment: Moment) -> None:
+    def _follow(self, grip: ActiveGrip, jaws: Jaws, moment: Moment) -> None:
         now, position = moment.monotonic, self._position(moment)
         if grip.answered is not None:
             if abs(position - grip.still_at) > STILL:
@@ -181,14 +181,14 @@ class GripperExecutor:
             feedback = GripperCommandFeedback(stamp=moment.unix, position=position, effort=self._effort(moment))
             self._device.out.put(GripperProgress(grip.goal_id, feedback))
 
-    def _is_there(self, grip: Grip, jaws: Jaws, moment: Moment) -> bool:
+    def _is_there(self, grip: ActiveGrip, jaws: Jaws, moment: Moment) -> bool:
         if not jaws.has_arrived or self._gripper is None:
             return False
         if not self._is_measured(moment):
             return moment.monotonic >= grip.arrival
         return abs(self._reading - grip.position) <= self._gripper.tolerance
 
-    def _is_stalled(self, grip: Grip, jaws: Jaws, moment: Moment) -> bool:
+    def _is_stalled(self, grip: ActiveGrip, jaws: Jaws, moment: Moment) -> bool:
         """The pulse is there, the jaws are not, and do not come nearer."""
         is_still = moment.monotonic - grip.still_since >= STALL_TIME
         return jaws.has_arrived and is_still and self._is_measured(moment)

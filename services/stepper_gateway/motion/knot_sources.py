@@ -7,7 +7,7 @@ from typing import Protocol
 
 from schemas.message import Vector
 from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.paths import Path
+from services.stepper_gateway.motion.paths import TimedPath
 from services.stepper_gateway.motion.target_tracker import TargetTracker
 
 KNOT_TIME = 0.02  # [s] between knots; chosen: one for each state of the device
@@ -30,7 +30,7 @@ class KnotSource(Protocol):
 class PathKnots:
     """A path in equal steps of at most `KNOT_TIME`, ending at rest exactly at its end."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: TimedPath) -> None:
         self._path = path
         self._count = max(1, math.ceil(path.duration / KNOT_TIME - 1e-9))
         self.dt_us = max(1000, math.ceil(path.duration / self._count * 1e6 - 1e-6))

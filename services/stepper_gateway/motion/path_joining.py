@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits
-from services.stepper_gateway.motion.paths import Path, ProfilePath, profile
+from services.stepper_gateway.motion.paths import ProfilePath, TimedPath, profile
 
 GRID = 0.02  # [s] between the times at which the path may be met; chosen: one for each knot
 GRID_POINTS = 150  # at most so many are tried, coarser on long paths; chosen: bounds the time of a step of the loop
@@ -18,7 +18,7 @@ Within = Callable[[Knot], bool]
 class JoinedPath:
     """The join until `meets`, then the path itself."""
 
-    def __init__(self, join: ProfilePath, path: Path, meets: float) -> None:
+    def __init__(self, join: ProfilePath, path: TimedPath, meets: float) -> None:
         self._bridge = join
         self._path = path
         self.meets = meets  # [s]
@@ -29,7 +29,7 @@ class JoinedPath:
         return self._bridge.at(t) if t < self.meets else self._path.at(t)
 
 
-def join_path(start: Knot, path: Path, limits: Limits, within: Within) -> Path | None:
+def join_path(start: Knot, path: TimedPath, limits: Limits, within: Within) -> TimedPath | None:
     """`path`, joined from `start` as early as the limits allow; else straight to its end; None if that leaves `within`.
 
     The join ends at the smallest time of the grid at which the state-to-state minimum is no longer than that

@@ -14,7 +14,7 @@ from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits
 
 
-class Path(Protocol):
+class TimedPath(Protocol):
     """A motion as a function of time."""
 
     @property

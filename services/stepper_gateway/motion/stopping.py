@@ -26,7 +26,7 @@ class Segment(NamedTuple):
     gains: tuple[float, ...]  # by which the speed rises over the segment; a reversal brakes first
 
 
-class Stop(NamedTuple):
+class StoppingPath(NamedTuple):
     """Until the path stands."""
 
     distance: float  # [m] of the tool's path
@@ -45,7 +45,7 @@ def segment(dt: float, length: float, first: Sequence[float], second: Sequence[f
 
 def stop_on(
     path: Sequence[Segment], limits: Sequence[float], y: float, top: float, reaction: float, *, ends: bool
-) -> Stop:
+) -> StoppingPath:
     """The stop on `path`, which begins where the arm is at y = s^2.
 
     `limits`: the joints' accelerations. Until `reaction` [s] have passed s may rise to `top`. `ends`: the path ends at
@@ -69,7 +69,7 @@ def stop_on(
             y = end
         if y <= SLOWEST:
             break
-    return Stop(CARE * distance + LEAST if distance > 0.0 else 0.0, time)
+    return StoppingPath(CARE * distance + LEAST if distance > 0.0 else 0.0, time)
 
 
 def _ceilings(path: Sequence[Segment], able: Sequence[float], last: float) -> list[float]:

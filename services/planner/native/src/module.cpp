@@ -284,27 +284,27 @@ nb::tuple look(const World& world, const Kernel& kernel, const Rows& rows, int d
                           array_of(Joints(validator.touching()), {validator.touching().size()}));
 }
 
-// Of a polyline that is not known to be free: for each range, in rows, begin and end, and the pairs (k, 2) in doubt.
-nb::list doubts(const World& world, const Kernel& kernel, const Rows& rows, double margin, double finest) {
+// Of a polyline that is not known to be free: for each range, in rows, begin and end, and the unresolved pairs (k, 2).
+nb::list unresolved(const World& world, const Kernel& kernel, const Rows& rows, double margin, double finest) {
     require_columns(rows.shape(1), static_cast<size_t>(world.dof()), "joint values");
     require_usable(rows.data(), rows.size());
     require(rows.shape(0) > 1, "a polyline needs two rows");
     Tolerances tolerances;
     tolerances.margin = margin;
     tolerances.finest = finest;
-    std::vector<MotionValidator::Doubt> found;
+    std::vector<MotionValidator::Unresolved> found;
     {
         nb::gil_scoped_release release;
         MotionValidator validator(world, kernel, tolerances);
         const Polyline path(rows.data(), rows.shape(0), rows.shape(1));
-        found = validator.doubts(path, StopCondition(std::numeric_limits<double>::infinity(), nullptr));
+        found = validator.unresolved(path, StopCondition(std::numeric_limits<double>::infinity(), nullptr));
     }
     nb::list result;
-    for (const auto& doubt : found) {
+    for (const auto& interval : found) {
         std::vector<int32_t> pairs;
-        for (const auto& pair : doubt.pairs) pairs.insert(pairs.end(), pair.begin(), pair.end());
-        const size_t count = doubt.pairs.size();
-        result.append(nb::make_tuple(doubt.begin, doubt.end, array_of(std::move(pairs), {count, size_t{2}})));
+        for (const auto& pair : interval.pairs) pairs.insert(pairs.end(), pair.begin(), pair.end());
+        const size_t count = interval.pairs.size();
+        result.append(nb::make_tuple(interval.begin, interval.end, array_of(std::move(pairs), {count, size_t{2}})));
     }
     return result;
 }
@@ -408,7 +408,7 @@ NB_MODULE(_motion, module) {
     module.def("first_contact", &first_contact, "world"_a, "kernel"_a, "row"_a, "margin"_a);
     module.def("look", &look, "world"_a, "kernel"_a, "rows"_a, "degree"_a, "margin"_a, "finest"_a, "seconds"_a,
                "cancel"_a.none());
-    module.def("doubts", &doubts, "world"_a, "kernel"_a, "rows"_a, "margin"_a, "finest"_a);
+    module.def("unresolved", &unresolved, "world"_a, "kernel"_a, "rows"_a, "margin"_a, "finest"_a);
     module.def("plan", &find, "world"_a, "kernel"_a, "bounds"_a, "start"_a, "goals"_a, "seed"_a, "margin"_a,
                "seconds"_a, "cancel"_a.none(), "enough"_a);
     add_trajectories(module);

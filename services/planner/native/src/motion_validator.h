@@ -67,13 +67,13 @@ class MotionValidator {
 
     // From where to where, in spans, the path is not known to be free, and of which pairs: parts, or a part and
     // kMaxParts + an obstacle.
-    struct Doubt {
+    struct Unresolved {
         double begin, end;
         std::vector<std::array<int32_t, 2>> pairs;
     };
 
     // In order; empty where all of the path is free.
-    std::vector<Doubt> doubts(const JointPath& path, const StopCondition& stop) {
+    std::vector<Unresolved> unresolved(const JointPath& path, const StopCondition& stop) {
         begin(path);
         std::vector<Stretch> found;
         for (size_t next = 0, count = 0; next < stretches_.size(); next += count) {
@@ -97,20 +97,20 @@ class MotionValidator {
     static double middle_of(const Stretch& stretch) { return static_cast<double>(stretch.span) + stretch.middle; }
 
     // In order, and those that meet as one, with the pairs of all of them.
-    std::vector<Doubt> joined(const JointPath& path, std::vector<Stretch> found) {
+    std::vector<Unresolved> joined(const JointPath& path, std::vector<Stretch> found) {
         std::sort(found.begin(), found.end(),
                   [](const Stretch& a, const Stretch& b) { return middle_of(a) < middle_of(b); });
         stretches_ = std::move(found);
-        std::vector<Doubt> result;
+        std::vector<Unresolved> result;
         for (size_t first = 0, next = 0; first < stretches_.size(); first = next) {
-            Doubt doubt{middle_of(stretches_[first]) - stretches_[first].half, 0.0, {}};
+            Unresolved interval{middle_of(stretches_[first]) - stretches_[first].half, 0.0, {}};
             for (next = first; next < stretches_.size(); ++next) {
                 const double begins = middle_of(stretches_[next]) - stretches_[next].half;
-                if (next > first && begins > doubt.end + 1e-9) break;
-                doubt.end = middle_of(stretches_[next]) + stretches_[next].half;
+                if (next > first && begins > interval.end + 1e-9) break;
+                interval.end = middle_of(stretches_[next]) + stretches_[next].half;
             }
-            doubt.pairs = near_pairs(path, first, next);
-            result.push_back(std::move(doubt));
+            interval.pairs = near_pairs(path, first, next);
+            result.push_back(std::move(interval));
         }
         return result;
     }

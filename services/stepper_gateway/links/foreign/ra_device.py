@@ -59,7 +59,7 @@ class RaDevice:
         read = ra_messages.read_states if topic == ra_messages.STATES else ra_messages.read_sensors
         try:
             values = read(payload).values
-        except ra_messages.BadMessage as error:
+        except ra_messages.BadRaMessage as error:
             return self._complain(str(error), now)
         self._sender.heard(now)
         self._heard = now

@@ -21,7 +21,7 @@ FLOAT_MARGIN = 2.0**-20
 _decoder = msgspec.json.Decoder(dict[str, int | float | bool | None])
 
 
-class BadMessage(ValueError):
+class BadRaMessage(ValueError):
     """What no sketch says; the text says what is wrong."""
 
 
@@ -51,28 +51,28 @@ def output_message(output: bool) -> bytes:
 
 
 def read_states(payload: bytes) -> Telemetry:
-    """`{"estado": int}`; raises `BadMessage`."""
+    """`{"estado": int}`; raises `BadRaMessage`."""
     values = _numbers(payload)
     if "estado" not in values:
-        raise BadMessage(f'{STATES} without "estado": {_shown(payload)}')
+        raise BadRaMessage(f'{STATES} without "estado": {_shown(payload)}')
     return Telemetry({"estado": values["estado"]})
 
 
 def read_sensors(payload: bytes) -> Telemetry:
-    """`{"ultra": int}`, `{"bateria": float}`, or `{"Estado": int, "ultra": int}`; raises `BadMessage`."""
+    """`{"ultra": int}`, `{"bateria": float}`, or `{"Estado": int, "ultra": int}`; raises `BadRaMessage`."""
     values = {name: value for name, value in _numbers(payload).items() if name in ("ultra", "bateria", "estado")}
     if not values:
-        raise BadMessage(f'{SENSORS} without "ultra", "bateria" or "Estado": {_shown(payload)}')
+        raise BadRaMessage(f'{SENSORS} without "ultra", "bateria" or "Estado": {_shown(payload)}')
     return Telemetry(values)
 
 
 def _numbers(payload: bytes) -> dict[str, float]:
     if len(payload) > LARGEST:
-        raise BadMessage(f"{len(payload)} bytes, more than the {LARGEST} of a sketch")
+        raise BadRaMessage(f"{len(payload)} bytes, more than the {LARGEST} of a sketch")
     try:
         found = _decoder.decode(payload)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadMessage(f"no JSON object of numbers: {_shown(payload)}: {error}") from error
+        raise BadRaMessage(f"no JSON object of numbers: {_shown(payload)}: {error}") from error
     named = ((name[:1].lower() + name[1:], value) for name, value in found.items() if value is not None)
     return {name: float(value) for name, value in named if math.isfinite(value)}
 

@@ -9,7 +9,7 @@ import statistics
 from collections import OrderedDict, deque
 from dataclasses import dataclass
 
-from services.stepper_gateway.links.foreign.text_messages import HALF, SEQ_MODULUS, Answer
+from services.stepper_gateway.links.foreign.text_messages import HALF, SEQ_MODULUS, LineAnswer
 
 REMEMBERED = 256  # lines whose answers are told apart; chosen: more than a line is repeated in its patience
 TRIPS = 2048  # latest round trips; chosen: enough for a 99th percentile
@@ -79,7 +79,7 @@ class TextExchange:
             self._lose(old)
         return seq
 
-    def on_answer(self, answer: Answer, now: float) -> bool:
+    def on_answer(self, answer: LineAnswer, now: float) -> bool:
         """True if it, which came at `now` [s], is the first answer to a line."""
         self.heard = now
         line = self._lines.get(answer.seq)

@@ -13,7 +13,7 @@ HALF = SEQ_MODULUS // 2
 _ANSWER = re.compile(rb"<(ACK|NAK),(\d{1,10}),([A-Za-z0-9_ ]{1,24})>")
 
 
-class Answer(NamedTuple):
+class LineAnswer(NamedTuple):
     """What the board says to one line."""
 
     seq: int
@@ -26,15 +26,15 @@ def line_of(seq: int, positions: Sequence[float], decimals: int) -> bytes:
     return f"<{seq},{','.join(f'{position:z.{decimals}f}' for position in positions)}>\n".encode()
 
 
-def read_answer(frame: bytes) -> Answer | None:
+def read_answer(frame: bytes) -> LineAnswer | None:
     """`frame` from `<` to `>`; None for what is no answer."""
     match = _ANSWER.fullmatch(frame)
     if match is None or int(match[2]) >= SEQ_MODULUS:
         return None
     seq, rest = int(match[2]), match[3].decode()
     if match[1] == b"NAK":
-        return Answer(seq, None, rest)
-    return Answer(seq, int(rest)) if rest.isdecimal() and int(rest) < 1 << 64 else None
+        return LineAnswer(seq, None, rest)
+    return LineAnswer(seq, int(rest)) if rest.isdecimal() and int(rest) < 1 << 64 else None
 
 
 class AnswerReader:
@@ -44,10 +44,10 @@ class AnswerReader:
         self._rest = b""
         self.bad = 0
 
-    def feed(self, data: bytes) -> list[Answer]:
+    def feed(self, data: bytes) -> list[LineAnswer]:
         """The answers that are complete now, oldest first."""
         self._rest += data
-        found: list[Answer] = []
+        found: list[LineAnswer] = []
         while (end := self._rest.find(b">")) >= 0:
             start = self._rest.rfind(b"<", 0, end)
             frame, self._rest = self._rest[max(0, start) : end + 1], self._rest[end + 1 :]
