@@ -34,8 +34,7 @@ def imported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     build: Callable[[Path], Export] = request.param
     folder = tmp_path_factory.mktemp(build.__name__)
     export = build(folder / "download")
-    capture = request.config.pluginmanager.getplugin("capturemanager")
-    with capture.global_and_fixture_disabled(), Said() as said:
+    with Said() as said:
         code = run(["import", str(export.source), "--yes", "--name", "arm", "--output", str(folder / "urdf")])
     assert code is ExitCode.OK, said.text
     return Imported(export, said.text, load_arm(folder / "urdf" / "arm"))
