@@ -33,36 +33,36 @@ class RaIntake:
     def __init__(self, arm: Arm) -> None:
         self._joints = arm.joints
         self._names = tuple(joint.wire_name for joint in arm.joints)
-        self._target: tuple[Fraction, ...] | None = None
+        self.target_steps: tuple[Fraction, ...] | None = None  # [steps] of each joint; None if nothing is asked for
 
     @property
     def target(self) -> tuple[float, ...] | None:
         """[rad] or [m] by joint; None if nothing is asked for."""
-        if self._target is None:
+        if self.target_steps is None:
             return None
-        return tuple(_position(joint, steps) for joint, steps in zip(self._joints, self._target, strict=True))
+        return tuple(_position(joint, steps) for joint, steps in zip(self._joints, self.target_steps, strict=True))
 
     def take(self, payload: bytes, stands: Sequence[int]) -> Wanted:
         """A message, while the arm stands at `stands` [steps]; raises `RefusedMessage`, and the target before stays."""
         wanted = self._read(payload)
         if wanted.moves is None:
             return wanted
-        base = self._target if self._target is not None else tuple(map(Fraction, stands))
+        base = self.target_steps if self.target_steps is not None else tuple(map(Fraction, stands))
         target = tuple(at + move for at, move in zip(base, wanted.moves, strict=True))
         for joint, steps in zip(self._joints, target, strict=True):
             _require_within(joint, steps)
-        self._target = target
+        self.target_steps = target
         return wanted
 
     def forget(self) -> None:
         """Somebody has stopped the arm: nothing of what was asked is continued."""
-        self._target = None
+        self.target_steps = None
 
     def is_reached(self, stands: Sequence[int]) -> bool:
         """True if the arm stands on the nearest steps; the fractions are kept for the next message."""
-        return self._target is None or all(
+        return self.target_steps is None or all(
             abs(steps - count) <= Fraction(1, 2) + Fraction(1, 128)
-            for steps, count in zip(self._target, stands, strict=True)
+            for steps, count in zip(self.target_steps, stands, strict=True)
         )
 
     def forget_if_elsewhere(self, stands: Sequence[int]) -> None:

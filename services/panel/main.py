@@ -75,7 +75,7 @@ class Panel:
         bus.pace.drawn(tuple(joints.values()), now)
         if now - self._texts_at >= 1.0 / TEXTS:
             self._texts_at, readings = now, bus.read()
-            for page in self._present():
+            for page in self.pages():
                 self._refresh(page, readings, now)
 
     def close(self) -> None:
@@ -89,10 +89,11 @@ class Panel:
             with page.client.atomic():
                 page.refresh(readings, now)
         except Exception:
-            if page in self._present():
+            if page in self.pages():
                 raise
 
-    def _present(self) -> list[Page]:
+    def pages(self) -> list[Page]:
+        """One for each browser that is here."""
         with self._lock:
             return list(self._pages.values())
 
@@ -100,14 +101,14 @@ class Panel:
         page = Page(client, self.operator, self._world, self._arms)
         with self._lock:
             self._pages[client.client_id] = page
-        self._log.info(f"browser {client.client_id} is here; {len(self._present())} in all")
+        self._log.info(f"browser {client.client_id} is here; {len(self.pages())} in all")
 
     def _close(self, client: viser.ClientHandle) -> None:
         with self._lock:
             page = self._pages.pop(client.client_id, None)
         if page is not None:
             page.close()
-        self._log.info(f"browser {client.client_id} has gone; {len(self._present())} in all")
+        self._log.info(f"browser {client.client_id} has gone; {len(self.pages())} in all")
 
 
 def run(deployment: Deployment, config: Path | None, log: logging.Logger, stop: ShutdownRequest) -> int:

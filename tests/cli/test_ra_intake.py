@@ -48,7 +48,7 @@ def test_no_remainder_of_any_message_is_lost(moves: list[tuple[float, float, flo
         with contextlib.suppress(RefusedMessage):
             intake.take(said(*move), STANDS)
             wanted = [a + Fraction(b) * ratio for a, b, ratio in zip(wanted, move, ratios, strict=True)]
-    assert intake._target is None or list(intake._target) == wanted
+    assert intake.target_steps is None or list(intake.target_steps) == wanted
 
 
 def test_a_message_beyond_a_limit_is_refused_and_what_was_asked_before_stays() -> None:
@@ -90,7 +90,7 @@ def test_after_a_stop_the_next_message_counts_from_where_the_arm_is() -> None:
     intake.take(said(45.0, 0.0, 0.0), STANDS)
     intake.forget()
     intake.take(said(1.8, 0.0, 0.0), (1000, 0, 0))
-    assert intake._target == (Fraction(1000) + Fraction(1.8) * Fraction(1296, 25), 0, 0)
+    assert intake.target_steps == (Fraction(1000) + Fraction(1.8) * Fraction(1296, 25), 0, 0)
 
 
 @settings(max_examples=150)

@@ -116,7 +116,7 @@ class MemoryPage:
 
     def sent(self) -> Counter[str]:
         """What the browser has got since the last call: all that was sent before this one."""
-        [page] = self.panel._present()
+        [page] = self.panel.pages()
         names = {f"/mark/{next(self._number)}", f"/mark/{next(self._number)}"}
         for scene, name in zip((self.panel._server.scene, page.client.scene), names, strict=True):
             scene.add_frame(name, show_axes=False)
@@ -154,7 +154,7 @@ def memory_page(robot: str | Path, folder: Path) -> Iterator[MemoryPage]:
             page = MemoryPage(panel, gateway, port)
             try:
                 with bare_browser(f"127.0.0.1:{port}", page.hear) as page.browser:
-                    assert until(lambda: bool(panel._present()), 20.0)
+                    assert until(lambda: bool(panel.pages()), 20.0)
                     yield page
             finally:
                 panel.close()

@@ -30,7 +30,7 @@ class Opened:
 
     def __init__(self, memory: MemoryPage, window: Window, link: SlowLink, port: int) -> None:
         self.memory, self.window, self.link = memory, window, link
-        before = self.memory.panel._present()
+        before = self.memory.panel.pages()
         window.goto(f"http://127.0.0.1:{port}")
         [self.page] = until(self._drawn_beside(before), lambda pages: len(pages) == 1, OPENING / 1e3)
         until(self._built, lambda built: built is not None and built == self.page._wanted and self.page._was_chosen)
@@ -39,7 +39,7 @@ class Opened:
     def _drawn_beside(self, before: list[Page]):
         def pages() -> list[Page]:
             self.draw()
-            return [page for page in self.memory.panel._present() if page not in before]
+            return [page for page in self.memory.panel.pages() if page not in before]
 
         return pages
 

@@ -17,7 +17,7 @@ def form(tmp_path_factory: pytest.TempPathFactory) -> Iterator[NewStep]:
     folder: Path = tmp_path_factory.mktemp("page")
     with memory_page("rm1", folder) as page:
         page.draw(5)
-        [shown] = page.panel._present()
+        [shown] = page.panel.pages()
         yield shown._programs._form
 
 

@@ -68,7 +68,7 @@ def test_a_picture_of_one_joint_that_moves_is_one_message_whatever_the_arm_carri
 
 
 def test_a_browser_that_tells_its_frame_rate_later_has_the_lag_that_it_had(page: MemoryPage):
-    [shown] = page.panel._present()
+    [shown] = page.panel.pages()
     assert shown.browser is not None
     lag, sent = shown.lag, shown.browser.sent
     shown._hear(f'{CHANNEL} {{"sent": {sent}, "language": "en", "rate": 5.0}}')
@@ -87,7 +87,7 @@ def test_a_long_lag_is_measured_again_though_nothing_else_changes(page: MemoryPa
 
 
 def test_the_lag_of_a_page_that_was_loading_is_not_shown_for_ever(page: MemoryPage, monkeypatch: pytest.MonkeyPatch):
-    [shown] = page.panel._present()
+    [shown] = page.panel.pages()
     monkeypatch.setattr(shown, "_hear", lambda text: None)  # the browser tells nothing besides
     for lag, told in ((4.7, "4700 ms"), (0.03, "30 ms"), (0.04, "30 ms"), (0.2, "200 ms")):
         shown.lag = lag
@@ -98,7 +98,7 @@ def test_the_lag_of_a_page_that_was_loading_is_not_shown_for_ever(page: MemoryPa
 def test_in_a_narrow_picture_the_camera_stands_farther_away_on_the_same_line_and_in_a_wide_one_it_stays(
     page: MemoryPage,
 ):
-    [shown] = page.panel._present()
+    [shown] = page.panel.pages()
     world, camera = page.panel._world, shown.client.camera
     before = np.array(camera.position)
     world.step_back(shown.client, 1.5)

@@ -28,7 +28,7 @@ def test_a_scene_that_is_saved_is_offered_at_once_and_chosen_by_its_name(
         page.gateway.show_scene(PlanningScene(objects=(POST,)))
         assert until(lambda: len(page.panel.operator.bus.scene.objects) == 1)
         page.draw(5)
-        [shown] = page.panel._present()
+        [shown] = page.panel.pages()
         tab = shown._scene
         for name in ("table", "post"):
             tab._file.value = name

@@ -14,7 +14,7 @@ from tests.runtime.support import until
 def test_the_shafts_of_a_virtual_device_stand_beside_its_counters_and_a_real_one_has_no_such_column(tmp_path: Path):
     with memory_page("rm1", tmp_path) as page:
         names, node = page.panel.operator.arm.joint_names, page.gateway._node
-        [shown] = page.panel._present()
+        [shown] = page.panel.pages()
         node.publisher(JOINT_COMMANDS).put(JointState(stamp=node.now(), name=names, position=(0.0,) * len(names)))
         assert until(lambda: bool(page.panel.operator.bus.read().commanded))
         page.draw(5)

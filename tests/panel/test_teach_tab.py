@@ -16,7 +16,7 @@ def test_every_point_that_is_taught_is_the_one_that_is_shown_also_the_first(tmp_
         teaching = page.panel.operator.teaching
         assert until(lambda: len(page.panel.operator.arm.joints) == 3)
         page.draw(2)
-        [shown] = page.panel._present()
+        [shown] = page.panel.pages()
         tab = shown._teach
         assert tab._chosen.value == "none"
         for name in ('"one" <b>', "two"):

@@ -18,7 +18,7 @@ def test_a_refusal_that_the_page_tells_is_not_told_by_the_tab_again(tmp_path: Pa
     )
     with memory_page("rm1", tmp_path) as page:
         page.draw(5)
-        operator, [shown] = page.panel.operator, page.panel._present()
+        operator, [shown] = page.panel.operator, page.panel.pages()
         problem = problem_of(refused)
         operator.goal.goal = replace(operator.goal.goal, problem=problem, version=operator.goal.goal.version + 1)
         page.draw(2)

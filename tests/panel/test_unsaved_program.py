@@ -28,7 +28,7 @@ def page(tmp_path: Path) -> Iterator[MemoryPage]:
 
 
 def tab(page: MemoryPage) -> ProgramsTab:
-    [shown] = page.panel._present()
+    [shown] = page.panel.pages()
     return shown._programs
 
 

@@ -77,7 +77,7 @@ def test_one_object_more_is_one_object_computed(arm: Arm, monkeypatch: pytest.Mo
 def test_the_reach_of_pairs_is_what_the_chain_between_them_gives(arm: Arm):
     kinematics = Kinematics(arm)
     world = World(arm, kinematics, with_load(drawn_scene(2, 12), arm.tool_frame))
-    geometry, model = world._geometry, kinematics.model
+    geometry, model = world.geometry, kinematics.model
     shapes = geometry.model.geometryObjects
     carriers = [{joint for joint in model.supports[shape.parentJoint] if joint > 0} for shape in shapes]
     expected = np.zeros((len(geometry.pairs), len(arm.joints)))
@@ -98,9 +98,9 @@ def test_distances_are_pinocchios_however_the_world_was_come_by(arm: Arm):
     scene = with_load(drawn_scene(2, OBJECTS), arm.tool_frame)
     world = World(arm, kinematics, scene)
     assert world.pairs == World(arm, Kinematics(arm), scene).pairs
-    geometry = world._geometry.model.copy()
+    geometry = world.geometry.model.copy()
     geometry.removeAllCollisionPairs()
-    for one, other in world._geometry.pairs:
+    for one, other in world.geometry.pairs:
         geometry.addCollisionPair(pin.CollisionPair(one, other))
     data, placed = kinematics.model.createData(), geometry.createData()
     numbers = range(len(world.pair_names))

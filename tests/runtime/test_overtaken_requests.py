@@ -83,7 +83,7 @@ def gateway(buses: Buses, started: list[str]) -> tuple[Node, int]:
 
 
 def counted(node: Node, key: str) -> TopicStatistics:
-    return next(each for each in node._endpoints.statistics() if each.key == key)
+    return next(each for each in node.statistics() if each.key == key)
 
 
 def send(client: Bus, goal_id: str, epoch: int, answers: list[BusReply | None], number: int = 0) -> None:
@@ -143,9 +143,7 @@ def test_a_goal_that_is_tried_again_does_not_pass_a_stop_in_between(buses: Buses
         rates._of_a_client = Rate(0.0, 0)  # of stops
         with pytest.raises(NoAnswer):  # it is carried out, but above the rate nothing is answered
             client.call(DEVICE_STOP, DeviceStopRequest())
-        assert until(
-            lambda: any(each.received for each in server._endpoints.statistics() if each.key == DEVICE_STOP.key)
-        )
+        assert until(lambda: any(each.received for each in server.statistics() if each.key == DEVICE_STOP.key))
         rates._of_a_client = OF_A_CLIENT
         rates._of.clear()
         sending.join(timeout=20.0)

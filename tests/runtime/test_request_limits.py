@@ -47,7 +47,7 @@ def ask(client: Bus, key: str, question: Message, answers: Answers) -> None:
 
 
 def dropped(server: Node, key: str) -> int:
-    return sum(each.dropped for each in server._endpoints.statistics() if each.key == key)
+    return sum(each.dropped for each in server.statistics() if each.key == key)
 
 
 def test_a_polite_client_gets_all_its_answers(buses: Buses) -> None:

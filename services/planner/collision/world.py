@@ -54,14 +54,14 @@ class World:
         self.arm = arm
         self.scene, self.folders = scene or PlanningScene(), tuple(folders)
         self._kinematics = kinematics
-        self._geometry = WorldGeometry(arm, kinematics, self.scene, folders)
-        self._bounds = LowerBounds(self._geometry)
+        self.geometry = WorldGeometry(arm, kinematics, self.scene, folders)
+        self._bounds = LowerBounds(self.geometry)
         self._data = kinematics.model.createData()
-        self._placed = self._geometry.model.createData()
-        self._distances = PairDistances(self._geometry)
-        self.reach: Array = self._geometry.reach
+        self._placed = self.geometry.model.createData()
+        self._distances = PairDistances(self.geometry)
+        self.reach: Array = self.geometry.reach
         self._sides: dict[tuple[int, int], Side] = {}  # the shapes' numbers, outer first
-        self._sweep = ContinuousCheck(self._geometry.pair_reach, self.distances)
+        self._sweep = ContinuousCheck(self.geometry.pair_reach, self.distances)
 
     @property
     def clearance(self) -> float:
@@ -90,12 +90,12 @@ class World:
     @property
     def geometry_count(self) -> int:
         """How many shapes there are, of links and of objects; never zero."""
-        return int(self._geometry.model.ngeoms)
+        return int(self.geometry.model.ngeoms)
 
     @property
     def pairs(self) -> tuple[LinkPair, ...]:
         """The names of links and objects that are checked against one another."""
-        return tuple(dict.fromkeys(self._geometry.names))
+        return tuple(dict.fromkeys(self.geometry.names))
 
     def distance(self, positions: Positions, padding: float = 0.0) -> float:
         """[m] between the nearest pair that is checked, less `padding`; negative inside, infinite where nothing is."""
@@ -111,27 +111,27 @@ class World:
     def distances(self, positions: Positions, numbers: Sequence[int]) -> Array:
         """(k,) [m] between the shapes of these pairs alone; a number is the place in `pair_names`."""
         q = self._kinematics.configuration.to_pinocchio(positions)
-        pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
+        pin.updateGeometryPlacements(self._kinematics.model, self._data, self.geometry.model, self._placed, q)
         return np.array([self._exact(index) for index in numbers])
 
     def least_distances(self, positions: Positions) -> Array:
         """(pairs,) [m] that each pair is apart at least, cheaply; minus infinity where that says nothing."""
         q = self._kinematics.configuration.to_pinocchio(positions)
-        pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
+        pin.updateGeometryPlacements(self._kinematics.model, self._data, self.geometry.model, self._placed, q)
         bounds = self._bounds.of(self._placed)
-        return np.concatenate((np.full(len(self._geometry.pairs) - len(bounds), -np.inf), bounds))
+        return np.concatenate((np.full(len(self.geometry.pairs) - len(bounds), -np.inf), bounds))
 
     @property
     def is_dear(self) -> NDArray[np.bool_]:
         """(pairs,) True for each pair of shapes whose meshes have more than `MANY` triangles together: one distance
         takes as long as a thousand others."""
-        sizes = [0 if mesh is None else len(mesh.faces) for mesh in self._geometry.meshes]
-        return np.array([sizes[one] + sizes[other] > MANY for one, other in self._geometry.pairs], dtype=bool)
+        sizes = [0 if mesh is None else len(mesh.faces) for mesh in self.geometry.meshes]
+        return np.array([sizes[one] + sizes[other] > MANY for one, other in self.geometry.pairs], dtype=bool)
 
     @property
     def pair_names(self) -> Sequence[LinkPair]:
         """Of every pair of shapes; a link may have several shapes."""
-        return self._geometry.names
+        return self.geometry.names
 
     @property
     def pair_reach(self) -> Array:
@@ -151,20 +151,20 @@ class World:
     @cached_property
     def _by_name(self) -> dict[LinkPair, list[int]]:
         places: dict[LinkPair, list[int]] = {}
-        for place, pair in enumerate(self._geometry.names):
+        for place, pair in enumerate(self.geometry.names):
             places.setdefault(pair, []).append(place)
         return places
 
     def pairs_within(self, positions: Positions, margin: float = 0.0) -> list[LinkPair]:
         """The pairs of names nearer than `margin` [m], each once."""
-        near = (self._geometry.names[index] for index, _ in self._near(positions, margin))
+        near = (self.geometry.names[index] for index, _ in self._near(positions, margin))
         return list(dict.fromkeys(near))
 
     def contacts(self, positions: Positions, margin: float = 0.0) -> list[Contact]:
         """The pairs nearer than `margin` [m] with their distance and the point between them, the nearest first."""
         found: dict[LinkPair, Contact] = {}
         for index, distance in sorted(self._near(positions, margin), key=lambda near: near[1]):
-            pair = self._geometry.names[index]
+            pair = self.geometry.names[index]
             point = self._point_between(index)
             found.setdefault(pair, Contact(first=pair[0], second=pair[1], distance=distance, point=point))
         return list(found.values())
@@ -172,13 +172,13 @@ class World:
     def _place(self, positions: Positions) -> None:
         """Moves the shapes, and computes the distances of the pairs that are looked at in every configuration."""
         q = self._kinematics.configuration.to_pinocchio(positions)
-        pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
-        pin.computeDistances(self._geometry.model, self._placed)
+        pin.updateGeometryPlacements(self._kinematics.model, self._data, self.geometry.model, self._placed, q)
+        pin.computeDistances(self.geometry.model, self._placed)
 
     def _direct(self) -> Iterator[tuple[int, float]]:
         """Number and distance [m] of the pairs that `_place` has looked at."""
         results = self._placed.distanceResults
-        for index, padding in enumerate(self._geometry.padding[: self._geometry.direct]):
+        for index, padding in enumerate(self.geometry.padding[: self.geometry.direct]):
             yield index, results[index].min_distance - padding
 
     def _near(self, positions: Positions, margin: float) -> Iterator[tuple[int, float]]:
@@ -196,20 +196,20 @@ class World:
         distance = float(self._distances.of(self._placed, index).min_distance)
         if distance > 0.0 and self._is_swallowed(index, distance):
             distance = -distance
-        return distance - self._geometry.padding[index]
+        return distance - self.geometry.padding[index]
 
     def _is_swallowed(self, index: int, distance: float) -> bool:
         """True if one shape is wholly inside the other, a mesh: coal sees only its surface, `distance` [m] away."""
-        one, other = self._geometry.pairs[index]
+        one, other = self.geometry.pairs[index]
         return self._holds(one, other, distance) or self._holds(other, one, distance)
 
     def _holds(self, outer: int, inner: int, distance: float) -> bool:
         """No point that moves less than the surface was and is away from it has changed sides."""
-        mesh = self._geometry.meshes[outer]
-        if mesh is None or not np.isfinite(self._geometry.boxes[inner]).all():
+        mesh = self.geometry.meshes[outer]
+        if mesh is None or not np.isfinite(self.geometry.boxes[inner]).all():
             return False
-        filling = self._geometry.meshes[inner]
-        point = self._geometry.boxes[inner][0] if filling is None else filling.vertices[0]
+        filling = self.geometry.meshes[inner]
+        point = self.geometry.boxes[inner][0] if filling is None else filling.vertices[0]
         there = self._placed.oMg[outer].actInv(self._placed.oMg[inner].act(point))
         known = self._sides.get((outer, inner))
         if known is None or float(np.linalg.norm(there - known.point)) >= distance + known.distance:

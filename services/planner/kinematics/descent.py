@@ -46,14 +46,14 @@ def _native_descent(arm: Arm) -> compiled.NativeDescent | None:
 
 
 class Descent:
-    """Descends for one arm."""
+    """Descends for one arm; in Python alone where `is_plain`, as where the core is not built."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics) -> None:
+    def __init__(self, arm: Arm, kinematics: Kinematics, is_plain: bool = False) -> None:
         self._kinematics = kinematics
         self._lower = np.array([joint.lower for joint in arm.joints])
         self._upper = np.array([joint.upper for joint in arm.joints])
         self._identity = np.eye(len(arm.joints))
-        self._native = _native_descent(arm)
+        self._native = None if is_plain else _native_descent(arm)
 
     def clip(self, positions: Array) -> Array:
         """The nearest joint values (n,) [rad] or [m] within the limits."""

@@ -25,9 +25,8 @@ class Both:
 
     def __init__(self, arm: Arm) -> None:
         self.kinematics = Kinematics(arm)
-        self.compiled, self.plain = Descent(arm, self.kinematics), Descent(arm, self.kinematics)
-        assert self.compiled._native is not None
-        self.plain._native = None
+        self.compiled, self.plain = Descent(arm, self.kinematics), Descent(arm, self.kinematics, is_plain=True)
+        assert self.compiled.knows_centring(Target(self.kinematics.tool(np.zeros(len(arm.joints))).position))
         spans = np.array([(max(joint.lower, -3.0), min(joint.upper, 3.0)) for joint in arm.joints]).T
         self.rows = np.random.default_rng(1).uniform(*spans, (2 * STARTS, len(arm.joints)))
 
