@@ -1,4 +1,4 @@
-"""Figures of the recording on a running stack while the arm moves: what it costs the processor and the disk."""
+"""Figures of recordings: the cost of recording and of a black box, and how fast a recording is replayed."""
 
 from __future__ import annotations
 
@@ -18,6 +18,9 @@ from services.recordings.channels import Entry
 from services.recordings.incidents import Incident
 from services.recordings.reader import RecordingReader
 from services.recordings.table import recorded_topics
+from services.replay.main import SERVICES, replay, text_of
+from services.replay.make_recordings import FOLDER
+from services.runtime.deployment import project_root
 
 SETTLE = 3.0  # [s] of motion that are not counted
 WINDOW, WINDOWS = 5.0, 4  # [s]
@@ -124,3 +127,22 @@ def _newest(running: Running) -> Path:
     if not files:
         raise NotMeasured("the logger has begun no file")
     return files[-1]
+
+
+ROUNDS = 3
+ROUNDED = 1e-9  # share by which floats may differ on another processor than the recordings'
+
+
+def replay_speed() -> Figure:
+    """Times real time at which the kept recordings are replayed, the slowest service for the median."""
+    speeds: dict[str, list[float]] = {service: [] for service in SERVICES}
+    for _ in range(ROUNDS):
+        for service, samples in speeds.items():
+            replayed = replay(project_root() / FOLDER / f"{service}.mcap", service, tolerance=ROUNDED)
+            if replayed.difference is not None:
+                raise NotMeasured(text_of(replayed))
+            samples.append(replayed.speed)
+    medians = {service: sorted(samples)[len(samples) // 2] for service, samples in speeds.items()}
+    slowest = min(medians, key=lambda service: medians[service])
+    note = f"of {slowest}, the slowest; {ROUNDS} rounds, reading the file not counted, every message compared"
+    return of_samples(speeds[slowest], reference=medians, note=note)

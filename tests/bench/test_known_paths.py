@@ -8,9 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from services.bench.problems import joint_grid
-from services.bench.problems.joint_grid import JointGrid, islands
-from services.bench.problems.known_paths import tightened
+from services.bench.problems import known_paths
+from services.bench.problems.known_paths import JointGrid, islands, tightened
 from services.bench.problems.problem_sets import path_length
 from services.bench.scenes import rm1
 from services.planner.path.validity import ValidityChecker
@@ -59,7 +58,7 @@ def test_islands_are_what_is_joined():
     free = np.array([[1, 1, 0, 1], [0, 1, 0, 1], [1, 0, 0, 1]], dtype=bool)
     joined = [free[:-1] & free[1:], free[:, :-1] & free[:, 1:]]
     numbers = islands(free, joined)
-    assert (numbers == joint_grid.NOWHERE).tolist() == (~free).tolist()
+    assert (numbers == known_paths.NOWHERE).tolist() == (~free).tolist()
     assert numbers[0, 0] == numbers[0, 1] == numbers[1, 1]
     assert numbers[0, 3] == numbers[1, 3] == numbers[2, 3]
     assert len({numbers[0, 0], numbers[0, 3], numbers[2, 0]}) == 3
@@ -67,7 +66,7 @@ def test_islands_are_what_is_joined():
 
 @pytest.mark.parametrize(("gap", "is_open"), [(-2.0, True), (-9.0, False)])
 def test_a_grid_decides_if_any_path_exists(monkeypatch: pytest.MonkeyPatch, gap: float, is_open: bool):
-    monkeypatch.setattr(joint_grid, "STEP", 0.25)
+    monkeypatch.setattr(known_paths, "STEP", 0.25)
     arm = dataclasses.replace(rm1(), joints=rm1().joints[:2])
     grid = JointGrid(arm, ONES, ValidityChecker(Wall(gap), 0.0))
     assert grid.is_connected(np.array([-1.0, 1.0]), np.array([1.0, 1.0])) is is_open

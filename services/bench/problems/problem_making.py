@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
-from services.bench.problems.joint_grid import JointGrid
-from services.bench.problems.known_paths import shortest
+from services.bench.problems.known_paths import JointGrid, shortest
 from services.bench.problems.problem_sets import (
     COUNT,
     FILE,
