@@ -191,15 +191,20 @@ class Planner:
         raise timed_out()
 
     def _configurations(self, context: PlanningContext) -> Iterator[Start]:
-        """The goal's configurations, nearest first, on the clock of the kinematics."""
+        """The goal's configurations, nearest first, on the clock of the kinematics; then, where any way will do, the
+        first of them with joints without limits turned the other way round."""
         with context.watch.phase("ik"):
             configurations = self._goals.candidates(context.request.goal, context.start, context.deadline)
+        first: Start | None = None
         while True:
             with context.watch.phase("ik"):
                 configuration = next(configurations, None)
             if configuration is None:
-                return
+                break
+            first = first or configuration
             yield configuration
+        if first is not None and isinstance(context.request.motion, FreeMotion):
+            yield from self._goals.other_ways_round(first, context.start)
 
     def _around(
         self, motion: FreeMotion, goals: Array, blocked: Array, context: PlanningContext

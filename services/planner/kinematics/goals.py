@@ -14,6 +14,7 @@ from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.planner.collision.clearance import DistanceChecker
 from services.planner.kinematics.ik import InverseKinematics
+from services.planner.kinematics.joint_ranges import FullTurns
 from services.planner.kinematics.pose_goals import target_of
 from services.planner.kinematics.task_space import task_space
 from services.planner.kinematics.unreachable import UnreachableRefusals
@@ -24,6 +25,8 @@ from services.planner.request.start_state import require_parallel, require_unwou
 Array = NDArray[np.float64]
 Start = tuple[float, ...]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
+MOST_OTHER_WAYS = 7  # of a configuration, which are tried beside it
 INVALID = PlanCode.INVALID_GOAL_CONSTRAINTS
 
 
@@ -36,6 +39,7 @@ class Goals:
         self._kinematics = kinematics
         self.task_space = task_space(arm, kinematics)
         self._ik = InverseKinematics(arm, kinematics)
+        self._turns = FullTurns(arm)
         self._unreachable = UnreachableRefusals(
             arm, kinematics, self._ik, self.task_space, checker or kinematics.collisions
         )
@@ -62,6 +66,12 @@ class Goals:
                 raise malformed(
                     INVALID, "goal", "this planner takes one goal at a time", "ask for the first point alone"
                 )
+
+    def other_ways_round(self, configuration: Start, start: Start) -> list[Start]:
+        """Where the arm stands as in `configuration` (n,) [rad] or [m], with joints without limits a full turn away;
+        the fastest to reach from `start` (n,) first."""
+        rows = self._turns.other_ways_round(np.array(configuration), np.array(start), MOST_OTHER_WAYS)
+        return [tuple(row.tolist()) for row in rows]
 
     def _named(self, goal: NamedGoal, start: Start) -> Start:
         values = self._arm.named_state(goal.name, start)

@@ -25,6 +25,7 @@ class FullTurns:
     def __init__(self, arm: Arm) -> None:
         self._lower = np.array([joint.lower - ROUNDING for joint in arm.joints])
         self._upper = np.array([joint.upper + ROUNDING for joint in arm.joints])
+        self._speed = np.array([joint.velocity for joint in arm.joints])
         self._period = np.array([math.tau if joint.unit == "rad" else NEVER for joint in arm.joints])
 
     def within_limits(self, branches: Array, near: Array) -> list[Array]:
@@ -40,6 +41,15 @@ class FullTurns:
             if turns.min() >= 0.0:  # false for what is not a number, too
                 configurations.extend(_turned(values, turns) if turns.any() else [values])
         return configurations
+
+    def other_ways_round(self, values: Array, near: Array, most: int) -> list[Array]:
+        """`values` (n,) [rad] or [m] with a full turn more or less of one or more joints without limits, where the arm
+        stands as it does at `values`: at most `most`, the fastest to reach from `near` (n,) first."""
+        choices = [(-1, 0, 1) if endless else (0,) for endless in np.isinf(self._upper).tolist()]
+        turns = np.array([each for each in product(*choices) if any(each)], dtype=float).reshape(-1, len(values))
+        rows = values + math.tau * turns
+        nearest = np.argsort((np.abs(rows - near) / self._speed).max(axis=1), kind="stable")
+        return list(rows[nearest[:most]])
 
     def nearly(self, branches: Array) -> tuple[Array, Array]:
         """The branches (m, n) [rad] or [m] with the full turns that bring them nearest to the limits, and (m,) [rad] or
