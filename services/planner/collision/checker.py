@@ -53,12 +53,7 @@ class CollisionChecker:
 
     def keeps(self, positions: Positions, margin: float) -> bool:
         """True if everything is farther than `margin` [m] in this configuration (n,)."""
-        self.deadline.check()
-        if self._spheres.is_free(self.world, positions, margin):
-            return True
-        if self._spheres.touches(self.world, positions, margin):
-            return False
-        return self.world.distance(positions) > margin
+        return self.touching(np.array((positions, positions)), margin) is None
 
     def distance(self, positions: Positions) -> float:
         """Distance [m] of the nearest pair, as `World.distance`."""

@@ -49,12 +49,6 @@ class SphereCheck(Protocol):
     def planner(self, world: World, margin: float) -> NativePlanner | None:
         """The native planner in this world, to keep `margin` [m], or None if it is not built."""
 
-    def is_free(self, world: World, positions: Positions, margin: float) -> bool:
-        """True if the configuration (n,) [rad] or [m] surely keeps `margin` [m]."""
-
-    def touches(self, world: World, positions: Positions, margin: float) -> bool:
-        """True if the configuration (n,) [rad] or [m] surely does not keep `margin` [m]."""
-
     def least_distance(self, world: World, positions: Positions) -> float:
         """[m] that every pair is apart at least in this configuration (n,) [rad] or [m]; 0 where nothing is known."""
 
@@ -77,15 +71,6 @@ class NativeCheck:
             self._shown = world
         planner.margin = margin
         return planner
-
-    def is_free(self, world: World, positions: Positions, margin: float) -> bool:
-        """True if the spheres around the links keep the margin [m] in this configuration (n,)."""
-        return bool(self.planner(world, margin).free(np.array([positions]))[0])
-
-    def touches(self, world: World, positions: Positions, margin: float) -> bool:
-        """True if the spheres are in something by more than they bulge, less the margin [m], in this configuration
-        (n,)."""
-        return self.planner(world, margin).touching(np.array([positions, positions])) is not None
 
     def least_distance(self, world: World, positions: Positions) -> float:
         """[m] between the spheres and what is nearest to them in this configuration (n,); 0 where they touch."""
@@ -118,14 +103,6 @@ class ExactShapesOnly:
     def planner(self, world: World, margin: float) -> None:
         """None, whatever the margin [m]: there is no native planner."""
         return None
-
-    def is_free(self, world: World, positions: Positions, margin: float) -> bool:
-        """False for every configuration (n,) [rad] or [m]: nothing is known."""
-        return False
-
-    def touches(self, world: World, positions: Positions, margin: float) -> bool:
-        """False for every configuration (n,) [rad] or [m]: nothing is known."""
-        return False
 
     def least_distance(self, world: World, positions: Positions) -> float:
         """0 for every configuration (n,) [rad] or [m]: nothing is known."""

@@ -123,6 +123,8 @@ def _margins(arm: Arm, states: States) -> tuple[StepMargin, ...]:
     knots = _knots(float(states.times[-1]))
     parts = [(begin, min(begin + MOST_KNOTS, knots)) for begin in range(0, knots, MOST_KNOTS)]
     found = [margins(arm, _stream(arm, states, part)) for part in parts]
+    if len(found) == 1:
+        return found[0]
     worst = (max(of_joint, key=lambda margin: margin.share) for of_joint in zip(*found, strict=True))
     peaks = np.max([[margin.peak_rate for margin in part] for part in found], axis=0).tolist()
     return tuple(replace(margin, peak_rate=peak) for margin, peak in zip(worst, peaks, strict=True))
