@@ -12,6 +12,7 @@ from schemas.errors import ConfigurationError
 from services.runtime.deployment import load_deployment
 from services.runtime.errors import BusError, Refused
 from services.runtime.node import Node
+from services.runtime.process.freed_memory import give_back_freed_memory
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.shutdown import ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
 
@@ -24,6 +25,7 @@ def service(name: str, run: Run, arguments: Sequence[str] | None = None) -> None
     options = _parse(name, arguments)
     stop = ShutdownRequest()
     end_with_any_thread(line_logger(name, options.log_level), lambda: stop.is_set)
+    give_back_freed_memory()
     with stop_on_signals(stop):
         code = _run(name, run, options, stop)
     end_soon(code)  # whatever threads a library has left behind

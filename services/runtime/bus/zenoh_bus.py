@@ -17,9 +17,11 @@ import zenoh
 import zenoh.ext as zx
 from zenoh.handlers import Callback
 
+from schemas.actions import GoalEnd
 from schemas.deployment import RouterSection
+from schemas.device import DeviceEvent, GatewayInputs
 from schemas.planning import AnswerInputs, PlanInputs
-from schemas.system import Exchange
+from schemas.system import Exchange, LogRecord, NodeStatistics
 from schemas.topics import Delivery
 from services.runtime.bus.dead_links import end_dead_links
 from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Query
@@ -40,9 +42,15 @@ from services.runtime.bus.zenoh_declarations import (
 )
 from services.runtime.errors import BusError
 
-CACHE = 1024  # messages of an EVERY key that survive while the router is away
-# Messages; a plan's answer is some 50 kB, and what a plan was made of some 2: an hour of moves fills CACHE with them.
-CACHE_OF = {each.__name__: 64 for each in (Exchange, PlanInputs, AnswerInputs)}
+# Messages of an EVERY key that survive while the router is away: chosen, a minute of what is said most often (commands
+# and their acknowledgements, 22 a second). What is said less often fills as many only within the hour, and a process
+# grows by it all the while: measured, 2 MB/h of the gateway.
+CACHE = 1024
+CACHE_OF = {
+    **{each.__name__: 512 for each in (DeviceEvent, LogRecord)},  # 1 in 2 s while the arm moves, and then many at once
+    **{each.__name__: 128 for each in (GatewayInputs, GoalEnd, NodeStatistics)},  # at most 2 a second
+    **{each.__name__: 64 for each in (Exchange, PlanInputs, AnswerInputs)},  # one a move, of up to 50 kB
+}
 HEARTBEAT = 0.5  # [s] after which a reader notices that it misses the last message
 CLOSE_TIMEOUT = 1.0  # [s]
 MOST_OF_A_TIMEOUT = 0.9  # what ends without an answer after that has timed out

@@ -1,0 +1,24 @@
+"""Freed memory given back to the kernel: a heap keeps it in holes between what lives, and grows."""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from collections.abc import Callable
+
+# [s] chosen. Measured without it: the gateway's memory in use stays at 13.2 MB, its heap grows by 3 MB/h, since the
+# messages that wait in Zenoh's caches are of every size.
+EVERY = 60.0
+
+
+def give_back_freed_memory(every: float = EVERY) -> None:
+    """Does so every `every` [s] until the process ends; nothing where the C library has no `malloc_trim`."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        threading.Thread(target=_trim_often, args=(trim, every), daemon=True, name="freed memory").start()
+
+
+def _trim_often(trim: Callable[[int], int], every: float) -> None:
+    pause = threading.Event()
+    while not pause.wait(every):
+        trim(0)  # ctypes lets the other threads of Python go on
