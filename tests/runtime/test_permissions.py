@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from functools import partial
@@ -26,7 +29,9 @@ from services.runtime.permissions import ABOUT, SET, Permissions, permissions
 from services.runtime.requests import client as requests
 from services.runtime.robots import robots_on
 from tests.runtime.locks import Lock, LockedRouter, sessions
-from tests.runtime.support import RouterProcess, spinning, until
+from tests.runtime.support import ROOT, RouterProcess, spinning, until
+from tests.stack import hostile
+from tests.stack.hostile import FOREIGN
 
 MAY: dict[str, Permissions] = {each.name: permissions(each) for each in ROLES}
 NAMES = tuple(MAY)
@@ -329,6 +334,42 @@ def test_a_viewer_changes_a_running_nodes_parameter_only_where_the_lock_is_open(
     assert changed_by(unlocked, dict.fromkeys(names, unlocked.deployment.router), "viewer")
     assert not changed_by(locked, behind, "viewer")
     assert changed_by(locked, behind, "operator")
+    locked.stop()
+    unlocked.stop()
+
+
+def test_a_viewers_flood_reaches_keys_of_others_only_where_the_lock_is_open(lock, tmp_path):
+    """What it does behind the lock to an arm that moves: tests/stack/test_hostile_viewer.py."""
+
+    def reached(sections: dict[str, RouterSection]) -> set[str]:
+        own = sections["viewer"]
+        shown = {"tls": "true", "ca": own.ca, "certificate": own.certificate, "key": own.key} if own.tls else {}
+        environ = {f"GEMELO_ROUTER_{name.upper()}": value for name, value in ({"port": str(own.port)} | shown).items()}
+        counts: Counter[str] = Counter()
+        with sessions({name: sections[name] for name in ("gateway", "planner", "operator")}) as opened:
+            declared: list[object] = [
+                opened[name].declare_subscriber(key, lambda sample, key=key: counts.update((key,)))
+                for name, key in (("operator", hostile.OWN), ("gateway", FOREIGN[0]), ("operator", FOREIGN[1]))
+            ]
+            for name, key in zip(("planner", "planner", "gateway"), hostile.ASKED, strict=True):
+                declared.append(opened[name].declare_queryable(key, lambda query, key=key: counts.update((key,))))
+            flood = subprocess.Popen(
+                [sys.executable, "-m", "tests.stack.hostile", "flood"], cwd=ROOT, stdout=subprocess.DEVNULL,
+                env=os.environ | environ,
+            )  # fmt: skip
+            try:
+                assert until(lambda: counts[hostile.OWN] > hostile.RATE, 30.0)
+            finally:
+                flood.kill()
+                flood.wait()
+            for each in declared:
+                each.undeclare()  # type: ignore[attr-defined]
+        return set(counts)
+
+    locked, unlocked = LockedRouter(tmp_path / "locked", lock), RouterProcess(tmp_path / "open")
+    names = ("gateway", "planner", "operator", "viewer")
+    assert reached(dict.fromkeys(names, unlocked.deployment.router)) == {hostile.OWN, *FOREIGN, *hostile.ASKED}
+    assert reached({name: locked.section(name) for name in names}) == {hostile.OWN, hostile.ASKED[0]}
     locked.stop()
     unlocked.stop()
 
