@@ -56,6 +56,10 @@ def _addresses(site: Site, problems: Problems) -> None:
         seen.setdefault(host.address.lower(), name)
         if len(site.hosts) > 1:
             _require_reachable(site, name, problems)
+        for key in ("address", "listen") if name in (site.router.host, site.broker.host) else ():
+            if "%" in getattr(host, key):
+                text = f"{getattr(host, key)} has a zone, which no certificate can name: take an address without one"
+                problems.add(("hosts", name, key), text)
         if _is_unspecified(host.address):
             problems.add(("hosts", name, "address"), f"nobody can connect to {host.address}: that is for `listen`")
 

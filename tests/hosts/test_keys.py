@@ -24,6 +24,15 @@ def made(tmp_path_factory):
     return lab, folder / "out"
 
 
+@pytest.mark.parametrize("address", ["fd00::12", "FD00:0::12", "Brain.Lab.local", "xn--ncleo-0ra", "fe80::1"])
+def test_every_address_that_a_site_may_have_stands_in_the_routers_certificate(tmp_path, address):
+    lab = site(tmp_path, '"10.0.0.12"', f'"{address}"')
+    make_keys(lab, tmp_path / "out", project_root())
+    said = openssl("x509", "-in", str(tmp_path / "out/brain/keys/router.pem"), "-noout", "-checkip" if ":" in address
+                   else "-checkhost", address)  # fmt: skip
+    assert "does match certificate" in said
+
+
 def names(folder) -> set[str]:
     return {file.name for file in folder.iterdir()}
 

@@ -112,6 +112,8 @@ def test_a_virtual_device_on_a_serial_line_is_on_the_host_of_its_gateway(tmp_pat
             'services may write below state = "/etc/gemelo", so config cannot',
         ),
         ("# A lab", 'project = "/var/lib/gemelo/x"\n# A lab', "so project cannot be there"),
+        ('"10.0.0.12"', '"fe80::1%eth0"', "line 20: fe80::1%eth0 has a zone, which no certificate can name"),
+        ('"10.0.0.11"', '"10.0.0.11"\nlisten = "fe80::1%a"', "line 16: fe80::1%a has a zone, which no certificate"),
         ('"10.0.0.12"', '"10.0.0.12"\nlisten = "::1"', "line 21: ::1 is brain's own: no other host reaches"),
         ('device = "virtual"', 'wire = "serial"\nserial = "ttyUSB0"', 'as "/dev/ttyUSB0"'),
     ],
