@@ -5,9 +5,10 @@ from __future__ import annotations
 import ipaddress
 import shlex
 import subprocess
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from schemas.site import Site
+from services.hosts.layout import robots
 from services.hosts.site_file import SiteError
 from services.hosts.units import TARGET
 
@@ -59,6 +60,13 @@ def _look(site: Site, host: str) -> str:
             f"{site.user} cannot run {program} on {host}: {remedy}",
         "command -v rsync >/dev/null": f"rsync is missing on {host}: apt-get install rsync",
     }  # fmt: skip
+    for robot in robots(site, host):
+        for file in filter(None, (f"{site.robots[robot].folder}/robot.toml", site.robots[robot].cell)):
+            there, target = f"{site.project}/{file}", f"root@{_bracketed(site.hosts[host].address)}:{site.project}/"
+            copied = f"rsync -a --relative {shlex.quote(str(PurePosixPath(file).parent))} {shlex.quote(target)}"
+            wanted[f"runuser -u {site.user} -- test -r {shlex.quote(there)}"] = (
+                f"{site.user} cannot read {there} on {host}: `{copied}` in the project's folder here"
+            )
     return "; ".join(f"{there} || {{ echo {shlex.quote(said)} >&2; exit 1; }}" for there, said in wanted.items())
 
 

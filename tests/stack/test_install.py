@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -89,7 +90,7 @@ def installed(lab: Lab) -> Lab:
 
 def test_a_dry_run_does_nothing_there(lab: Lab) -> None:
     done = lab.deploy("install", "one", "--dry-run")
-    assert done.stdout.count("root@127.0.0.1") == 4
+    assert ["root@127.0.0.1" in line for line in done.stdout.splitlines()] == [True] * 4
     assert not lab.host.calls.exists()
 
 
@@ -104,6 +105,26 @@ def test_where_gemelo_cannot_be_run_nothing_is_copied_and_the_remedy_is_said(lab
     assert done.returncode == 1
     assert "gemelo cannot run /opt/nowhere/.venv/bin/gemelo on one: `make setup` in /opt/nowhere" in done.stderr
     assert lab.host.run("ls /etc/elsewhere").stdout == ""
+
+
+def test_where_the_robots_own_files_are_missing_nothing_is_copied_and_the_remedy_is_said(lab: Lab) -> None:
+    """An arm or cell of one's own is not in what a host has installed."""
+    text, own = lab.file.read_text(), project_root() / "urdf/own_of_test"
+    own.mkdir()
+    try:
+        (own / "cell.toml").write_text((project_root() / "urdf/rm1/cell.toml").read_text())
+        for file in (project_root() / "urdf/rm1").iterdir():
+            if file.name != "cell.toml":
+                (own / file.name).symlink_to(file)
+        own.chmod(0o700)  # of root, so that the services' user has none of it
+        lab.file.write_text(text.replace('"urdf/rm1"', '"urdf/rm1"\ncell = "urdf/own_of_test/cell.toml"'))
+        done = lab.deploy("install", "one")
+    finally:
+        lab.file.write_text(text)
+        shutil.rmtree(own)
+    assert done.returncode == 1
+    assert f"gemelo cannot read {own}/cell.toml on one: `rsync -a --relative urdf/own_of_test root@" in done.stderr
+    assert lab.host.run("ls /etc/gemelo").stdout == ""
 
 
 def test_the_folder_is_the_services_users_alone_and_the_authority_stays_here(installed: Lab) -> None:
