@@ -1,4 +1,4 @@
-"""What a soak says of samples: slopes after the warm-up, and what grew although it should not."""
+"""The judgement of a soak: slopes after the warm-up, and what grew although it should not."""
 
 from __future__ import annotations
 
