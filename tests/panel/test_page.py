@@ -7,6 +7,8 @@ from contextlib import suppress
 from math import degrees
 from pathlib import Path
 
+import imageio.v3 as imageio
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, expect
 
@@ -16,6 +18,9 @@ from services.stack.stack import Stack
 from tests.panel.conftest import SIZE
 from tests.panel.person import BLUE, Person, until
 
+PICTURES = (
+    "() => [...document.images].filter((each) => each.offsetParent).map((i) => [i.naturalWidth, i.naturalHeight])"
+)
 ARM, FOREARM, LIFT = "brazo_joint", "antebrazo_joint", "efector_joint"
 
 
@@ -152,6 +157,9 @@ def test_points_are_taught_and_a_program_of_them_is_checked_run_changed_and_run_
         person.types("Name", f"P{number}")
         person.press("Remember this pose")
         until(lambda: _text(folder / "rm1.points.toml").count("joints ="), lambda count: count > len(taught) - 1)
+    picture = until(lambda: _pictured(person, folder / "rm1.points"), bool)[-1]
+    assert np.asarray(imageio.imread(picture)).std() > 5.0  # something is drawn
+    until(lambda: person.page.evaluate(PICTURES), lambda sizes: [240, 180] in sizes)
     person.tab("Programs")
     for name in ("P0", "P1", "P2"):
         person.chooses("Where to", name)
@@ -177,6 +185,14 @@ def test_points_are_taught_and_a_program_of_them_is_checked_run_changed_and_run_
     until(lambda: _same(arm.joints, taught[1]) and not is_moving(arm), bool)
     person.reads("Done.")
     assert "P2" not in (folder / "tour.toml").read_text()
+
+
+def _pictured(person: Person, folder: Path) -> list[Path]:
+    """The pictures of points soon after one more; a page that does not draw in time remembers without one."""
+    person.press("Overwrite with this pose")
+    with suppress(AssertionError):
+        until(lambda: list(folder.glob("*.jpg")), bool, 10.0)
+    return list(folder.glob("*.jpg"))
 
 
 def _by_name(state: JointState) -> dict[str, float]:

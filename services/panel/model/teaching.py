@@ -60,9 +60,10 @@ class Teaching:
 
     # Points
 
-    def remember(self, name: str, picture: bytes | None, *, overwrite: bool = False) -> None:
-        """Where the arm is now, under `name`."""
-        self.points.remember(name, self._arm.joints, picture, overwrite=overwrite)
+    def remember(self, name: str, draw: Callable[[], bytes | None] | None = None, *, overwrite: bool = False) -> None:
+        """Where the arm is now, under `name`, with the picture that `draw` makes, which may take seconds."""
+        joints = self._arm.joints
+        self.points.remember(name, joints, draw() if draw is not None else None, overwrite=overwrite)
         self._points_changed()
 
     def rename_point(self, old: str, new: str) -> None:

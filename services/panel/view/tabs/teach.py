@@ -68,7 +68,7 @@ class TeachTab:
         return next(name for name in names if name not in self._teaching.points)
 
     def _take(self, overwrite: str = "") -> None:
-        self._teaching.remember(overwrite or self._name.value, self._drawn(), overwrite=bool(overwrite))
+        self._teaching.remember(overwrite or self._name.value, self._drawn, overwrite=bool(overwrite))
 
     def _drawn(self) -> bytes | None:
         """What this browser sees, as JPEG; None where it does not draw in time."""
