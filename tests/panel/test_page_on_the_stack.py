@@ -1,4 +1,4 @@
-"""What the buttons of points and programs do on a whole stack, and what the page says then."""
+"""The buttons of points and programs on a whole stack, and the page's sentences then."""
 
 from __future__ import annotations
 

@@ -16,8 +16,7 @@ from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm, load_arm
 from services.planner.collision.world import World
 from services.planner.jog.jog import PERIOD, Jog
-from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.knots import Knot, Limits
 from services.stepper_gateway.motion.target_tracker import TargetTracker
 
 Array = NDArray[np.float64]

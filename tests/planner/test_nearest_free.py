@@ -17,8 +17,7 @@ from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.world import World
 from services.planner.core import Planner
 from services.planner.jog.jog import PERIOD
-from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.knots import Knot, Limits
 from services.stepper_gateway.motion.target_tracker import TargetTracker
 from tests.planner.jogging import Array, Jogged, arm_of, kinematics_of
 

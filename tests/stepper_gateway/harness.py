@@ -9,8 +9,7 @@ from pathlib import Path
 from schemas.message import Vector
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from services.arm.model.description import Arm
-from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.knots import Knot, Limits
 from services.stepper_gateway.motion.paths import profile
 from services.virtual_arm.virtual_arm import VirtualArm, rm1
 

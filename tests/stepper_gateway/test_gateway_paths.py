@@ -16,10 +16,8 @@ from services.stepper_gateway.device.clock import ClockSync
 from services.stepper_gateway.goals.limit_checks import within
 from services.stepper_gateway.motion.commanded_path import CommandedPath
 from services.stepper_gateway.motion.knot_sources import PathKnots
-from services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot, whole_steps
-from services.stepper_gateway.motion.limits import Limits
-from services.stepper_gateway.motion.path_joining import JoinedPath, join_path
-from services.stepper_gateway.motion.paths import RoundedPath, SampledPath, TimedPath, profile
+from services.stepper_gateway.motion.knots import Knot, Limits, StepEncoder, StepKnot, whole_steps
+from services.stepper_gateway.motion.paths import JoinedPath, RoundedPath, SampledPath, TimedPath, join_path, profile
 from services.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.harness import ROOT, move
 

@@ -14,8 +14,7 @@ from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.joints import JointState
 from schemas.topics import DEVICE_EVENTS, JOINT_STATES
-from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.knots import Knot, Limits
 from services.stepper_gateway.motion.target_tracker import TargetTracker
 from services.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
@@ -199,7 +198,7 @@ from services.runtime.node import Node
 from services.runtime.process.shutdown import ShutdownRequest
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.knots import Limits
 from services.stepper_gateway.motion.target_tracker import TargetTracker
 
 arm = load_arm(project_root() / "urdf/rm1")

@@ -1,4 +1,4 @@
-"""Why something cannot be, in English and in the units of the page: by the check that refused, as `es_refusals`.
+"""English of the refusals in the units of the page: by the check that refused, as `es_refusals`.
 
 A check without a template here is told in the planner's own words, which say more of it.
 """

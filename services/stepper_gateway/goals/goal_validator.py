@@ -12,10 +12,8 @@ from services.stepper_gateway.goals.limit_checks import require_path_within, req
 from services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from services.stepper_gateway.goals.scene_versions import PlannedIn
 from services.stepper_gateway.goals.trajectory_checks import Tolerances, ordered_trajectory, time_tolerance, tolerances
-from services.stepper_gateway.motion.knots import Knot, whole_steps
-from services.stepper_gateway.motion.limits import Limits
-from services.stepper_gateway.motion.path_joining import join_path
-from services.stepper_gateway.motion.paths import RoundedPath, SampledPath, TimedPath, profile
+from services.stepper_gateway.motion.knots import Knot, Limits, whole_steps
+from services.stepper_gateway.motion.paths import RoundedPath, SampledPath, TimedPath, join_path, profile
 from services.stepper_gateway.parameters import GatewayParameters
 
 SAME_VELOCITY = 1e-9  # [rad/s] or [m/s] chosen: rounding of a velocity that was computed

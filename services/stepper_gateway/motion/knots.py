@@ -1,4 +1,4 @@
-"""A knot: where every joint is to be, how fast, and bending how, at one instant."""
+"""A knot: where every joint is to be, how fast, and bending how, at one instant; and the limits of all joints."""
 
 from __future__ import annotations
 
@@ -71,3 +71,30 @@ def whole_steps(q8: int) -> int:
 def stop_time(knot: Knot, joints: tuple[Joint, ...]) -> float:
     """[s] that braking from this knot to rest takes at the acceleration limits."""
     return max(abs(v) / joint.acceleration for joint, v in zip(joints, knot.velocity, strict=True))
+
+
+class Limits(NamedTuple):
+    """One value per joint, all positive."""
+
+    velocity: Vector  # [rad/s] or [m/s]
+    acceleration: Vector  # [rad/s^2] or [m/s^2]
+    jerk: Vector  # [rad/s^3] or [m/s^3]
+
+    @classmethod
+    def of(cls, joints: tuple[Joint, ...]) -> Limits:
+        return cls(
+            tuple(joint.velocity for joint in joints),
+            tuple(joint.acceleration for joint in joints),
+            tuple(joint.jerk for joint in joints),
+        )
+
+    def raised_to(self, *knots: Knot) -> Limits:
+        """Limits that these knots keep: ruckig takes a start beyond its limits without a word.
+
+        A validated trajectory may exceed a limit by the gateway's small margins, and so may its knots.
+        """
+        velocity, acceleration = list(self.velocity), list(self.acceleration)
+        for knot in knots:
+            velocity = [max(a, abs(b)) for a, b in zip(velocity, knot.velocity, strict=True)]
+            acceleration = [max(a, abs(b)) for a, b in zip(acceleration, knot.acceleration, strict=True)]
+        return Limits(tuple(velocity), tuple(acceleration), self.jerk)

@@ -9,8 +9,7 @@ from services.stepper_gateway.goals.limit_checks import SLACK, beyond
 from services.stepper_gateway.goals.rejections import invalid, invalid_joints
 from services.stepper_gateway.goals.trajectory_checks import require_known
 from services.stepper_gateway.motion.knot_sources import KNOT_TIME, TargetKnots
-from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.knots import Knot, Limits
 from services.stepper_gateway.motion.target_tracker import TargetTracker
 
 NEVER = -1.0e9  # [s] chosen: before every monotonic clock's beginning
