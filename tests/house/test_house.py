@@ -24,6 +24,7 @@ from tests.house.counts import (
 KEPT = {
     "services.planner.parameters": "as the parameters of every service",
     "services.panel.view.pick_box": "a part of the page, as all its boxes",
+    "services.runtime.process.freed_memory": "the C library's heap, apart from the main of services",
     "services.stepper_gateway.ledger.reasons": "the sentences, apart from the arithmetic",
 }
 CLAUSES = {"What", "Where", "How", "Whether", "Who", "When", "Which", "Why", "Whatever", "True", "From", "By", "For"}

@@ -1,4 +1,4 @@
-"""What a goal, a plan, a jog, the device and the scene are on the page of a whole stack, by its own words."""
+"""The page of a whole stack by its own words: a goal, a plan, a jog, the device and the scene."""
 
 from __future__ import annotations
 
