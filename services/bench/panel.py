@@ -72,7 +72,7 @@ def panel_cpu_percent(stacks: Stacks) -> Figure:
 
 
 def judged_cpu(rest: Sequence[float], moving: Sequence[float], reference: Mapping[str, float]) -> Figure:
-    """The figure of CPU [% of a core] in windows at rest and while the arm moves: each has its own goal."""
+    """The figure of CPU [% of a core] in windows at `rest` and while `moving`, each with its goal; and `reference`."""
     note = f"{WINDOWS} windows of {WINDOW:g} s; a bare browser does not draw"
     at_rest = of_samples(rest, REST_GOAL)
     figure = of_samples(moving, MOVING_GOAL, {"at rest": quantile(rest, 0.5), **reference}, note)
