@@ -8,7 +8,6 @@ import msgspec
 
 from schemas.system import NodeRecord
 from services.recordings.channels import Entry
-from services.recordings.reader import BadRecording, RecordingReader
 
 LAYOUT = "layout"  # the name of the metadata record
 SECONDS = 20.0  # [s] of the past that plots and the tool's way show where nobody has chosen
@@ -35,12 +34,3 @@ def layout_of(entries: Iterable[Entry], cameras: tuple[str, ...]) -> ViewLayout:
 def layout_metadata(layout: ViewLayout) -> dict[str, dict[str, str]]:
     """The record of a recording's metadata."""
     return {LAYOUT: {"json": msgspec.json.encode(layout).decode()}}
-
-
-def layout_in(reader: RecordingReader) -> ViewLayout | None:
-    """None where the recording has none; raises `BadRecording` where it cannot be read."""
-    text = reader.read_metadata().get(LAYOUT, {}).get("json", "")
-    try:
-        return msgspec.json.decode(text, type=ViewLayout) if text else None
-    except (msgspec.DecodeError, msgspec.ValidationError) as error:
-        raise BadRecording(f'"{reader.path}": its layout cannot be read ({error})') from error
