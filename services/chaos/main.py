@@ -90,17 +90,18 @@ def run(
     out: Path,
     only: tuple[str, ...],
 ) -> bool:
-    """Runs episodes for `seconds` [s] or until there are no more; writes and prints the report; True if all is good."""
+    """Runs episodes for `seconds` [s], or until there are no more, on a stack that is ready; writes and prints the
+    report; True if all is good."""
     new_results(out)
-    begun = time.monotonic()
     episodes: list[Episode] = []
     with Site(out, broker, seed) as site:
         say(f"seed {seed}, all ready after {site.stack.ready_seconds:.1f} s")
-        campaign = Campaign(site, say)
+        campaign, begun = Campaign(site, say), time.monotonic()
         while time.monotonic() < begun + seconds and (next_one := next(wanted, None)) is not None:
             episode = campaign.episode(*next_one)
             episodes.append(episode)
             say(line_of(episode))
+        took = time.monotonic() - begun
         robot, logs = site.arm.name, {name: site.stack.logs(name) for name in site.stack.processes}
         last = time.time_ns() - int(LAST_WORDS * 1e9)
     heard = [stamp for stamp in campaign.person.stamps if stamp < last]
@@ -110,7 +111,7 @@ def run(
     found += [f"{name} has raised an error: see {out / 'logs' / name}.log" for name, text in logs.items()
               if "Traceback" in text]  # fmt: skip
     report = Report(
-        seed=seed, robot=robot, broker=broker, seconds=time.monotonic() - begun, episodes=tuple(episodes),
+        seed=seed, robot=robot, broker=broker, seconds=took, episodes=tuple(episodes),
         only=only, states_heard=len(heard), states_lost=len(missing), violations=tuple(found),
     )  # fmt: skip
     (out / "report.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")

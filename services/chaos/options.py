@@ -11,7 +11,7 @@ BROKER_HELP = "[mosquitto where it is installed, else amqtt]"
 
 def add_chaos_options(parser: ArgumentParser) -> None:
     """How long, which faults, which chance."""
-    parser.add_argument("--minutes", type=float, default=10.0, help="how long")
+    parser.add_argument("--minutes", type=float, default=10.0, help="how long, from when all is ready")
     parser.add_argument("--seed", type=int, default=None, help="of the order and of all chance; else a new one")
     parser.add_argument("--episode", type=int, default=None, metavar="N", help="only this one of the seed")
     parser.add_argument("--only", nargs="+", default=[], metavar="FAULT", help="only faults whose names contain this")
