@@ -157,6 +157,7 @@ def test_points_are_taught_and_a_program_of_them_is_checked_run_changed_and_run_
         person.types("Name", f"P{number}")
         person.press("Remember this pose")
         until(lambda: _text(folder / "rm1.points.toml").count("joints ="), lambda count: count > len(taught) - 1)
+    until(lambda: person.row("Point").locator("input").first.input_value(), lambda chosen: chosen == "P2")
     picture = until(lambda: _pictured(person, folder / "rm1.points"), bool)[-1]
     assert np.asarray(imageio.imread(picture)).std() > 5.0  # something is drawn
     until(lambda: person.page.evaluate(PICTURES), lambda sizes: [240, 180] in sizes)
