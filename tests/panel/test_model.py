@@ -165,7 +165,7 @@ def test_every_refusal_of_the_planner_is_said_in_spanish():
         ("joint limit", "efector_joint", 0.25, 0.2, "250.00 mm está más allá de su límite de 200.00 mm."),
         ("moving start", "efector_joint", 0.01, 0.001, "se mueve a 10.00 mm/s"),
         ("reach", "tool position", 0.1234, 0.0, "Ese punto queda 123.4 mm fuera del alcance"),
-        ("reach", "z", 0.4, 0.2, "llega en z hasta 200.0 mm, no hasta 400.0 mm"),
+        ("reach", "z", 0.4, 0.2, "llega en z hasta 200.0 mm, no hasta 400.0 mm: faltan 200.0 mm."),
         ("collision", "efector_link / post", 0.0012, 0.004, "y post quedarían a 1.2 mm; deben quedar 4.0 mm"),
         ("self-collision", "a / b", 0.0, 0.004, "a y b, del mismo brazo, se tocarían."),
         ("self-collision", "a / b", -0.03, 0.004, "a y b, del mismo brazo, se tocarían: 30.0 mm uno dentro del otro."),
@@ -192,6 +192,7 @@ def test_refusals_are_said_in_spanish_with_their_values(check, subject, value, l
         ("joint limit", "brazo_joint", math.pi, math.radians(169.0), "brazo_joint: 180.00 ° is beyond its limit of "
          "169.00 °."),
         ("reach", "tool position", 0.1234, 0.0, "That point is 123.4 mm out of reach of the tool."),
+        ("reach", "x", 0.4392, 0.4063, "The tool reaches 406.3 mm in x, not 439.2 mm: that is 32.9 mm out of reach."),
         ("collision", "link / post", -0.0343, 0.004, "link and post would touch: 34.3 mm of one inside the other."),
         ("collision", "link / post", 0.0012, 0.004, "link and post would be 1.2 mm apart; 4.0 mm must stay free."),
         ("allowed time", "allowed_time", 5.04, 5.0, "blocked by post: go around"),  # no sentence of the page's own

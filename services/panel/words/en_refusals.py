@@ -16,7 +16,7 @@ REFUSALS: dict[str, str] = {
     "joint_state_unknown": "No state of the arm has come yet. See whether the device is connected.",
     # where the tool can be
     "reach": "That point is {value} out of reach of the tool.",
-    "reach_axis": "The tool reaches {limit} in {subject}, not {value}.",
+    "reach_axis": "The tool reaches {limit} in {subject}, not {value}: that is {beyond} out of reach.",
     "orientation": "The tool cannot be turned so: {value} are missing.",
     "orientation_unknown": "The tool cannot be turned so.",
     # what would touch

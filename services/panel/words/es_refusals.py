@@ -17,7 +17,7 @@ REFUSALS: dict[str, str] = {
     "joint_state_unknown": "Aún no llegó ningún estado del brazo. Vea si el equipo está conectado.",
     # where the tool can be
     "reach": "Ese punto queda {value} fuera del alcance de la herramienta.",
-    "reach_axis": "La herramienta llega en {subject} hasta {limit}, no hasta {value}.",
+    "reach_axis": "La herramienta llega en {subject} hasta {limit}, no hasta {value}: faltan {beyond}.",
     "orientation": "La herramienta no puede girarse así: faltan {value}.",
     "orientation_unknown": "La herramienta no puede girarse así.",
     # what would touch

@@ -28,7 +28,7 @@ def sentence_of(problem: Problem, joints: Joints, templates: Mapping[str, str]) 
     show = SHOWN.get(problem.check)
     values = {
         name: "" if value is None or show is None else show(problem, joints, value)
-        for name, value in (("value", problem.value), ("limit", problem.limit))
+        for name, value in (("value", problem.value), ("limit", problem.limit), ("beyond", _beyond(problem)))
     }
     first, _, second = problem.subject.partition(" / ")
     return template.format(subject=problem.subject, first=first, second=second, **values)
@@ -51,6 +51,11 @@ def _variant(problem: Problem) -> str:
     if problem.check not in PAIRS or problem.value > 0.0:
         return ""
     return "inside" if problem.value < 0.0 and problem.check != "clearance" else "touch"
+
+
+def _beyond(problem: Problem) -> float | None:
+    """How far the value is from its limit, in the unit of the check; None where one of them is not known."""
+    return None if problem.value is None or problem.limit is None else abs(problem.value - problem.limit)
 
 
 def _of_joint(problem: Problem, joints: Joints, value: float) -> str:
