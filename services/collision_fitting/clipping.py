@@ -21,7 +21,7 @@ PARALLEL = 1e-6  # the determinant of three normals below which their planes hav
 def clipped(corners: Array, normal: Array, offset: float) -> tuple[Array, NDArray[np.int64]]:
     """The parts (g, 3, 3) of triangles (f, 3, 3) [m] where `normal` (3,) times a point is at most `offset` [m], and
     the number (g,) of the triangle that each is of."""
-    heights = corners @ normal - offset
+    heights = heights_of(corners, normal) - offset
     below = heights <= 0.0
     count = below.sum(axis=1)
     numbers = np.arange(len(corners))
@@ -33,6 +33,11 @@ def clipped(corners: Array, normal: Array, offset: float) -> tuple[Array, NDArra
     second = np.stack((cut[:, 0], rest[:, 2], cut[:, 1]), axis=1)
     whole = numbers[count == 3]
     return np.concatenate((corners[whole], tip, first, second)), np.concatenate((whole, one, two, two))
+
+
+def heights_of(corners: Array, normal: Array) -> Array:
+    """(f, 3) [m] of the corners of triangles (f, 3, 3) along a normal (3,)."""
+    return np.asarray((corners.reshape(-1, 3) @ normal).reshape(-1, 3))  # one product of matrices
 
 
 def _crossings(corners: Array, heights: Array, rows: NDArray[np.int64], lone: NDArray[np.int64]) -> tuple[Array, Array]:

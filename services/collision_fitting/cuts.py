@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from services.collision_fitting.clipping import heights_of
 from services.collision_fitting.fitting import axes_of, spread
 from services.collision_fitting.mesh_part import MeshPart
 
@@ -105,7 +106,10 @@ def _planes(part: MeshPart) -> Iterator[_Cut]:
         along = part.places @ axis
         even = np.linspace(along.min(), along.max(), CUTS + 2)[1:-1]
         found += [np.array([(*axis, offset)]) for offset in (*even.tolist(), *_step(part.places @ turn.T, along))]
-    rough = np.array([_cut_by(part, planes, ROUGH).outside.beyond for planes in found])
+    rough: list[float] = []
+    for planes in found:
+        enough = sorted(rough)[FINALISTS - 1] if len(rough) >= FINALISTS else np.inf
+        rough.append(_cut_by(part, planes, ROUGH, enough).outside.beyond)
     yield from (_cut_by(part, found[number]) for number in np.argsort(rough, kind="stable")[:FINALISTS])
 
 
@@ -119,8 +123,9 @@ def _crossed(part: MeshPart) -> Iterator[_Cut]:
         yield from (_cut_by(part, np.delete(planes, axis, axis=0)) for axis in range(3))
 
 
-def _cut_by(part: MeshPart, planes: Array, rough: int = 1) -> _Cut:
-    """By all of the planes (k, 4), judged by places on it and in the cuts, so many times fewer where it is `rough`."""
+def _cut_by(part: MeshPart, planes: Array, rough: int = 1, enough: float = np.inf) -> _Cut:
+    """By all of the planes (k, 4), judged by places on it and in the cuts, so many times fewer where it is `rough`; no
+    more sides are looked at once more than `enough` stands out."""
     sections = [_some(_section(part.corners, plane), rough) for plane in planes]
     sides = [np.vstack((_some(part.places, rough), *sections))]
     for *normal, offset in planes:
@@ -129,7 +134,12 @@ def _cut_by(part: MeshPart, planes: Array, rough: int = 1) -> _Cut:
             side[sign * height <= SAME] for side, height in zip(sides, heights, strict=True) for sign in (1.0, -1.0)
         ]
     around = np.vstack((part.planes, planes))
-    return _Cut(_sum(_outside(part, side, around, rough) for side in sides), planes)
+    looked_at: list[Outside] = []
+    for side in sides:
+        looked_at.append(_outside(part, side, around, rough))
+        if sum(each.beyond for each in looked_at) > enough:
+            break
+    return _Cut(_sum(looked_at), planes)
 
 
 def _sum(several: Iterable[Outside]) -> Outside:
@@ -157,7 +167,7 @@ def _outside(part: MeshPart, places: Array, planes: Array, rough: int = 1) -> Ou
 
 def _section(corners: Array, plane: Array) -> Array:
     """(k, 3) [m] where edges of triangles (f, 3, 3) [m] cross a plane (4,)."""
-    heights = corners @ plane[:3] - plane[3]
+    heights = heights_of(corners, plane[:3]) - plane[3]
     crossed = (heights.min(axis=1) <= 0.0) & (heights.max(axis=1) > 0.0)
     corners, heights = corners[crossed], heights[crossed]
     ends, high = np.roll(corners, -1, axis=1), np.roll(heights, -1, axis=1)

@@ -41,7 +41,8 @@ class Excess:
 
 
 class ShapeSurface:
-    """Places on a fitted shape, the areas that they stand for [m^2], and how far each is from the mesh [m]."""
+    """Places on a fitted shape, the areas that they stand for [m^2], how far each is from the mesh [m], and the corners
+    `low` and `high` (3,) [m] of a box around it all."""
 
     def __init__(self, fitted: Fitted, mesh: MeshSurface) -> None:
         self.fitted, self.shapes = fitted, fitted.shapes
@@ -50,6 +51,10 @@ class ShapeSurface:
         self.points = np.vstack([points[mask] for (points, _), mask in zip(found, outer, strict=True)])
         self.areas = np.concatenate([areas[mask] for (_, areas), mask in zip(found, outer, strict=True)])
         self.beyond = mesh.distances(self.points)
+        halves = [np.abs(shape.rotation) @ solid_of(shape).half - BURIED for shape in self.shapes]
+        at = [np.array(shape.pose[0]) for shape in self.shapes]
+        self.low = np.min([place - half for place, half in zip(at, halves, strict=True)], axis=0)
+        self.high = np.max([place + half for place, half in zip(at, halves, strict=True)], axis=0)
         self._free: WeakKeyDictionary[ShapeSurface, Mask] = WeakKeyDictionary()
 
     def share_within(self, within: float) -> float:
@@ -59,7 +64,9 @@ class ShapeSurface:
     def free_of(self, other: ShapeSurface) -> Mask:
         """(n,) True for the places that are in no shape of the other."""
         if other not in self._free:
-            self._free[other] = depth_in(other.shapes, self.points) <= BURIED
+            held = ((self.points > other.low) & (self.points < other.high)).all(axis=1)
+            held[held] = depth_in(other.shapes, self.points[held]) > BURIED
+            self._free[other] = ~held
         return self._free[other]
 
 
@@ -74,18 +81,25 @@ def outer_places(surfaces: Sequence[ShapeSurface]) -> list[Mask]:
 
 
 def excess_of(fitted: Sequence[Fitted], mesh: MeshSurface, within: float) -> Excess:
-    """Of shapes together, with `within` [m] asked for; exact at each place."""
+    """Of shapes together, with `within` [m] asked for; exact at each place beyond it and at the farthest ones."""
     surfaces = [ShapeSurface(each, mesh) for each in fitted]
     masks = outer_places(surfaces)
     points = np.concatenate([one.points[mask] for one, mask in zip(surfaces, masks, strict=True)])
     areas = np.concatenate([one.areas[mask] for one, mask in zip(surfaces, masks, strict=True)])
-    beyond = mesh.exact_distances(points)
+    beyond = np.concatenate([one.beyond[mask] for one, mask in zip(surfaces, masks, strict=True)])
+    is_far = beyond >= min(within, _reached(beyond, areas))  # the others are no farther than this says
+    beyond[is_far] = mesh.exact_distances(points[is_far])
+    worst = int(np.argmax(beyond))
+    x, y, z = points[worst].tolist()
+    share = float(areas[beyond <= within].sum() / areas.sum())
+    return Excess(share, _reached(beyond, areas), float(beyond[worst]), (x, y, z))
+
+
+def _reached(beyond: Array, areas: Array) -> float:
+    """[m] that `SHARE` of the areas stays within."""
     order = np.argsort(beyond, kind="stable")
     covered = np.cumsum(areas[order]) / areas.sum()
-    p95 = float(beyond[order][min(int(np.searchsorted(covered, SHARE)), len(order) - 1)])
-    x, y, z = points[order[-1]].tolist()
-    share = float(areas[beyond <= within].sum() / areas.sum())
-    return Excess(share, p95, float(beyond[order[-1]]), (x, y, z))
+    return float(beyond[order][min(int(np.searchsorted(covered, SHARE)), len(order) - 1)])
 
 
 def depth_in(shapes: Sequence[CollisionShape], points: Array) -> Array:

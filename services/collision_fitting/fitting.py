@@ -28,14 +28,17 @@ WIDTHS = np.array((np.cos(TURNS), np.sin(TURNS)))  # (2, 8): directions in which
 UPRIGHT = np.eye(3)[[2, 0, 1]]  # the link's axes; of equal shapes the one along its z is taken
 
 
-def fitted(points: Array) -> Fitted:
-    """The shape of least volume that holds all `points` (n, 3) [m]; the same points give the same shape."""
+def fitted(points: Array, limit: float = math.inf) -> Fitted:
+    """The shape of least volume that holds all `points` (n, 3) [m]; the same points give the same shape.
+
+    A round one that cannot have less than `limit` [m^3] is not looked for.
+    """
     corners, sides = corners_and_sides(points)
     best = _box(corners, np.eye(3))
     for axis in np.vstack((UPRIGHT, spread(corners), sides)):
-        for each in _along(corners, axis, best.volume):
+        for each in _along(corners, axis, min(best.volume, limit)):
             best = min(best, each, key=_cost)
-    if _least_ball(corners) < OBLIQUE * best.volume:
+    if _least_ball(corners) < OBLIQUE * min(best.volume, limit):
         best = min(best, _ball(corners), key=_cost)
     return best
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 
 import numpy as np
 
@@ -22,6 +24,9 @@ from services.planner.collision_geometry.shapes import TriangleMesh
 WITHIN = 0.005  # [m] of the mesh, where `SHARE` of the shapes' outer surface is to be
 WITHIN_SHARE = 0.01  # of the longest side of a link for which that is more
 MOST = 40  # shapes of a link
+ALONE = 3.0  # [s] after which other processes are started: each needs a second for that
+
+_Wanted = tuple[str, TriangleMesh, float, int]  # what `_fit` is given
 
 
 @dataclass(frozen=True)
@@ -66,16 +71,31 @@ def fit_links(
         raise DescriptionError(f"{arm.urdf_path}: {of} no visual mesh to fit shapes to: write <collision> by hand")
     drawn = {name: mesh for name, mesh in meshes.items() if mesh is not None}
     fits = []
-    for number, (name, mesh) in enumerate(drawn.items(), 1):
-        began = time.monotonic()
-        fits.append(_fit(name, mesh, usual_bound(mesh) if within is None else within, most))
-        place = f'link "{name}" ({number} of {len(drawn)}), {len(mesh.faces)} triangles'
-        p95, worst = 1000.0 * fits[-1].excess.p95, 1000.0 * fits[-1].excess.worst
+    wanted_fits = [(name, mesh, usual_bound(mesh) if within is None else within, most) for name, mesh in drawn.items()]
+    for fit, seconds in _on_all_cores(wanted_fits):
+        fits.append(fit)
+        place = f'link "{fit.link}" ({len(fits)} of {len(drawn)}), {len(fit.mesh.faces)} triangles'
+        p95, worst = 1000.0 * fit.excess.p95, 1000.0 * fit.excess.worst
         reach = f"95 % of their surface within {p95:.1f} mm, the worst place {worst:.1f} mm beyond"
-        count = len(fits[-1].shapes)
-        shapes = "1 shape" if count == 1 else f"{count} shapes"
-        tell(f"{place}: {shapes} after {time.monotonic() - began:.1f} s, {reach}")
+        shapes = "1 shape" if len(fit.shapes) == 1 else f"{len(fit.shapes)} shapes"
+        tell(f"{place}: {shapes} after {seconds:.1f} s, {reach}")
     return fits
+
+
+def _on_all_cores(wanted: Sequence[_Wanted]) -> Iterator[tuple[LinkFit, float]]:
+    """Each fit with how long it took [s], in their order; in processes of their own once they have taken `ALONE`."""
+    began, number = time.monotonic(), 0
+    while number < len(wanted) and time.monotonic() < began + ALONE:
+        yield _timed_fit(wanted[number])
+        number += 1
+    if number < len(wanted):
+        with ProcessPoolExecutor(mp_context=get_context("spawn")) as others:
+            yield from others.map(_timed_fit, wanted[number:])
+
+
+def _timed_fit(wanted: _Wanted) -> tuple[LinkFit, float]:
+    began = time.monotonic()
+    return _fit(*wanted), time.monotonic() - began
 
 
 def usual_bound(mesh: TriangleMesh) -> float:

@@ -41,9 +41,10 @@ class MeshPart:
     def surface(self) -> ShapeSurface:
         """Of the shape around it: a hull, or one of few numbers where that is within the bound or no worse than the
         hull, and hardly larger."""
-        simple, hull = fitted(self.points), enclosing_hull(self.points, self.planes[:, :3])
+        hull = enclosing_hull(self.points, self.planes[:, :3])
         if hull is None:
-            return ShapeSurface(simple, self.mesh)
+            return ShapeSurface(fitted(self.points), self.mesh)
+        simple = fitted(self.points, LARGER * hull.volume)
         if simple.volume > LARGER * hull.volume:
             return ShapeSurface(hull, self.mesh)
         surface, other = ShapeSurface(simple, self.mesh), ShapeSurface(hull, self.mesh)

@@ -10,6 +10,7 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from services.collision_fitting.openings import closed, places_numbered
 from services.planner.collision_geometry.coal_shapes import is_inside, tree_of
 from services.planner.collision_geometry.shapes import TriangleMesh
 
@@ -17,7 +18,6 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-SAME = 1e-9  # [m] between places that are not told apart
 SPACING = 0.002  # [m] between places on the surface, where that makes neither fewer nor more than
 FEWEST, MOST = 2000, 12000
 POINT = 1e-9  # [m] radius of a ball that stands for a point
@@ -26,12 +26,14 @@ CLOSED = 1e-6  # of its area, that the sum of a closed body's normals is off zer
 
 
 class MeshSurface:
-    """`corners` (f, 3, 3) [m] of the triangles, `body` (f,) that each belongs to: bodies touch nowhere.
+    """`corners` (f, 3, 3) [m] of the triangles, with the lids of openings, and `body` (f,) that each belongs to: bodies
+    touch nowhere.
 
     Bodies that are not closed are one: they may bound a solid together.
     """
 
-    def __init__(self, mesh: TriangleMesh) -> None:
+    def __init__(self, drawn: TriangleMesh) -> None:
+        mesh = closed(drawn)
         self._boxes = tree_of(mesh)
         self.corners: Array = mesh.vertices[mesh.faces]
         self.body = _bodies(mesh, self.corners)
@@ -86,13 +88,9 @@ class MeshSurface:
 
 def _bodies(mesh: TriangleMesh, corners: Array) -> Numbers:
     """(f,) numbers; corners at one place are one, whatever normals they have in the file."""
-    keys = np.round(mesh.vertices / SAME).astype(np.int64)
-    order = np.lexsort(keys.T)
-    is_new = np.concatenate(([True], (np.diff(keys[order], axis=0) != 0).any(axis=1)))
-    numbers = np.empty(len(keys), dtype=np.int64)
-    numbers[order] = np.cumsum(is_new) - 1
+    numbers, count = places_numbered(mesh.vertices)
     faces = numbers[mesh.faces]
-    labels = trimesh.graph.connected_component_labels(faces[:, [[0, 1], [1, 2]]].reshape(-1, 2), int(is_new.sum()))
+    labels = trimesh.graph.connected_component_labels(faces[:, [[0, 1], [1, 2]]].reshape(-1, 2), count)
     body = np.unique(labels[faces[:, 0]], return_inverse=True)[1]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.bincount(body, np.linalg.norm(normals, axis=1))
