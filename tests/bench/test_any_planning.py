@@ -48,7 +48,7 @@ def test_the_arms_are_mostly_free_of_themselves(name: str):
 
 
 def test_seven_has_40_to_60_spheres_and_six_17_solids_that_are_worth_as_many():
-    """A solid is worth as many spheres as stand side by side in the box around it, each as wide as its thinnest side."""
+    """A solid is worth as many spheres as stand side by side in its box, each as wide as its thinnest side."""
     seven, six = solids_of(seven_joints()), solids_of(six_joints())
     assert 40 <= len(seven) <= 60
     assert all(len(solid.size) == 1 for solid in seven)
