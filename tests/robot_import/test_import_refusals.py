@@ -144,10 +144,10 @@ def test_xacro_that_cannot_be_expanded_says_what_is_missing(tmp_path: Path, caps
     assert "nobody" in said
 
 
-def test_motors_are_written_with_their_sources_and_the_speeds_that_follow(
+def test_motors_are_written_with_their_sources_and_what_was_answered_and_the_speeds_that_follow(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
-    """Also: with --answers the same robot is written again, and a switch homes its joint."""
+    """Also: with --answers the same robot is written again to the byte, and a switch homes its joint."""
     source, output = str(by_hand(tmp_path / "source").source), tmp_path / "urdf"
     words = ["import", source, "--output", str(output), "--name", "arm"]
     assert run([*words, "--motor", "nema 23", "--driver", "dm542", "--yes"]) is ExitCode.OK
@@ -162,7 +162,15 @@ def test_motors_are_written_with_their_sources_and_the_speeds_that_follow(
 
     answers = output / "arm" / "import.toml"
     text = answers.read_text()
-    for key, value in (("joint1.switch", "lower"), ("joint2.ratio", "380/21"), ("finger1.motor", "28BYJ-48")):
+    for key, value in (
+        ("joint1.switch", "lower"),
+        ("joint2.ratio", "380/21"),
+        ("joint2.step_pin", "2"),
+        ("joint2.dir_pin", "15"),
+        ("joint2.inverted", "yes"),
+        ("joint2.microsteps", "20"),
+        ("finger1.motor", "28BYJ-48"),
+    ):
         assert f'"{key}"' in text
         old = tomllib.loads(text)[key]
         text = text.replace(f'"{key}" = "{old}"', f'"{key}" = "{value}"')
@@ -172,10 +180,23 @@ def test_motors_are_written_with_their_sources_and_the_speeds_that_follow(
     assert "give --force" in capsys.readouterr().err
     assert run([*words, "--answers", str(mine), "--yes", "--force"]) is ExitCode.OK
     arm = load_arm(output / "arm")
-    assert arm.joint("joint1").drive.homing is not None
-    assert arm.joint("joint2").drive.motor.gear_ratio == "380/21"
+    homing, switch = arm.joint("joint1").drive.homing, arm.joint("joint1").drive.homing.switch
+    assert homing.direction == "lower"
+    assert [(each.pin, each.joint) for each in arm.inputs if each.name == switch] == [(34, "joint1")]
+    assert arm.joint("joint2").drive.homing is None  # its place is declared: `gemelo reference`
+    motor = arm.joint("joint2").drive.motor
+    assert (motor.gear_ratio, motor.step_pin, motor.dir_pin, motor.inverted) == ("380/21", 2, 15, True)
+    assert motor.pulses_per_turn == 200 * 20
     assert arm.joint("finger1").drive.motor.gear_ratio == "25792/405"
     assert [finding for finding in check(arm.folder) if finding.severity is Severity.ERROR] == []
+
+    again = [*words[:2], "--output", str(tmp_path / "again"), "--name", "arm"]
+    assert run([*again, "--answers", str(arm.folder / "import.toml")]) is ExitCode.OK  # nobody is asked
+    assert contents(tmp_path / "again" / "arm") == contents(arm.folder)
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.mark.parametrize(
