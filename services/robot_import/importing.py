@@ -28,6 +28,7 @@ from services.robot_import.trial import trial_findings
 
 ANSWERS_FILE = "import.toml"
 XACRO = "xacro."  # before the names of its arguments, in a file of answers
+LONGEST_NAME = 60  # letters: with what others add it is a folder's name everywhere
 NOT_IN_A_NAME = r"[^A-Za-z0-9_-]+"
 
 
@@ -53,7 +54,8 @@ def import_robot(options: ImportOptions) -> Path:
         {**answers, **{f"{XACRO}{name}": value for name, value in options.xacro.items()}}, options.yes
     )
     mended = _mended(options, questions)
-    name = safe_name(options.name or mended.xml.root.get("name") or options.source.stem, set(), NOT_IN_A_NAME)
+    wanted = options.name or mended.xml.root.get("name") or options.source.stem
+    name = safe_name(wanted[:LONGEST_NAME], set(), NOT_IN_A_NAME)
     folder = options.output / name
     _require_free(folder, options)
     description = _described(name, mended, options, questions)

@@ -66,6 +66,37 @@ def test_followers_in_a_ring_are_an_error(tmp_path: Path):
     assert any("follows another itself" in each for each in errors(mended(tmp_path / "robot.urdf", *BASE, *parts)))
 
 
+def test_a_joint_that_follows_itself_is_told_so(tmp_path: Path):
+    parts = (joint("one", "ground", "base", rest=f'{LIMIT}<mimic joint="one"/>'), joint("two", "base", "arm"))
+    (said,) = errors(mended(tmp_path / "robot.urdf", *BASE, *parts))
+    assert 'joint "one": mimics "one", which is this very joint -> name the joint that has the motor' in said
+
+
+@pytest.mark.parametrize(
+    ("shape", "words"),
+    [
+        ('<box size="-0.05 0.05 0.1"/>', '`size` of <box> is "-0.05 0.05 0.1", not 3 numbers above 0'),
+        ('<box size="0.05 0.05"/>', '`size` of <box> is "0.05 0.05", not 3 numbers above 0'),
+        ('<cylinder radius="0.05" length="0"/>', '`length` of <cylinder> is "0", not a number above 0'),
+        ('<cylinder radius="0.05"/>', "attribute `length` of <cylinder> is missing"),
+        ('<sphere radius="nan"/>', '`radius` of <sphere> is "nan", not a number above 0'),
+    ],
+)
+def test_a_shape_that_has_no_size_is_an_error_with_its_line(tmp_path: Path, shape: str, words: str):
+    drawn = f'<link name="base"><visual><geometry>{shape}</geometry></visual></link>'
+    parts = (drawn, *BASE[::2], joint("turn", "ground", "base"), joint("on", "base", "arm"))
+    (said,) = errors(mended(tmp_path / "robot.urdf", *parts))
+    assert words in said
+    assert 'line 3: link "base"' in said
+
+
+def test_the_pointer_that_git_lfs_leaves_in_a_meshs_place_is_named(tmp_path: Path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "arm.stl").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 9\n")
+    (said,) = errors(mended(tmp_path / "robot.urdf", link("arm", "meshes/arm.stl")))
+    assert "not the mesh, but a pointer to it of Git LFS -> give `git lfs pull` where it is from" in said
+
+
 def test_attributes_and_elements_of_other_programs_are_left_out(tmp_path: Path):
     limit = (
         '<limit lower="-1" upper="1" effort="2" velocity="1" drake:acceleration="2.5"/><drake:rotor_inertia value="1"/>'

@@ -22,6 +22,7 @@ SMALLEST = 0.002  # [m] of its longest side
 FLAT = 1e-3  # thickness as a share of the longest side below which a mesh bounds no volume
 LIGHTEST, HEAVIEST = 15.0, 20_000.0  # [kg/m^3] light foam, tungsten: no part of an arm is beyond
 COLLADA_UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([0-9.eE+-]+)")
+LFS_POINTER, IS_POINTER = b"version https://git-lfs", "it is not the mesh, but a pointer to it of Git LFS"
 MILLIMETRE_REMEDY = 'write scale="0.001 0.001 0.001"'
 
 
@@ -76,6 +77,8 @@ def scene_of(file: Path) -> trimesh.Scene:
 
 def facts_of(file: Path) -> MeshFacts | str:
     """Of a mesh file, or why it cannot be read."""
+    if _is_pointer(file):
+        return IS_POINTER
     try:
         mesh = scene_of(file).to_mesh()
     except ImportError as problem:
@@ -95,6 +98,14 @@ def facts_of(file: Path) -> MeshFacts | str:
     except Exception:  # the hull of what is flat, by qhull
         return MeshFacts(longest, 0.0, 0.0, (0.0,) * 3, (0.0,) * 9)
     return MeshFacts(longest, _thickness(used), volume, center, tuple(np.ravel(inertia)))
+
+
+def _is_pointer(file: Path) -> bool:
+    """True for what a clone has in a mesh's place if Git LFS is not installed."""
+    if not file.is_file():
+        return False
+    with file.open("rb") as opened:
+        return opened.read(len(LFS_POINTER)) == LFS_POINTER
 
 
 def _thickness(points: np.ndarray) -> float:
@@ -126,7 +137,8 @@ def _mesh(geometry: Geometry, facts: MeshFacts | str | None, subject: str, file:
         return []
     mesh, line = f'mesh "{geometry.mesh}"', geometry.line
     if isinstance(facts, str):
-        return [error(file, subject, f"{mesh}: {facts}", "export it again, as .stl or .obj", line)]
+        remedy = "give `git lfs pull` where it is from" if facts == IS_POINTER else "export it again, as .stl or .obj"
+        return [error(file, subject, f"{mesh}: {facts}", remedy, line)]
     longest = facts.longest * max(map(abs, geometry.scale))
     if is_in_millimetres(geometry, facts):
         return [error(file, subject, f"{mesh} is {longest:.4g} m long: it is in millimetres", MILLIMETRE_REMEDY, line)]

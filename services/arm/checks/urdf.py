@@ -104,6 +104,7 @@ def _mimic(joint: UrdfJoint, model: UrdfModel, file: str) -> list[Finding]:
     leader = model.joint(name)
     if leader.kind is JointKind.FIXED or leader.mimic is not None:
         how = "is fixed" if leader.kind is JointKind.FIXED else "follows another itself"
+        how = "is this very joint" if name == joint.name else how
         remedy = "name the joint that has the motor in <mimic>"
         return [error(file, subject, f'mimics "{name}", which {how}', remedy, joint.line)]
     return []

@@ -16,6 +16,7 @@ from services.arm.model.xml_reader import XmlFault, XmlReader, joined, parse_xml
 ZERO: Triple = (0.0, 0.0, 0.0)
 DEFAULT_AXIS: Triple = (1.0, 0.0, 0.0)
 NO_SHAPE = "nothing"  # of a geometry that cannot be read
+SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "cylinder": {"radius": 1, "length": 1}}  # how many numbers
 
 
 class JointKind(StrEnum):
@@ -243,7 +244,29 @@ def _geometry(xml: XmlReader, element: ET.Element, where: str) -> Geometry:
     if shape.tag == "mesh":
         scale = xml.triple(shape, "scale", (1.0, 1.0, 1.0), f"{where}, <mesh>")
         return Geometry("mesh", xml.text(shape, "filename", f"{where}, <mesh>"), origin, scale, line)
+    _require_sizes(xml, shape, where)
     return Geometry(shape.tag, origin=origin, line=line)
+
+
+def _require_sizes(xml: XmlReader, shape: ET.Element, where: str) -> None:
+    """Of a box, a cylinder or a ball."""
+    for name, count in SIZES.get(shape.tag, {}).items():
+        text = xml.text(shape, name, f"{where}, <{shape.tag}>")
+        if text and not _are_sizes(text.split(), count):
+            wanted = "a number" if count == 1 else f"{count} numbers"
+            xml.fault(
+                shape,
+                where,
+                f'`{name}` of <{shape.tag}> is "{text}", not {wanted} above 0',
+                "leave it out, or correct it",
+            )
+
+
+def _are_sizes(words: list[str], count: int) -> bool:
+    try:
+        return len(words) == count and all(0.0 < float(word) < math.inf for word in words)
+    except ValueError:
+        return False
 
 
 def _origin(xml: XmlReader, element: ET.Element, where: str) -> Origin:
