@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -24,7 +25,7 @@ from services.planner.collision_geometry.shapes import TriangleMesh
 WITHIN = 0.005  # [m] of the mesh, where `SHARE` of the shapes' outer surface is to be
 WITHIN_SHARE = 0.01  # of the longest side of a link for which that is more
 MOST = 40  # shapes of a link
-ALONE = 3.0  # [s] after which other processes are started: each needs a second for that
+ALONE = 3.0  # [s] of the CPU, after which other processes are started: each needs a second or two for that
 
 _Wanted = tuple[str, TriangleMesh, float, int]  # what `_fit` is given
 
@@ -84,12 +85,13 @@ def fit_links(
 
 def _on_all_cores(wanted: Sequence[_Wanted]) -> Iterator[tuple[LinkFit, float]]:
     """Each fit with how long it took [s], in their order; in processes of their own once they have taken `ALONE`."""
-    began, number = time.monotonic(), 0
-    while number < len(wanted) and time.monotonic() < began + ALONE:
+    began, number = time.process_time(), 0
+    while number < len(wanted) and time.process_time() < began + ALONE:
         yield _timed_fit(wanted[number])
         number += 1
     if number < len(wanted):
-        with ProcessPoolExecutor(mp_context=get_context("spawn")) as others:
+        count = min(len(wanted) - number, os.cpu_count() or 1)
+        with ProcessPoolExecutor(count, get_context("spawn")) as others:
             yield from others.map(_timed_fit, wanted[number:])
 
 
