@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from argparse import ArgumentTypeError
 from pathlib import Path
 
@@ -58,5 +59,5 @@ def run(options: Options) -> ExitCode:
         folder = import_robot(wanted)
     except (DescriptionError, OSError) as error:
         raise CommandError(str(error)) from error
-    print(f"GEMELO_ROBOT={folder} make up")
+    print(f"GEMELO_ROBOT={shlex.quote(str(folder))} make up")
     return ExitCode.OK

@@ -3,6 +3,8 @@ nobody wrote anything."""
 
 from __future__ import annotations
 
+import shlex
+
 from schemas.actions import GoalStatusCode
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.planning import NamedGoal, PlanCode, PlanRequest
@@ -17,9 +19,9 @@ from tests.stack.person import Operator
 
 def test_an_imported_export_makes_its_first_move_on_a_generated_device(tmp_path, capsys):
     export = solidworks(tmp_path / "download")
-    assert run(["import", str(export.source), "--yes", "--output", str(tmp_path / "urdf")]) is ExitCode.OK
+    assert run(["import", str(export.source), "--yes", "--output", str(tmp_path / "my arms")]) is ExitCode.OK
     last = capsys.readouterr().out.splitlines()[-1]
-    robot = last.removeprefix("GEMELO_ROBOT=").removesuffix(" make up")
+    robot = shlex.split(last)[0].removeprefix("GEMELO_ROBOT=")
     typed = ("sh", "-c", f"exec env {last}")
     environment = {"GEMELO_ROBOT": robot}  # of those who look on
     with Stack(out=tmp_path / "out", panel=True, command=typed, environment=environment) as stack:
