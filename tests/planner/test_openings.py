@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from services.bench.fit_quality import heavy_part
 from services.collision_fitting import mesh_fit
 from services.collision_fitting.excess import SHARE, depth_in, excess_of
 from services.collision_fitting.mesh_surface import MeshSurface
@@ -78,6 +79,18 @@ def test_the_edge_of_a_bent_sheet_is_no_opening():
         (made.triangles[:, :, 0].mean(axis=1) > 0.0) & (np.abs(made.triangles[:, :, 2]).min(axis=1) < 0.049)
     )
     assert len(closed(as_mesh(made)).faces) == len(made.faces)
+
+
+def test_a_heavy_mesh_with_all_that_cad_draws_needs_few_shapes():
+    """The link of `import_s`: an open housing with a front and a back, a motor, a hundred bolts."""
+    made = heavy_part(0)
+    mesh = TriangleMesh(np.array(made.vertices) / 1000.0, np.array(made.faces, dtype=np.int32))
+    assert len(mesh.faces) >= 60_000
+    surface = MeshSurface(mesh)
+    shapes = shapes_around(surface, WITHIN, 40)
+    assert len(shapes) <= 5
+    assert excess_of(shapes, surface, WITHIN).share >= SHARE
+    assert depth_in([shape for each in shapes for shape in each.shapes], mesh.vertices).min() >= -1e-9
 
 
 @pytest.mark.parametrize("alone", [0.0, 1e9])
