@@ -105,10 +105,10 @@ class NativePlanner:
         """The names of what is attached."""
         return tuple(self._scene.held)
 
-    def free(self, positions: ArrayLike) -> NDArray[np.bool_]:
-        """(rows,) True for each row of `positions` (rows, n) [rad] or [m] that keeps the margin to itself and
-        everything else; raises ValueError for another shape."""
-        return motion.are_free(self._scene.world, self._kernel, self._rows(positions), self.margin)
+    def free(self, positions: ArrayLike, spare: float = 0.0) -> NDArray[np.bool_]:
+        """(rows,) True for each row of `positions` (rows, n) [rad] or [m] that keeps the margin, and `spare` [m] more,
+        to itself and everything else; raises ValueError for another shape."""
+        return motion.are_free(self._scene.world, self._kernel, self._rows(positions), self.margin + spare)
 
     def edge_free(self, start: ArrayLike, goal: ArrayLike) -> bool:
         """True if the whole straight line of the joints from `start` to `goal`, (n,) [rad] or [m], keeps the margin,
@@ -180,9 +180,9 @@ class NativePlanner:
         """A path from `start` (n,) to one of `goals` (n,) or (m, n), by RRT-Connect, shortened and smoothed.
 
         The same seed gives the same path, unless `time_limit` [s] cuts the shortening off. Distances are counted in
-        time at full speed. Until `enough` configurations have been checked, or the path is nearly as short as any can
-        be, other searches look for a shorter one. The interpreter's lock is released; `cancel` may be set from another
-        thread.
+        time at full speed. Other searches look for a shorter path until `enough` configurations have been checked, or
+        fewer where it is not half as long again as the straight line: in proportion to what is to be gained. The
+        interpreter's lock is released; `cancel` may be set from another thread.
         """
         rows = self._rows(np.atleast_2d(np.asarray(goals, dtype=np.float64)))
         at = self._row(start)

@@ -29,20 +29,15 @@ def nearby_free(
 ) -> Array | None:
     """`configuration` (n,) [rad] or [m] itself where the native planner lets it move, else a near one where it does;
     None where none was found."""
-    if _can_move(core, configuration):
+    if core.free(configuration[None], SPARE)[0]:
         return configuration
     for rows in _around(arm, configuration, seed):
-        for row in rows[core.free(rows)][:TRIED]:
-            if _can_move(core, row) and validity.is_line_free(configuration, row):
+        for row in rows[core.free(rows, SPARE)][:TRIED]:
+            if validity.is_line_free(configuration, row):
                 return np.asarray(row)
         if deadline.has_passed():
             break
     return None
-
-
-def _can_move(core: NativePlanner, configuration: Array) -> bool:
-    most = core.margin + SPARE
-    return core.distance(configuration, most) >= most
 
 
 def _around(arm: Arm, configuration: Array, seed: int) -> Iterator[Array]:

@@ -22,6 +22,7 @@ from tests.planner.native.coal_truth import Truth
 from tests.planner.native.conftest import load
 
 UNSURE = 1e-5  # [m] of coal's own distances
+LONGER = 1.06  # times as long as the shortest of eight: a path of one search
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -99,7 +100,7 @@ def test_more_searches_make_no_path_longer_and_all_are_free(arm, core, configura
     speeds = np.array([joint.velocity for joint in arm.joints])
     once, more = [], []
     for seed, (start, goal) in enumerate(zip(rows[0:40:2], rows[1:41:2], strict=True)):
-        single, several = (core.plan(start, goal, seed=seed, time_limit=20.0, enough=enough) for enough in (0, 20_000))
+        single, several = (core.plan(start, goal, seed=seed, time_limit=20.0, enough=enough) for enough in (0, 200_000))
         if isinstance(single, NoPath):
             continue
         assert isinstance(several, FreePath)
@@ -113,6 +114,29 @@ def test_more_searches_make_no_path_longer_and_all_are_free(arm, core, configura
     assert sum(more) < sum(once)
 
 
+def test_no_other_search_is_begun_where_nothing_is_to_be_gained(core, configurations):
+    core.set_scene([])
+    rows = configurations(400, 5)
+    start, goal = next((a, b) for a, b in pairwise(rows) if core.edge_free(a, b))
+    single, several = (core.plan(start, goal, enough=enough) for enough in (0, 10**9))
+    assert len(single.corners) == 2
+    assert several.effort.checks == single.effort.checks
+
+
+def test_the_first_path_is_looked_for_where_short_ones_are(core, configurations):
+    """Without any search for a shorter one it is seldom much longer than the shortest of many."""
+    core.set_scene(SHELF)
+    rows = configurations(400, 5)
+    rows = rows[core.free(rows)]
+    speeds = np.array([joint.velocity for joint in core.arm.joints])
+    ratios = []
+    for start, goal in zip(rows[0:60:2], rows[1:61:2], strict=True):
+        paths = [core.plan(start, goal, seed=seed, time_limit=20.0) for seed in range(8)]
+        found = [float(np.linalg.norm(np.diff(path.corners, axis=0) / speeds, axis=1).sum()) for path in paths]
+        ratios += [length / min(found) for length in found]
+    assert np.mean(ratios) < LONGER
+
+
 def test_what_the_spheres_say_of_a_configuration_for_certain_is_so_on_the_exact_shapes(arm, configurations):
     world = World(arm, Kinematics(arm), SCENES["shelf"])
     check = NativeCheck(arm)
@@ -120,7 +144,7 @@ def test_what_the_spheres_say_of_a_configuration_for_certain_is_so_on_the_exact_
     for row in configurations(150, 6):
         distance = world.distance(row)
         assert check.least_distance(world, row) <= max(distance, 0.0) + UNSURE
-        if check.touches(world, row, CLEARANCE):
+        if check.resolve(world, np.array((row, row)), CLEARANCE).touching is not None:
             touching += 1
             assert distance < CLEARANCE
     assert touching > 10

@@ -21,11 +21,11 @@ struct PlanQuery {
     Joints start;
     std::vector<Joints> goals;  // any of them will do
     uint64_t seed = 0;
-    uint64_t enough = 0;  // configurations to check, after which no other search is begun; 0: one search
-    int patience = 15;    // of the shortener
+    uint64_t enough = 0;  // configurations to check at most before no other search is begun; 0: one search
+    int patience = 6;     // of the shortener
 };
 
-constexpr double kCloseEnough = 1.05;    // of the least possible length: no other search begins; chosen
+constexpr double kMuchLonger = 0.5;      // more than the least possible length: all of `enough` is spent; measured
 constexpr uint64_t kNextSeed = 1000003;  // from search to search; chosen: a prime, far from the seeds of other requests
 
 // Chosen: how finely lines are told apart [m]: a line that comes so near to something is no loss where there is room.
@@ -46,6 +46,13 @@ inline Tolerances told_to(double finest, const World& world, const Kernel& kerne
     return result;
 }
 
+// How many configurations are to be checked, as much of `enough` as there is to be gained: nothing where a path is of
+// the length `bound`, which none can be shorter than.
+inline uint64_t worth_checking(uint64_t enough, double length, double bound) {
+    const double most = kMuchLonger * bound, gain = std::min(length - bound, most);
+    return gain > 0.0 ? static_cast<uint64_t>(static_cast<double>(enough) * gain / most) : 0;
+}
+
 // The shortest path of several searches into `result`; none where the first one was stopped. The others only look where
 // a shorter path may lead, and shorten what they find.
 inline void find_shortest(const Space& space, MotionValidator& searching, MotionValidator& shortening,
@@ -57,7 +64,8 @@ inline void find_shortest(const Space& space, MotionValidator& searching, Motion
         Random random(seed);
         const double began = stop.elapsed();
         Search search(space, searching, random, stop);
-        const uint64_t most = query.enough - std::min(query.enough, shortening.checks());
+        const uint64_t worth = worth_checking(query.enough, least, bound);
+        const uint64_t most = worth - std::min(worth, shortening.checks());
         std::vector<Joints> path = result.path.empty() ? search.find(query.start, goals)
                                                        : search.find_shorter(query.start, goals, least, most);
         const double found = stop.elapsed();
@@ -73,7 +81,7 @@ inline void find_shortest(const Space& space, MotionValidator& searching, Motion
             result.path = std::move(path);
         }
         const uint64_t checks = searching.checks() + shortening.checks();
-        if (least <= kCloseEnough * bound || checks >= query.enough || stop()) return;
+        if (checks >= worth_checking(query.enough, least, bound) || stop()) return;
     }
 }
 

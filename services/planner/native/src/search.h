@@ -72,7 +72,8 @@ class Search {
   public:
     Search(const Space& space, MotionValidator& validator, Random& random, const StopCondition& stop)
         : space_(space), validator_(validator), random_(random), stop_(stop) {
-        range_ = 0.25 * space_.distance(space_.lower.data(), space_.upper.data());
+        diagonal_ = space_.distance(space_.lower.data(), space_.upper.data());
+        range_ = 0.25 * diagonal_;
     }
 
     size_t iterations() const { return iterations_; }
@@ -82,7 +83,10 @@ class Search {
         for (const Joints& goal : goals) {
             if (validator_.is_free_line(start.data(), goal.data(), stop_)) return {start, goal};
         }
-        return grown(start, goals, std::numeric_limits<double>::infinity(), std::numeric_limits<uint64_t>::max());
+        const double everything = std::numeric_limits<double>::infinity();
+        nearest_ = everything;
+        for (const Joints& goal : goals) nearest_ = std::min(nearest_, space_.distance(start.data(), goal.data()));
+        return grown(start, goals, everything, std::numeric_limits<uint64_t>::max());
     }
 
     // As `find`, where none of the goals can be seen from the start: only configurations are drawn by which a path
@@ -114,15 +118,21 @@ class Search {
     }
 
     // Somewhere between the bounds, by which a path shorter than `longest` may lead; false where so many draws have
-    // found nothing.
+    // found nothing. Where no path is known, short ones are looked for first: the longer the search lasts, the farther
+    // away is drawn.
     bool draw(const Joints& start, const std::vector<Joints>& goals, double longest, Joints& sample) {
-        if (std::isinf(longest)) {
-            for (size_t i = 0; i < sample.size(); ++i) {
-                sample[i] = space_.lower[i] + random_.share() * (space_.upper[i] - space_.lower[i]);
-            }
-            return true;
+        if (!std::isinf(longest)) return draw_within(start, goals, longest, kMostDraws, sample);
+        const double reach =
+            kNear * nearest_ + kWider * diagonal_ * std::pow(kGrowth, static_cast<double>(iterations_));
+        if (reach < diagonal_ && draw_within(start, goals, reach, kFewDraws, sample)) return true;
+        for (size_t i = 0; i < sample.size(); ++i) {
+            sample[i] = space_.lower[i] + random_.share() * (space_.upper[i] - space_.lower[i]);
         }
-        for (int tried = 0; tried < kMostDraws; ++tried) {
+        return true;
+    }
+
+    bool draw_within(const Joints& start, const std::vector<Joints>& goals, double longest, int draws, Joints& sample) {
+        for (int drawn = 0; drawn < draws; ++drawn) {
             if (draw_around(start, goals[random_.below(goals.size())], longest, sample)) return true;
         }
         return false;
@@ -157,6 +167,10 @@ class Search {
     }
 
     static constexpr int kMostDraws = 200;  // chosen: bounds the time where hardly anything is free
+    static constexpr int kFewDraws = 8;     // chosen, of those for short paths
+    // Measured: how long the paths are that are looked for first, by the distance to the nearest goal and the diagonal
+    // of all that the joints can do, and by how much longer with every sample.
+    static constexpr double kNear = 1.1, kWider = 0.01, kGrowth = 1.01;
 
     // One step of at most `range_` from a node towards `target`; true when it got there.
     bool extend(SearchTree& tree, size_t from, const double* target) {
@@ -196,7 +210,8 @@ class Search {
     MotionValidator& validator_;
     Random& random_;
     const StopCondition& stop_;
-    double range_;
+    double diagonal_, range_;
+    double nearest_ = 0.0;  // from the start to a goal
     size_t iterations_ = 0;
 };
 

@@ -1,5 +1,6 @@
 // A shorter path through the same free space: straight cuts between two places of it, at random and from corner to
-// corner.
+// corner, and corners pulled towards the line between their neighbours, all joints together and one by one (Geraerts
+// and Overmars 2007).
 #pragma once
 
 #include "search.h"
@@ -18,6 +19,12 @@ class Shortener {
             failures = cut(path) ? 0 : failures + 1;
         }
         drop_corners(path);
+        for (int round = 0; round < kRounds && path.size() > 2 && !stop_(); ++round) {
+            const double before = length(path);
+            for (size_t corner = 1; corner + 1 < path.size(); ++corner) pull(path, corner);
+            drop_corners(path);
+            if (length(path) > kWorthARound * before) break;
+        }
         return path;
     }
 
@@ -28,6 +35,47 @@ class Shortener {
     }
 
   private:
+    static constexpr int kRounds = 3;
+    static constexpr double kWorthARound = 0.99;  // of the length before, or it is the last one
+    static constexpr double kWorthAMove = 0.995;  // of the length of both edges before
+
+    void pull(std::vector<Joints>& path, size_t corner) {
+        for (double share = 0.5; share > 0.1; share *= 0.5) {
+            while (!stop_() && move(path, corner, between(path[corner], foot(path, corner), share))) continue;
+        }
+        const Joints there = foot(path, corner);
+        for (size_t i = 0; i < there.size(); ++i) {
+            for (double share = 1.0; share > 0.2; share *= 0.5) {
+                Joints at = path[corner];
+                at[i] += share * (there[i] - at[i]);
+                if (stop_() || move(path, corner, at)) break;
+            }
+        }
+    }
+
+    // The corner to `at`, where that is free and worth it.
+    bool move(std::vector<Joints>& path, size_t corner, const Joints& at) {
+        const double *before = path[corner - 1].data(), *after = path[corner + 1].data(), *old = path[corner].data();
+        const double length = space_.distance(before, old) + space_.distance(old, after);
+        if (space_.distance(before, at.data()) + space_.distance(at.data(), after) > kWorthAMove * length) return false;
+        if (!validator_.is_free_line(before, at.data(), stop_)) return false;
+        if (!validator_.is_free_line(at.data(), after, stop_)) return false;
+        path[corner] = at;
+        return true;
+    }
+
+    // The place nearest to the corner on the line between its neighbours.
+    Joints foot(const std::vector<Joints>& path, size_t corner) const {
+        const Joints &from = path[corner - 1], &to = path[corner + 1], &here = path[corner];
+        double along = 0.0, squared = 0.0;
+        for (size_t i = 0; i < from.size(); ++i) {
+            const double weight = space_.weights[i] * space_.weights[i], way = to[i] - from[i];
+            along += weight * (here[i] - from[i]) * way;
+            squared += weight * way * way;
+        }
+        return between(from, to, squared > 0.0 ? std::min(1.0, std::max(0.0, along / squared)) : 0.0);
+    }
+
     // From every corner straight to the farthest one that can be seen.
     void drop_corners(std::vector<Joints>& path) {
         for (size_t from = 0; from + 2 < path.size(); ++from) {
