@@ -49,6 +49,7 @@ class Target(ToolGoal, total=False):
     jump: float  # [rad] or [m] that a joint may move between them
     planner: str  # "native", "RRTConnect", "RRTstar", "BITstar" or "PRM"
     seed: int  # the same seed, the same plan
+    attempts: int  # 1 to 1000: as many times as usual is looked for a shorter way, within `allowed_time`
     time_optimal: bool  # as fast as can be, without a limit of the jerk
     clearance: float  # [m] that stays free between what may not touch, 0.5 mm to 50 mm; the robot's own if left out
     allowed_time: float  # [s] for planning

@@ -16,6 +16,7 @@ from gemelo.errors import BadArgument
 from gemelo.units import Pose
 from schemas.joints import JointState
 from schemas.planning import (
+    MOST_ATTEMPTS,
     CircularMotion,
     FreeMotion,
     Goal,
@@ -264,9 +265,12 @@ def _motion_of(target: Target) -> Motion:
     if kind in ("free", "ptp"):
         _refuse_with(target, f"a {kind} motion (only line=True, through= and center=)", of_tool)
     if kind != "free":
-        _refuse_with(target, f"{kind}=", ("planner", "seed"))
+        _refuse_with(target, f"{kind}=", ("planner", "seed", "attempts"))
     if kind == "free":
-        return FreeMotion(planner_id=target.get("planner", ""), seed=target.get("seed", 0))
+        attempts = target.get("attempts", 1)
+        if not 1 <= attempts <= MOST_ATTEMPTS:
+            raise BadArgument(f"attempts={attempts} is not from 1 to {MOST_ATTEMPTS}")
+        return FreeMotion(planner_id=target.get("planner", ""), seed=target.get("seed", 0), attempts=attempts)
     if kind == "ptp":
         return PointToPoint()
     values = {name: _positive(name, target[name], unit, most) for name, unit, most in TOOL_LIMITS if name in target}  # type: ignore[literal-required]

@@ -47,11 +47,15 @@ class WaypointGoal(Message, frozen=True, kw_only=True, tag="waypoints"):
 Goal = PoseGoal | JointGoal | NamedGoal | WaypointGoal
 
 
+MOST_ATTEMPTS = 1000
+
+
 class FreeMotion(Message, frozen=True, kw_only=True, tag="free"):
     """Any way that touches nothing."""
 
     planner_id: str = ""  # "": the default; "RRTConnect", "RRTstar", "BITstar", "PRM", "native"
     seed: int = 0  # the same seed, the same plan
+    attempts: int = 1  # to 1000: as many times as usual is looked for a shorter way, by the native planner
 
 
 class PointToPoint(Message, frozen=True, kw_only=True, tag="ptp"):

@@ -98,6 +98,8 @@ def _motion_options(group: Group) -> None:
     group.add_argument("--time-optimal", action="store_true", help="as fast as can be, without a limit of the jerk")
     group.add_argument("--planner", metavar="ID", help="native, RRTConnect, RRTstar, BITstar or PRM")
     group.add_argument("--seed", type=int, help="the same seed, the same plan")
+    attempts = "as many times as usual is looked for a shorter way, up to 1000, within --time"
+    group.add_argument("--attempts", type=int, metavar="N", help=attempts)
 
 
 def run(options: Options) -> ExitCode:

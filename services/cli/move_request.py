@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from msgspec.structs import asdict, replace
 
 from schemas.planning import (
+    MOST_ATTEMPTS,
     CircularMotion,
     FreeMotion,
     Goal,
@@ -82,7 +83,7 @@ def motion_of(options: Options) -> Motion:
     is_arc = options.arc is not None or options.center is not None
     is_tool = options.line or is_arc
     _require(is_tool, options, TOOL_MOTION, "--line, --arc or --center")
-    _require(not is_tool and not options.ptp, options, ("planner", "seed"), "a free motion")
+    _require(not is_tool and not options.ptp, options, ("planner", "seed", "attempts"), "a free motion")
     if is_tool:
         line = LinearMotion(
             speed=_positive(options, "tool_speed"),
@@ -96,7 +97,10 @@ def motion_of(options: Options) -> Motion:
         return CircularMotion(interim=tuple(options.arc or ()), center=tuple(options.center or ()), **asdict(line))
     if options.ptp:
         return PointToPoint()
-    return FreeMotion(planner_id=options.planner or "", seed=options.seed or 0)
+    attempts = 1 if options.attempts is None else options.attempts
+    if not 1 <= attempts <= MOST_ATTEMPTS:
+        raise usage(f"--attempts {attempts} is not from 1 to {MOST_ATTEMPTS}")
+    return FreeMotion(planner_id=options.planner or "", seed=options.seed or 0, attempts=attempts)
 
 
 def _clearance(options: Options) -> float | None:

@@ -78,7 +78,8 @@ def motion_text(motion: Motion) -> str:
             return "in a straight line of the joints"
         case FreeMotion():
             seed = f"seed {motion.seed}" if motion.seed else ""
-            return _joined([f"by {motion.planner_id}" if motion.planner_id else "", seed])
+            attempts = f"{motion.attempts} attempts" if motion.attempts != 1 else ""
+            return _joined([f"by {motion.planner_id}" if motion.planner_id else "", seed, attempts])
         case LinearMotion():
             return _joined(["the tool in a straight line", *_tool_limits(motion)])
         case CircularMotion():

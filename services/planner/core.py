@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from schemas.joints import JointState
 from schemas.motion import JointTrajectory
 from schemas.planning import (
+    MOST_ATTEMPTS,
     CircularMotion,
     FreeMotion,
     LinearMotion,
@@ -224,6 +225,7 @@ class Planner:
                         motion.seed + attempt,
                         context.deadline,
                         context.watch,
+                        motion.attempts,
                     )
                 return context.builder.path(path), path.planner_id
             except (PathNotFound, DeadlinePassed) as not_found:
@@ -279,3 +281,6 @@ def _require_known(request: PlanRequest) -> None:
         raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, "allowed_time", message, "allow 1 s, which is the default")
     if isinstance(request.motion, FreeMotion):
         require_known(request.motion.planner_id)
+        if not 1 <= request.motion.attempts <= MOST_ATTEMPTS:
+            message = f"attempts is {request.motion.attempts}: it must be from 1 to {MOST_ATTEMPTS}"
+            raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, "attempts", message, "ask for 1, which is the default")

@@ -72,6 +72,7 @@ def test_the_tool_points_along_a_direction():
 def test_a_free_motion_names_its_planner_and_seed():
     asked = request("--named left --planner RRTstar --seed 7 --time 3")
     assert asked.motion == FreeMotion(planner_id="RRTstar", seed=7)
+    assert request("--named left --attempts 20").motion == FreeMotion(attempts=20)
     assert asked.allowed_time == 3.0
 
 
@@ -85,6 +86,8 @@ def test_a_clearance_is_a_length_within_its_range():
     [
         ("--named left --clearance 0.4mm", "--clearance 0.4mm is not from 0.5mm to 50mm"),
         ("--named left --clearance 4", "--clearance 4000mm is not from 0.5mm to 50mm"),
+        ("--named left --attempts 0", "--attempts 0 is not from 1 to 1000"),
+        ("--to 0.2 0.1 0.1 --line --attempts 3", "--attempts goes with a free motion"),
         ("--named left --rpy 0 0 0", "--rpy goes with --to"),
         ("--to 0.2 0.1 0.1 --blend 10mm", "--blend goes with --via"),
         ("--to 0.2 0.1 0.1 --tool-speed 10", "--tool-speed goes with --line"),

@@ -237,7 +237,8 @@ def test_no_option_but_these_takes_a_bare_number():
             if getattr(action.type, "__name__", "") in ("finite_number", "positive_number", "int", "float")
         }
     assert bare == {
-        "move --quat", "move --axis", "move --along", "move --free-axis", "move --seed", "ik --quaternion",
+        "move --quat", "move --axis", "move --along", "move --free-axis", "move --seed", "move --attempts",
+        "ik --quaternion",
         "ik --axis", "ik --along", "ik --free-axis", "topic pub --rate", "tf echo --rate", "link bench --rate",
         "grip --max-effort", "scene add --scale", "scene resize --scale", "bag record --duration",
         "bag record --max-minutes", "bag record --max-mb", "deploy keys --renew-within",

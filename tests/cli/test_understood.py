@@ -16,6 +16,7 @@ SAID = {
     "move --named left --planner PRM --seed 4 --time 3s --time-optimal": (
         'to the named state "left"; by PRM; seed 4; without a jerk limit; planned within 3 s'
     ),
+    "move --named left --attempts 20": 'to the named state "left"; 20 attempts',
     "move --to 0.2 0.1 0.1 --line --tool-speed 0.05 --tool-acceleration 200mm/s2 --fraction 80% --max-step 2mm": (
         "tool to 200, 100, 100 mm; the tool in a straight line; at most 50 mm/s; at most 200 mm/s2; "
         "checked every 2 mm; at least 80 % of it"

@@ -66,6 +66,8 @@ BAD = [
     ({"named": "ready", "allowed_time": 0}, "allowed_time=0 is not above 0"),
     ({"named": "ready", "clearance": 4}, "clearance=4 m is not from 0.0005 to 0.05 m: if it is in millimetres, write"),
     ({"named": "ready", "clearance": 0.0004}, "clearance=0.0004 m is not from 0.0005 to 0.05 m"),
+    ({"named": "ready", "attempts": 0}, "attempts=0 is not from 1 to 1000"),
+    ({"named": "ready", "ptp": True, "attempts": 3}, "attempts= does not go with ptp="),
     ({"named": "ready", "blend": 0.01}, "blend= does not go with a goal without via="),
     ({"named": "ready", "tool_speed": 0.1}, "tool_speed= does not go with a free motion"),
     ({"named": "ready", "ptp": True, "line": True}, "one path at a time, not line and ptp"),

@@ -18,6 +18,7 @@ from schemas.joints import JointState
 from schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, Timing
 from schemas.scene import MeshShape, PlanningScene, SceneObject
 from services.arm.model.description import load_arm
+from services.bench.problems.problem_sets import path_length
 from services.bench.scenes import SCENES, box
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.native_scene import native_scene
@@ -208,6 +209,34 @@ def test_an_arm_that_stands_at_the_very_margin_is_led_away_at_once(planner: Plan
         response = planner.plan(request, None)
         require_sound(planner, request, response)
         assert response.planner_id in {"native", "straight"}
+
+
+def test_more_attempts_make_no_way_longer_and_some_shorter(planner: Planner):
+    show(planner, SCENES["shelf"])
+    planner.checker.begin()
+    lengths: dict[int, list[float]] = {1: [], 300: []}
+    random = np.random.default_rng(11)
+    lower, upper = np.array([(joint.lower, joint.upper) for joint in planner.arm.joints]).T
+    ends = [row for row in random.uniform(lower, upper, (120, len(lower))) if planner.checker.keeps(row, 0.01)]
+    for start, goal in zip(ends[0:24:2], ends[1:25:2], strict=True):
+        for attempts, found in lengths.items():
+            request = asked(planner, start, goal, motion=FreeMotion(attempts=attempts), allowed_time=60.0)
+            response = planner.plan(request, None)
+            require_sound(planner, request, response)
+            rows = np.array([point.positions for point in response.trajectory.points])
+            found.append(path_length(rows, np.array([joint.velocity for joint in planner.arm.joints])))
+    few, many = np.array(lengths[1]), np.array(lengths[300])
+    assert many.sum() < few.sum()
+    assert (many <= 1.01 * few).all()  # of the polyline none is longer; its rounded corners may be by a little
+
+
+@pytest.mark.parametrize("attempts", [-1, 0, 1001])
+def test_attempts_that_nobody_can_make_are_refused(planner: Planner, attempts: int):
+    request = msgspec.structs.replace(between(planner), motion=FreeMotion(attempts=attempts))
+    refusal = planner.plan(request, None).refusal
+    assert refusal is not None
+    assert refusal.subject == "attempts"
+    assert f"attempts is {attempts}: it must be from 1 to 1000" in refusal.message
 
 
 def test_a_gap_too_narrow_for_the_spheres_is_found_by_another_search():

@@ -233,6 +233,7 @@ _ASKED: dict[str, str] = {
     "{name}={value} is not in (0, 1], a share of the joints' limits: {cent} per cent is {share}": "{name} va de más "
     "de 0 "
     "a 1, no {value}.",
+    "attempts={value} is not from 1 to {most}": "Los intentos van de 1 a {most}, no {value}.",
     "clearance={value} m is not from {least} to {most} m": "Lo que queda libre va de {least} a {most} m, no {value} m.",
     "{name}={value} is not above 0": "{name} debe ser más de 0, no {value}.",
     "{name}={value} is more than {most}": "{name} es {value}, más de {most}.",

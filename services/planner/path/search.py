@@ -52,14 +52,15 @@ class Search:
         seed: int,
         deadline: Deadline,
         watch: Stopwatch,
+        attempts: int = 1,
     ) -> Path:
-        """A smooth path from `start` (n,) to one of `goals` (m, n) that keeps `margin` [m]; raises `PathNotFound`,
-        `PlanRefused`."""
+        """A smooth path from `start` (n,) to one of `goals` (m, n) that keeps `margin` [m], after as many `attempts` as
+        usual for a shorter one; raises `PathNotFound`, `PlanRefused`."""
         require_known(planner_id)
         core, seed = self._checker.native(margin), seed % SEEDS
         if core is None and planner_id == NATIVE:
             raise _not_built()
-        sought = _Sought(start, goals, ValidityChecker(self._checker, margin), seed, watch)
+        sought = _Sought(start, goals, ValidityChecker(self._checker, margin), seed, attempts, watch)
         if core is not None and planner_id in ("", NATIVE):
             try:
                 return self._native(core, sought, deadline if planner_id else deadline.share(PATIENCE))
@@ -79,7 +80,7 @@ class Search:
         ends = [(goal, near) for goal, near in zip(sought.goals, goals, strict=True) if near is not None]
         if not ends:
             raise PathNotFound(SearchFailure.GOAL_TOUCHES)
-        path = native_path(core, start, np.array([near for _, near in ends]), sought.seed, deadline)
+        path = native_path(core, start, np.array([near for _, near in ends]), sought.seed, sought.attempts, deadline)
         goal = next(goal for goal, near in ends if np.array_equal(near, path.corners[-1]))
         return self._joined(sought, start, path, goal, deadline)
 
@@ -114,6 +115,7 @@ class _Sought:
     goals: Array
     validity: ValidityChecker
     seed: int
+    attempts: int
     watch: Stopwatch
 
 

@@ -87,7 +87,14 @@ class WaypointPlanner:
             try:
                 with context.watch.phase("search"):
                     path = self._search.find(
-                        leg[0], leg[1:], context.margin, motion.planner_id, motion.seed, context.deadline, context.watch
+                        leg[0],
+                        leg[1:],
+                        context.margin,
+                        motion.planner_id,
+                        motion.seed,
+                        context.deadline,
+                        context.watch,
+                        motion.attempts,
                     )
             except PathNotFound as not_found:
                 deadline, margin = context.deadline, context.margin
