@@ -49,6 +49,8 @@ FIGURES = {
     "plan_python_ms": Row("planner.planning:plan_python_ms", "ms"),
     "plan_any_ms": Row("planner.any_planning:plan_any_ms", "ms", takes_count=True),
     "plan_any_success": Row("planner.any_planning:plan_any_success", "%", takes_count=True),
+    "plan_near_success": Row("planner.near_planning:plan_near_success", "%", takes_count=True),
+    "refusal_ms": Row("planner.refusing:refusal_ms", "ms", takes_count=True),
     "plan_mesh_ms": Row("planner.mesh_planning:plan_mesh_ms", "ms"),
     "import_s": Row("fit_quality:import_s", "s"),
     "extra_mb": Row("extra_sizes:extra_mb", "MB"),
@@ -120,7 +122,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="make bench", description="Measure the figures of this machine.")
     parser.add_argument("--only", nargs="+", choices=FIGURES, metavar="NAME", help=", ".join(FIGURES))
     parser.add_argument("--out", type=Path, default=project_root() / "out/bench.json")
-    said = f"problems of each arm and family for plan_any_*, and picks of each arm ({FEW}; 100 take an hour)"
+    said = f"problems of each arm and family for plan_*, refusal_ms, and picks of each arm ({FEW}; 100 take an hour)"
     parser.add_argument("--problems", type=int, default=FEW, metavar="N", help=said)
     parser.add_argument("--seed", type=int, default=SEED, metavar="N", help=f"by which picks are drawn ({SEED})")
     options = parser.parse_args()

@@ -13,7 +13,7 @@ from services.arm.kinematics.kinematics import Kinematics
 from services.bench.any_arm.drawn_problems import ProblemDrawer, problems
 from services.bench.any_arm.families import FAMILIES, FEWEST, MOST, settings
 from services.bench.any_arm.generated_arms import Sketch, Solid, generated_arm, seven_joints, six_joints
-from services.bench.planner import any_planning
+from services.bench.planner import any_planning, near_planning, refusing
 from services.bench.planner.any_planning import AnyTrial, has_contact, planned, trial
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.world import World
@@ -105,6 +105,27 @@ def test_both_ends_are_within_limits_and_free_and_drawn_the_same_again(name: str
         drawn[-1].goal,
         drawn[-1].setting.scene,
     )
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_goals_near_things_are_near_and_others_touch(planner: Planner, family: str):
+    drawer = ProblemDrawer(planner.arm, planner.kinematics)
+    for seed in range(FEW):
+        near, touching = drawer.near(family, seed), drawer.in_contact(family, seed)
+        world = World(planner.arm, planner.kinematics, near.setting.scene)
+        assert near.goal == drawer.near(family, seed).goal
+        assert near.clearance is not None
+        assert near.clearance < world.distance(near.goal) < CLEARANCE
+        assert world.distance(touching.goal) <= 0.0
+
+
+def test_goals_near_things_are_reached_and_what_cannot_be_is_refused(monkeypatch: pytest.MonkeyPatch):
+    for module in (near_planning, refusing):
+        monkeypatch.setattr(module, "ARMS", ("seven",))
+        monkeypatch.setattr(module, "FAMILIES", ("box", "three shelves"))
+    reached, refused = near_planning.plan_near_success(FEW), refusing.refusal_ms(FEW)
+    assert (reached.median, reached.met) == (100.0, True)
+    assert {"goal in contact, p50", "goal too near, p50", "out of reach, p50"} <= set(refused.reference)
 
 
 def test_cages_have_5_to_40_solids():

@@ -5,7 +5,7 @@ Nobody knows beforehand whether a way leads from one to the other: what counts a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
@@ -28,6 +28,9 @@ COUNT = 100  # problems of an arm in a family
 SPARE = 0.002  # [m] beyond the clearance that both ends keep
 TRIES = 30  # random configurations for one end, before another scene is drawn
 SOLUTIONS = 6  # of one pose that are looked at
+NEAREST, FARTHEST = 0.0008, 0.0039  # [m] that goals near things are away from something
+NARROW = 0.0005  # [m] of clearance that is asked for there
+HALVINGS = 40
 REVOLUTION = np.pi  # [rad] either way, where a joint can do more: nobody winds it up for one move
 
 
@@ -42,15 +45,20 @@ class DrawnProblem:
     start: tuple[float, ...]
     goal: tuple[float, ...]
     is_pose: bool
+    clearance: float | None = None  # [m] that is asked for; None: the arm's own
+
+    def joint_goal(self, arm: Arm) -> JointGoal:
+        """The goal by its joint values."""
+        return JointGoal(name=arm.joint_names, position=self.goal)
 
     def request(self, arm: Arm, kinematics: Kinematics, allowed: float = ALLOWED) -> PlanRequest:
         """What a client sends, with `allowed` [s] for it."""
         names = arm.joint_names
-        asked = JointGoal(name=names, position=self.goal)
         return PlanRequest(
-            goal=tool_pose(arm, kinematics, self.goal) if self.is_pose else asked,
+            goal=tool_pose(arm, kinematics, self.goal) if self.is_pose else self.joint_goal(arm),
             start=JointState(name=names, position=self.start),
             allowed_time=allowed,
+            clearance=self.clearance,
         )
 
 
@@ -73,6 +81,40 @@ class ProblemDrawer:
             if start is not None and goal is not None and start != goal:
                 return DrawnProblem(self._arm.name, family, seed, setting, start, goal, seed % 2 == 0)
         raise AssertionError("settings do not end")
+
+    def near(self, family: str, seed: int) -> DrawnProblem:
+        """As `problem`, with the goal moved to where the arm is only `NEAREST` to `FARTHEST` from something."""
+        free = self.problem(family, seed)
+        world = World(self._arm, self._kinematics, free.setting.scene)
+        random = np.random.default_rng((seed, list(FAMILIES).index(family)))
+        while True:
+            wanted = random.uniform(NEAREST, FARTHEST)
+            row = self._brought_near(world, np.array(free.goal), random.uniform(self._lower, self._upper), wanted)
+            if row is not None:
+                return replace(free, goal=tuple(row.tolist()), clearance=NARROW)
+
+    def in_contact(self, family: str, seed: int) -> DrawnProblem:
+        """As `problem`, with a goal at which links touch something."""
+        free = self.problem(family, seed)
+        world = World(self._arm, self._kinematics, free.setting.scene)
+        random = np.random.default_rng((seed, list(FAMILIES).index(family)))
+        while True:
+            row = random.uniform(self._lower, self._upper)
+            if world.distance(row) <= 0.0:
+                return replace(free, goal=tuple(row.tolist()))
+
+    def _brought_near(self, world: World, free: Array, other: Array, wanted: float) -> Array | None:
+        """A place on the straight line to the `other` configuration (n,) [rad] that is `wanted` [m] from something, or
+        a little more; None where the other touches nothing, or the tolerance is not met."""
+        if world.distance(other) > 0.0:
+            return None
+        low, high = 0.0, 1.0
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            is_far = world.distance(free + middle * (other - free)) >= wanted
+            low, high = (middle, high) if is_far else (low, middle)
+        row: Array = np.round(free + low * (other - free), 6)
+        return row if NEAREST <= world.distance(row) <= FARTHEST else None
 
     def _end(self, world: World, pose: ToolPose | None, random: np.random.Generator) -> tuple[float, ...] | None:
         """A free configuration (n,) [rad], with the tool at `pose` where there is one; None where none is found."""

@@ -88,9 +88,10 @@ def _walk(checker: DistanceChecker, positions: Array, margin: float, deadline: D
     end = float(moved[-1])
     least = max(0.5 * margin, end / MOST_LOOKS)
     along, last = 0.0, positions[0]
+    quick = checker.least_distance if isinstance(checker, BoundingChecker) else _unknown
     while not deadline.has_passed():
         configuration = _configuration_at(along, moved, positions)
-        clearance = _quick_distance(checker, configuration) - margin
+        clearance = quick(configuration) - margin
         if clearance <= least:
             clearance = checker.distance(configuration) - margin
         if clearance <= 0.0:
@@ -102,9 +103,9 @@ def _walk(checker: DistanceChecker, positions: Array, margin: float, deadline: D
     return last, None
 
 
-def _quick_distance(checker: DistanceChecker, configuration: Array) -> float:
-    """[m] that every pair is apart at least; 0 where that takes long to know."""
-    return checker.least_distance(configuration) if isinstance(checker, BoundingChecker) else 0.0
+def _unknown(configuration: Array) -> float:
+    """[m] that every pair is apart at least, at joint values (n,) [rad] or [m], where that takes long to know."""
+    return 0.0
 
 
 def _movement(checker: DistanceChecker, positions: Array) -> Array:

@@ -64,8 +64,11 @@ class UnreachableRefusals:
 
     def _nearest_free(self, target: Target, near: Array, deadline: Deadline) -> Array:
         """The best configuration; one that touches is drawn back towards the start until it does not."""
-        configurations = self._ik.nearest(target, near, deadline)[:NEAREST_TRIED]
-        free = [self._drawn_back(near, configuration) for configuration in configurations]
+        free: list[Array] = []
+        for configuration in self._ik.nearest(target, near, deadline)[:NEAREST_TRIED]:
+            free.append(self._drawn_back(near, configuration))
+            if free[-1] is configuration:  # what comes after it is no nearer
+                break
         return min(free, key=lambda q: target.misses(self._kinematics.tool(q))[0])
 
     def _drawn_back(self, near: Array, configuration: Array) -> Array:
