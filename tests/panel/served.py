@@ -42,7 +42,7 @@ class Served:
     @property
     def page(self) -> Page:
         """As it is built for the first browser."""
-        return self.panel._present()[0]
+        return self.panel.pages()[0]
 
     @property
     def world(self) -> World:
@@ -85,7 +85,7 @@ def served_page() -> Iterator[Served]:
         try:
             served = Served(panel)
             with bare_browser(served.address, served.hear) as served.browser:
-                until(panel._present, bool)
+                until(panel.pages, bool)
                 served.browser.wait_for(ENGLISH["plan"])
                 yield served
         finally:

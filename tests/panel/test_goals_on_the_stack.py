@@ -283,7 +283,7 @@ def test_for_a_browser_that_does_not_keep_up_only_the_newest_of_each_joint_is_ke
         return Counter(f"{each.name} {type(each).__name__}" for each in moved if each.name.startswith("/measured"))
 
     with bare_browser(served.address, lambda said, at: reads.wait(60.0) or None):
-        until(lambda: len(served.panel._present()), lambda number: number == 2)
+        until(lambda: len(served.panel.pages()), lambda number: number == 2)
         try:
             for name in ("left", "home"):
                 arm.move(named=name)

@@ -76,7 +76,7 @@ def test_a_browser_that_tells_its_frame_rate_later_has_the_lag_that_it_had(page:
 
 
 def test_a_long_lag_is_measured_again_though_nothing_else_changes(page: MemoryPage):
-    [shown] = page.panel._present()
+    [shown] = page.panel.pages()
     shown.lag, shown._marked = 0.7, page.now  # a browser that compiles its shaders has just said so, of this mark
     page.browser._answered = f"{1000 * (page.now - shown._began):.0f}"
     page.draw(round(LATE_AGAIN * TEXTS) + 2)

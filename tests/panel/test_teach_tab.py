@@ -38,7 +38,7 @@ def test_a_broken_file_of_points_is_told_with_its_line_and_neither_hides_the_pag
         teaching = page.panel.operator.teaching
         assert until(lambda: len(page.panel.operator.arm.joints) == 3)
         page.draw(2)
-        [shown] = page.panel._present()
+        [shown] = page.panel.pages()
         assert "rm1.points.toml, line 4: " in shown._teach._facts.content
         with pytest.raises(gemelo.Error, match="line 4"):
             teaching.remember("two")
@@ -54,7 +54,7 @@ def test_the_name_that_is_offered_is_one_that_no_point_has(tmp_path: Path):
     with memory_page("rm1", tmp_path) as page:
         assert until(lambda: len(page.panel.operator.arm.joints) == 3)
         page.draw(2)
-        [shown] = page.panel._present()
+        [shown] = page.panel.pages()
         assert shown._teach._name.value == "point 1"
         for name in ("point 1", "point 3"):
             page.panel.operator.teaching.remember(name)

@@ -77,7 +77,7 @@ def test_a_program_that_is_written_beside_the_page_is_offered_and_a_broken_one_s
     tab(page)._file.value = "broken"
     tab(page)._open()
     assert tab(page)._file.value == teaching.program.name == "fresh"
-    [shown] = page.panel._present()
+    [shown] = page.panel.pages()
     page.draw(2)
     lines = shown._problem.content.partition("<br>")[2].splitlines()
     assert [line.partition("broken.toml, ")[2][:7] for line in lines] == ["line 3:", "line 4:"]
