@@ -40,7 +40,7 @@ def test_the_shares_of_a_path_are_those_of_its_curve(core, configurations):
     """Both languages lay the same control points for them."""
     rng = np.random.default_rng(4)
     cut = sharp = 0
-    for round_ in range(6):
+    for round_ in range(10):
         core.set_scene([random_shape(rng, kind, kind) for kind in SIMPLE])
         rows = configurations(80, 60 + round_)
         rows = rows[core.free(rows)]
