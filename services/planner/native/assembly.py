@@ -76,8 +76,10 @@ class Assembly:
         self.covers = {link: _told_cover(arm, link, shapes, bulge) for link in shapes}
         self._frames = frames_of(arm)
         self._chain = motion.chain(self._frames.links, self._frames.numbers, len(arm.joints))
-        self._links = {link: self._part(link, shapes[link], cover) for link, cover in self.covers.items()}
-        self._cores = {link: self._core(link, shapes[link], cover) for link, cover in self.covers.items()}
+        self._links: dict[str, motion.Part] = {}
+        self._cores: dict[str, motion.Part | None] = {}
+        for link, cover in self.covers.items():
+            self._links[link], self._cores[link] = self._part_and_core(link, shapes[link], cover)
 
     def hold(self, attachment: Attachment) -> Held:
         """The attachment with its spheres; raises ValueError for an unknown link or a shape without an end."""
@@ -86,8 +88,7 @@ class Assembly:
         if attachment.name in self._links:
             raise ValueError(f'"{attachment.name}" is the name of a link; give what is attached another one')
         cover = cover_shapes(attachment.shapes, _bulge(attachment.shapes))
-        link, shapes = attachment.link, attachment.shapes
-        return Held(attachment, cover, self._part(link, shapes, cover), self._core(link, shapes, cover))
+        return Held(attachment, cover, *self._part_and_core(attachment.link, attachment.shapes, cover))
 
     def compiled_scene(self, shapes: Sequence[CollisionShape], held: Mapping[str, Held]) -> CompiledScene:
         """Links, then what is attached; raises ValueError for two obstacles of one name or an unknown name."""
@@ -116,24 +117,25 @@ class Assembly:
         both = np.array(pairs, dtype=np.int32).reshape(-1, 2)
         return motion.world(self._chain, [part.part for part in parts], both, obstacles)
 
-    def _part(self, link: str, shapes: Sequence[CollisionShape], cover: SphereCover) -> motion.Part:
-        """A link's solids and their spheres in its frame, larger by what floats lose on an arm of this reach."""
-        return self._part_of(link, shapes, cover.spheres, self._rounding())
-
-    def _core(self, link: str, shapes: Sequence[CollisionShape], cover: SphereCover) -> motion.Part | None:
-        """As `_part`, of spheres that are wholly inside the link's shapes whatever floats lose; None if there are none:
-        its largest sphere reaches no deeper than the spheres may bulge."""
-        less = cover.bulge + self._rounding()
-        deep = cover.spheres[cover.spheres[:, 3] > less + HAIR]
-        return self._part_of(link, shapes, deep, -less) if len(deep) else None
-
-    def _part_of(self, link: str, shapes: Sequence[CollisionShape], covering: Array, wider: float) -> motion.Part:
+    def _part_and_core(
+        self, link: str, shapes: Sequence[CollisionShape], cover: SphereCover
+    ) -> tuple[motion.Part, motion.Part | None]:
+        """A link's solids in its frame with their spheres, larger by what floats lose on an arm of this reach; and with
+        spheres that are wholly inside the link's shapes whatever floats lose, None if there are none: its largest
+        sphere reaches no deeper than the spheres may bulge."""
         frame, pose = self._frames.places[link]
-        spheres = covering.copy()
-        spheres[:, :3] = spheres[:, :3] @ pose[:3, :3].T + pose[:3, 3]
-        spheres[:, 3] += wider
-        solids = [obstacle_of(shape, pose @ shape.matrix, self._rounding()) for shape in shapes]
-        return motion.part(frame, np.ascontiguousarray(spheres), solids)
+        rounding = self._rounding()
+        solids = [obstacle_of(shape, pose @ shape.matrix, rounding) for shape in shapes]
+
+        def with_spheres(covering: Array, wider: float) -> motion.Part:
+            spheres = covering.copy()
+            spheres[:, :3] = spheres[:, :3] @ pose[:3, :3].T + pose[:3, 3]
+            spheres[:, 3] += wider
+            return motion.part(frame, np.ascontiguousarray(spheres), solids)
+
+        less = cover.bulge + rounding
+        deep = cover.spheres[cover.spheres[:, 3] > less + HAIR]
+        return with_spheres(cover.spheres, rounding), with_spheres(deep, -less) if len(deep) else None
 
     def _rounding(self) -> float:
         """[m] at most between where a float and where a real number is."""
