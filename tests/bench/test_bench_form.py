@@ -15,19 +15,20 @@ from services.bench.panel import DRAG_GOAL, judged_cpu
 from services.bench.stack import Stacks
 
 OF_THE_ISSUES = (
-    "frame_lookup_us", "state_check_us", "collision_checks_per_s", "ik_ms", "ik_success", "plan_ms", "plan_success",
-    "path_length_ratio", "duration_ratio", "plan_python_ms", "plan_any_ms", "plan_any_success", "plan_mesh_ms",
-    "import_s", "extra_mb", "fit_excess_mm", "first_plan_s", "deadline_overrun_ms", "scene_intake_ms", "lin_ms",
-    "jog_tick_us", "tag_pose_mm", "tag_plane_mm", "tag_flips", "box_mm", "image_to_pose_ms", "mount_mm",
-    "mount_images_mm", "mount_touch_mm", "camera_cpu_percent", "detector_cpu_percent", "image_to_detection_ms",
-    "pick_mm", "pick_success", "replay_speed", "lost_of_45000_at_25hz", "seed_move_percent", "ra_remainder_steps",
-    "text_link_ms", "clock_sync_error_us", "hold_reaction_ms", "stopping_distance", "ledger", "gripper_reaction_ms",
-    "max_step_rate_hz", "parse_mb_per_s", "step_time_error_us", "estop_reaction_ticks", "render_ms", "cli_start_ms",
-    "handshake_ms", "arms_on_one_router", "tick_instructions", "slot_instructions", "core_text_bytes",
-    "core_ram_bytes", "stack_idle_cpu_percent", "stack_rss_mb", "state_to_frame_ms", "image_path_ms",
+    "frame_lookup_us", "state_check_us", "collision_checks_per_s", "ik_ms", "ik_success", "plan_ms",
+    "plan_success", "path_length_ratio", "duration_ratio", "plan_python_ms", "plan_any_ms", "plan_any_success",
+    "plan_near_success", "refusal_ms", "plan_mesh_ms", "import_s", "extra_mb", "fit_excess_mm", "first_plan_s",
+    "deadline_overrun_ms", "scene_intake_ms", "lin_ms", "jog_tick_us", "tag_pose_mm", "tag_plane_mm", "tag_flips",
+    "box_mm", "image_to_pose_ms", "mount_mm", "mount_images_mm", "mount_touch_mm", "camera_cpu_percent",
+    "detector_cpu_percent", "image_to_detection_ms", "pick_mm", "pick_success", "replay_speed",
+    "lost_of_45000_at_25hz", "seed_move_percent", "ra_remainder_steps", "text_link_ms", "clock_sync_error_us",
+    "hold_reaction_ms", "stopping_distance", "ledger", "gripper_reaction_ms", "max_step_rate_hz",
+    "parse_mb_per_s", "step_time_error_us", "estop_reaction_ticks", "render_ms", "cli_start_ms", "handshake_ms",
+    "arms_on_one_router", "tick_instructions", "slot_instructions", "core_text_bytes", "core_ram_bytes",
+    "stack_idle_cpu_percent", "stack_rss_mb", "state_to_frame_ms", "image_path_ms",
     "move_accept_to_first_step_ms", "program_legs", "stop_ms", "chunk_ack_ms", "chunk_ack_tls_ms",
-    "panel_cpu_percent", "panel_lag_ms", "stop_key_ms", "goal_drag_hz", "record_cpu_percent", "record_mb_per_hour",
-    "blackbox_ms", "blackbox_cpu_percent", "ready_s",
+    "panel_cpu_percent", "panel_lag_ms", "stop_key_ms", "goal_drag_hz", "record_cpu_percent",
+    "record_mb_per_hour", "blackbox_ms", "blackbox_cpu_percent", "ready_s",
 )  # fmt: skip
 
 

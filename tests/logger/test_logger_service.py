@@ -243,7 +243,7 @@ def test_what_persons_command_and_change_in_the_scene_is_recorded_with_its_answe
     commands = (ReferenceCommand(name=("brazo_joint",), position=(0.25,)), SpeedCommand(scale=0.5), ResetCommand())
     store = SceneStore(load_arm(ROOT / "urdf/rm1"))
     with (
-        running(deployment, network),
+        running(deployment, network) as logger,
         Node("planner", deployment, bus=MemoryBus(network)) as planner,
         Node("stepper_gateway", deployment, bus=MemoryBus(network)) as gateway,
         Node("client", deployment, bus=MemoryBus(network)) as client,
@@ -255,6 +255,8 @@ def test_what_persons_command_and_change_in_the_scene_is_recorded_with_its_answe
                 client.call(SCENE_EDIT, SceneRequest(edit=edit))
             for command in commands:
                 client.call(DEVICE_COMMAND, DeviceCommandRequest(command=command))
+        wait_for(lambda: heard(logger, "@request/scene/edit") == len(edits))
+        wait_for(lambda: heard(logger, "@request/device/command") == len(commands))
     (mcap,) = recordings(tmp_path, ".mcap")
     said = {}
     for topic, message in messages(mcap):
