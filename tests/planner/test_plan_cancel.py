@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
-import psutil
 import pytest
 from msgspec.structs import replace
 
 from schemas.planning import NamedGoal, PlanCode, PlanPhase, PlanRequest, PlanResponse
 from schemas.scene import PlanningScene
 from services.planner.workers.workers import LONGEST_ID, MOST, MOST_PLANS, Workers
+from tests.planner.processes import planning_processes
 from tests.planner.walled import WALLED, past_the_wall
 
 PROJECT = Path(__file__).parents[2]
@@ -69,18 +69,13 @@ def desk() -> Iterator[Desk]:
         yield desk
     finally:
         desk.workers.close()
-        assert processes() == []
-
-
-def processes() -> list[psutil.Process]:
-    children = psutil.Process().children()
-    return [child for child in children if child.is_running() and child.status() != psutil.STATUS_ZOMBIE]
+        assert planning_processes() == []
 
 
 @pytest.mark.parametrize("planner_id", ["", "RRTConnect", "RRTstar", "BITstar", "PRM"])
 def test_a_search_stops_when_it_is_cancelled_and_its_process_goes_on(desk: Desk, planner_id: str):
     desk.search("long", planner_id)
-    before = processes()
+    before = planning_processes()
     cancelled = desk.workers.cancel("long")
     assert cancelled.found
     assert cancelled.message.startswith('the plan "long" is cancelled after ')
@@ -89,12 +84,12 @@ def test_a_search_stops_when_it_is_cancelled_and_its_process_goes_on(desk: Desk,
     assert sentence.endswith(" s, while searching")
     desk.ask(replace(SHORT, request_id="next"))
     assert desk.answer("next").refusal is not None  # the walls are in the way of this one too
-    assert processes() == before
+    assert planning_processes() == before
 
 
 def test_a_process_that_does_not_heed_it_is_killed_and_replaced(desk: Desk):
     desk.search("long")
-    (process,) = processes()
+    (process,) = planning_processes()
     process.suspend()
     assert desk.workers.cancel("long").found
     assert desk.preempted("long").endswith("while searching")
@@ -119,13 +114,13 @@ def test_a_plan_that_waits_for_a_process_is_cancelled_at_once(desk: Desk):
 
 
 def test_a_plan_is_cancelled_while_its_process_starts_which_is_then_there_for_the_next(desk: Desk):
-    (process,) = processes()
+    (process,) = planning_processes()
     desk.ask(past_the_wall("early"))
     assert desk.workers.cancel("early").found
     assert desk.preempted("early").endswith("while waiting")
     desk.ask(replace(SHORT, request_id="next"))
     desk.answer("next")
-    assert processes() == [process]
+    assert planning_processes() == [process]
 
 
 def test_a_second_cancel_changes_nothing(desk: Desk):
@@ -192,7 +187,7 @@ def test_a_plan_that_has_to_be_stopped_says_what_it_was_at(desk: Desk):
     desk.search("long")
     desk.workers.cancel("long")
     desk.preempted("long")
-    (process,) = processes()
+    (process,) = planning_processes()
     process.suspend()
     desk.ask(past_the_wall("late", allowed=0.2))
     response = desk.answer("late")

@@ -29,6 +29,7 @@ from services.planner.workers.jobs import Job
 from services.planner.workers.process import PlannerProcess
 from services.planner.workers.workers import Workers
 from tests.planner.native.scenes import star_mesh, stl_of
+from tests.planner.processes import planning_processes
 
 PROJECT = Path(__file__).parents[2]
 HOME = JointState(name=("brazo_joint", "antebrazo_joint", "efector_joint"), position=(0.0, 0.0, 0.0))
@@ -59,12 +60,6 @@ def stack() -> Iterator[Stack]:
     finally:
         stack.workers.close()
         assert planning_processes() == []
-
-
-def planning_processes(of: int | None = None) -> list[psutil.Process]:
-    """Without the helper that Python starts for processes of others, as those of a fit, and never ends."""
-    children = [child for child in psutil.Process(of).children() if child.status() != psutil.STATUS_ZOMBIE]
-    return [child for child in children if "multiprocessing.resource_tracker" not in " ".join(child.cmdline())]
 
 
 def test_a_plan_comes_out_of_a_process_and_tells_where_its_time_went(stack: Stack):
