@@ -66,15 +66,16 @@ def _findings(folder: Path) -> list[Finding]:
         is_broken = any(finding.severity is Severity.ERROR for finding in findings)
         return findings if is_broken else [*findings, *trial_findings(folder)]
     from services.arm.errors import DescriptionError
+    from services.robot_import.link_mending import shapeless
     from services.robot_import.mending import mend
     from services.robot_import.source import find_source
 
     try:
-        findings = mend(find_source(folder)).findings()
+        mended = mend(find_source(folder))
     except DescriptionError as error:
         raise CommandError(str(error)) from error
     print(f"{folder} has no {ROBOT_FILE}: as `gemelo import {folder}` reads it, which mends what is a note")
-    return findings
+    return [*shapeless(mended), *mended.findings()]
 
 
 def fit_options(parser: Parser) -> None:

@@ -16,6 +16,7 @@ from services.arm.model.urdf import UrdfModel
 from services.arm.model.virtual_drive import NO_MOTORS, driven_joints
 from services.robot_import.drive import ask_drives, speed_lines
 from services.robot_import.limits import ask_limits
+from services.robot_import.link_mending import shapeless
 from services.robot_import.mended import Mended
 from services.robot_import.mending import mend, safe_name
 from services.robot_import.parts import MOTORS, USUAL_DRIVER, DriverPart, MotorPart, driver_named, motor_named
@@ -23,7 +24,7 @@ from services.robot_import.questions import Questions, answers_text, read_answer
 from services.robot_import.robot_folder import Description, step, write_robot
 from services.robot_import.source import find_source
 from services.robot_import.standing import ask_who_stands
-from services.robot_import.tool_link import tool_link
+from services.robot_import.tool_link import other_tools, tool_link
 from services.robot_import.trial import trial_findings
 
 ANSWERS_FILE = "import.toml"
@@ -78,7 +79,7 @@ def _mended(options: ImportOptions, questions: Questions) -> Mended:
         source = find_source(options.source, questions.given_below(XACRO))
         trial = mend(source)
         ask_limits(trial, Questions({}, takes_defaults=True))
-        _require_importable(trial.findings())
+        _require_importable([*shapeless(trial), *trial.findings()])
     mended = mend(source)
     ask_limits(mended, questions)
     _show(mended.findings())
@@ -91,6 +92,10 @@ def _described(name: str, mended: Mended, options: ImportOptions, questions: Que
     driver = _part(driver_named, options.driver or USUAL_DRIVER)
     tool = questions.ask("tool_frame", "the tool's link", tool_link(mended.model), _link_of(mended.model))
     said = len(mended.notes)
+    others = other_tools(mended.model, tool)
+    if others:
+        message = f'the goals are about "{tool}", though {_quoted(others)} could be the tool too'
+        mended.warn(mended.xml.root, "robot", message, "`tool_frame` in robot.toml, or in --answers, names another")
     ask_who_stands(mended, tool, questions)
     _show(mended.notes[said:])
     joints = driven_joints(mended.model)
@@ -182,3 +187,7 @@ def _link_of(model: UrdfModel) -> Callable[[str], str]:
 def _base(model: UrdfModel) -> str:
     children = {joint.child for joint in model.joints}
     return next(link for link in model.link_names if link not in children)
+
+
+def _quoted(names: list[str]) -> str:
+    return ", ".join(f'"{name}"' for name in names)

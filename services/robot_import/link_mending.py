@@ -5,7 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 
-from services.arm.checks.findings import error, note
+from services.arm.checks.findings import Finding, error, note
 from services.arm.checks.meshes import SMALLEST, Facts, MeshFacts, is_in_millimetres, link_volume
 from services.arm.checks.urdf import principal_moments
 from services.arm.model.urdf import Geometry, UrdfLink
@@ -119,6 +119,14 @@ def unseen(mended: Mended) -> None:
             mended.say(
                 collisions[0], subject_of(link), "has a <collision>, but no <visual>", "drawn with the same shape"
             )
+
+
+def shapeless(mended: Mended) -> list[Finding]:
+    """A robot without any shape: an error for who would import it."""
+    if any(link.find("visual") is not None for link in mended.xml.root.findall("link")):
+        return []
+    message = "no link has a <visual> or <collision>: nothing could be drawn, nothing would ever touch"
+    return [error(mended.source.label, "robot", message, "give the links meshes, boxes or cylinders")]
 
 
 def _even_density(link: UrdfLink, mass: float, facts: Facts) -> ET.Element | None:

@@ -21,15 +21,29 @@ JAW_WORDS = ("finger", "jaw", "knuckle", "claw", "thumb", "dedo", "mordaza")  # 
 def tool_link(model: UrdfModel) -> str:
     """The name of a link of `model`, which has one root."""
     depths = _depths(model)
-    jaws = {link for joint in _jaw_joints(model) for link in _behind(joint.child, model)}
-    moved = {link for joint in model.joints if _moves(joint) for link in _behind(joint.child, model)}
-    arm = [link for link in depths if link not in jaws and link in moved]
-    candidates = arm or list(depths)
+    candidates = _carried(model) or list(depths)
     for wanted in TOOL_NAMES:
-        found = [link for link in candidates if link.lower().rpartition("-")[2].endswith(wanted)]
+        found = [link for link in candidates if _is_called(link, wanted)]
         if found:
             return max(found, key=lambda link: depths[link])
     return max(candidates, key=lambda link: depths[link])
+
+
+def other_tools(model: UrdfModel, tool: str) -> list[str]:
+    """The links with a tool's name that neither carry the link `tool` nor are carried by it."""
+    named = [link for link in _carried(model) if any(_is_called(link, wanted) for wanted in TOOL_NAMES)]
+    return [link for link in named if link not in _behind(tool, model) and tool not in _behind(link, model)]
+
+
+def _carried(model: UrdfModel) -> list[str]:
+    """The links that a joint moves, without the jaws."""
+    jaws = {link for joint in _jaw_joints(model) for link in _behind(joint.child, model)}
+    moved = {link for joint in model.joints if _moves(joint) for link in _behind(joint.child, model)}
+    return [link for link in _depths(model) if link not in jaws and link in moved]
+
+
+def _is_called(link: str, wanted: str) -> bool:
+    return link.lower().rpartition("-")[2].endswith(wanted)
 
 
 def _depths(model: UrdfModel) -> dict[str, int]:

@@ -174,9 +174,19 @@ def test_several_meshes_of_a_name_that_is_not_where_it_should_be_are_said_with_t
 
 
 def test_a_robot_without_a_joint_that_moves_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    path = write(tmp_path / "robot.urdf", "robot", '<link name="base"/>')
+    box = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
+    path = write(tmp_path / "robot.urdf", "robot", f'<link name="base">{box}</link>')
     assert run(["import", str(path), "--yes", "--output", str(tmp_path / "urdf")]) is ExitCode.FAILED
     assert "no joint that moves" in capsys.readouterr().err
+
+
+def test_a_robot_without_any_shape_is_refused_by_import_and_check(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    path = write(
+        tmp_path / "robot.urdf", "robot", '<link name="base"/>', '<link name="arm"/>', joint("j", "base", "arm")
+    )
+    for command in (["import", str(path), "--yes", "--output", str(tmp_path / "urdf")], ["check", str(path)]):
+        assert run(command) is not ExitCode.OK
+        assert "no link has a <visual> or <collision>" in "".join(capsys.readouterr())
 
 
 def test_a_file_that_is_no_xml_is_named(tmp_path: Path):

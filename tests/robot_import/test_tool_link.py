@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from services.arm.model.urdf import UrdfModel, urdf_of
-from services.robot_import.tool_link import tool_link
-from tests.robot_import.exports import LIMIT, joint
+from services.cli.errors import ExitCode
+from services.cli.main import run
+from services.robot_import.tool_link import other_tools, tool_link
+from tests.robot_import.exports import LIMIT, joint, link, mesh, write
 
 
 def tree(*joints: str) -> UrdfModel:
@@ -61,3 +65,19 @@ TREES = {
 def test_the_tool_is_at_the_end_of_the_arm_and_no_jaw(words: tuple[str, ...]):
     *joints, expected = words
     assert tool_link(tree(*joints)) == expected
+
+
+def test_a_second_link_with_a_tools_name_is_told_but_neither_a_flange_before_it_nor_a_frame_behind_it():
+    two = tree(*ARM, "f wrist flange fixed", "a flange welder_tcp fixed", "b flange camera_tool fixed")
+    assert other_tools(two, "welder_tcp") == ["camera_tool"]
+    assert other_tools(two, "camera_tool") == ["welder_tcp"]
+    assert other_tools(two, "flange") == []
+
+
+def test_an_import_says_which_other_link_could_be_the_tool(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    mesh(tmp_path / "meshes", "part.stl")
+    links = [link("base", "meshes/part.stl"), link("arm", "meshes/part.stl"), link("tcp"), link("eef")]
+    ends = [joint(f"to_{name}", "arm", name, kind="fixed") for name in ("tcp", "eef")]
+    path = write(tmp_path / "robot.urdf", "robot", *links, joint("j1", "base", "arm"), *ends)
+    assert run(["import", str(path), "--yes", "--output", str(tmp_path / "urdf")]) is ExitCode.OK
+    assert 'the goals are about "tcp", though "eef" could be the tool too' in "".join(capsys.readouterr())
