@@ -70,8 +70,8 @@ def line():
 def quick(monkeypatch):
     for name, value in (("PATIENCE", 0.5), ("AGAIN", 0.1), ("TO_RESTART", 0.5)):
         monkeypatch.setattr(module, name, value)
-    monkeypatch.setattr(module.Exchange.send, "__defaults__", (0.5,))
-    monkeypatch.setattr(module.Exchange.status, "__defaults__", (0.5,))
+    monkeypatch.setattr(module.BoardExchange.send, "__defaults__", (0.5,))
+    monkeypatch.setattr(module.BoardExchange.status, "__defaults__", (0.5,))
 
 
 def test_a_board_is_told_what_is_given_and_nothing_else(line, monkeypatch, capsys):
