@@ -64,11 +64,7 @@ def read_incident(path: Path) -> Incident:
 
 def incident_in(reader: RecordingReader) -> Incident | None:
     """The incident of a recording, if it is a black box; raises `BadRecording` where it cannot be read."""
-    text = reader.read_metadata().get(INCIDENT, {}).get("json", "")
-    try:
-        return msgspec.json.decode(text, type=Incident) if text else None
-    except (msgspec.DecodeError, msgspec.ValidationError) as error:
-        raise BadRecording(f'"{reader.path}": its incident cannot be read ({error})') from error
+    return reader.read_record(INCIDENT, Incident)
 
 
 def black_boxes(folder: Path, robot: str) -> list[BlackBoxFile]:

@@ -11,11 +11,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from os import SEEK_END
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
+import msgspec
 from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
+
+S = TypeVar("S", bound=msgspec.Struct)
 
 MAGIC = b"\x89MCAP0\r\n"
 UNREADABLE = (McapError, struct.error, ValueError, EOFError, OSError, KeyError, IndexError, MemoryError)
@@ -89,6 +92,14 @@ class RecordingReader:
             if number >= 100:
                 break
         return self.metadata
+
+    def read_record(self, name: str, kind: type[S]) -> S | None:
+        """The record `name` of the metadata; None where there is none; raises `BadRecording` where it is no `kind`."""
+        text = self.read_metadata().get(name, {}).get("json", "")
+        try:
+            return msgspec.json.decode(text, type=kind) if text else None
+        except msgspec.DecodeError as error:
+            raise BadRecording(f'"{self.path}": its {name} cannot be read ({error})') from error
 
     def _records(self, file: IO[bytes]) -> Iterator[Any]:
         """Complete records; those of chunks one by one."""

@@ -56,7 +56,7 @@ def write_view(file: Path, rrd: Path, shadow: Path) -> Incident | None:
     write_shadow(reader, shadow, robot, project_root() / "urdf" / robot)
     incident = incident_in(reader)
     description = _description_in(reader)
-    chosen = _layout_in(reader) or ViewLayout()
+    chosen = reader.read_record(LAYOUT, ViewLayout) or ViewLayout()
     cameras = tuple(sorted({*chosen.cameras, *_cameras_in(reader)}))
     folders = (shadow, project_root())
     try:
@@ -96,15 +96,6 @@ def _description_in(reader: RecordingReader) -> RobotDescription:
     for row in reader.rows(DESCRIPTION.key.__eq__):
         return msgspec.json.decode(row.message.data, type=RobotDescription)
     raise BadRecording(f'"{reader.path}" has no description of its robot: it was recorded without state_publisher')
-
-
-def _layout_in(reader: RecordingReader) -> ViewLayout | None:
-    """None where the recording has none; raises `BadRecording` where it cannot be read."""
-    text = reader.read_metadata().get(LAYOUT, {}).get("json", "")
-    try:
-        return msgspec.json.decode(text, type=ViewLayout) if text else None
-    except (msgspec.DecodeError, msgspec.ValidationError) as error:
-        raise BadRecording(f'"{reader.path}": its layout cannot be read ({error})') from error
 
 
 def _cameras_in(reader: RecordingReader) -> tuple[str, ...]:
