@@ -36,6 +36,13 @@ def chooses_step(served: Served, number: int) -> None:
     steps.value = tuple(steps.options)[number]
 
 
+def runs_step_two(served: Served, arm: gemelo.Arm) -> None:
+    """Runs the program at 60 % of its speed, until its second step is lit."""
+    arm.speed(0.6)
+    served.press("run_from")
+    until(lambda: lit(served), lambda now: now == ["2"])
+
+
 def lit(served: Served) -> list[str]:
     """The numbers of the steps that are lit."""
     rows = served.page._programs._list.content.split("<div ")[2:]
@@ -139,9 +146,7 @@ def test_steps_are_put_in_order_stepped_paused_and_run_from_any_and_the_running_
 def test_a_program_that_is_stopped_says_where_and_begins_again_only_when_it_is_told_to(
     served: Served, arm: gemelo.Arm, tour: None
 ) -> None:
-    arm.speed(0.6)
-    served.press("run_from")
-    until(lambda: lit(served), lambda now: now == ["2"])
+    runs_step_two(served, arm)
     served.press("stop")
     says(served, "Stopped.</b> In step 2.")
     nothing_begins(served, arm)
@@ -155,9 +160,7 @@ def test_a_program_that_is_stopped_says_where_and_begins_again_only_when_it_is_t
 def test_an_emergency_stop_in_a_program_says_where_and_after_it_nothing_begins_by_itself(
     served: Served, arm: gemelo.Arm, tour: None
 ) -> None:
-    arm.speed(0.6)
-    served.press("run_from")
-    until(lambda: lit(served), lambda now: now == ["2"])
+    runs_step_two(served, arm)
     arm.device.inject("estop")
     says(served, "Failed.</b> Step 2: ")
     says(served, "the emergency stop &quot;estop&quot; of device &quot;rm1&quot; is pressed")

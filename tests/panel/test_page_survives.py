@@ -16,9 +16,7 @@ ARM = "brazo_joint"
 VICTIMS = ("router", "broker", "planner", "state_publisher", "stepper_gateway", "virtual_esp32")
 
 
-@pytest.mark.parametrize(
-    "victim", ["router", "broker", "planner", "state_publisher", "stepper_gateway", "virtual_esp32"]
-)
+@pytest.mark.parametrize("victim", VICTIMS)
 def test_the_page_goes_on_when_a_process_is_killed_in_the_middle_of_its_move(
     arm: gemelo.Arm, twin: Stack, victim: str
 ) -> None:
