@@ -47,6 +47,7 @@ class NodeStatistics(Message, frozen=True, kw_only=True):
     loop_late_max: float = 0.0  # [s] worst lateness of the last second
     cpu: float = 0.0  # [s/s] of one core
     topics: tuple[TopicStatistics, ...] = ()
+    started: int = 0  # [ns] UNIX time of the node's start; 0: from a node that does not say it
 
 
 class NodeInfo(Message, frozen=True, kw_only=True):

@@ -9,7 +9,7 @@ from schemas.actions import GoalStatusCode
 from schemas.device import DeviceEvent, DeviceFault, DeviceMode, DeviceState
 from schemas.device_faults import fault_text
 from schemas.message import Message
-from schemas.system import NodeRecord, NodeStatistics
+from schemas.system import NodeStatistics
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY, REQUESTS, TOPICS, Topic
 from services.recordings.incidents import IncidentKind
 from services.runtime.actions import keys
@@ -50,10 +50,7 @@ class IncidentWatch:
                 return Trigger(IncidentKind.REBOOT, now, f"the device has rebooted: {message.detail}")
             case NodeStatistics():
                 self._newest = now
-                if message.node in SERVICES:
-                    self._heard[message.node] = now
-            case NodeRecord(node=node) if node in SERVICES:
-                return self._on_record(message, now)
+                return self._on_statistics(message, now) if message.node in SERVICES else None
         if topic.key == ENDED:
             return _on_ended(message, now)
         return None
@@ -70,13 +67,17 @@ class IncidentWatch:
                 return Trigger(IncidentKind.LOST, now, what)
         return None
 
-    def _on_record(self, record: NodeRecord, now: int) -> Trigger | None:
-        """A service that process-compose has started again spoke before its silence was noticed."""
-        before, self._started[record.node] = self._started.get(record.node), record.info.started
-        if before is None or before == record.info.started:
+    def _on_statistics(self, message: NodeStatistics, now: int) -> Trigger | None:
+        """The trigger where a service was started again before its silence was noticed."""
+        node, started = message.node, message.started
+        was_heard = self._heard.get(node) is not None
+        self._heard[node] = now
+        before, self._started[node] = self._started.get(node), started
+        if not was_heard or before == started:  # a silence that was told already is no second incident
             return None
-        stamp = min(max(record.info.started, now - LONG_AGO), now)
-        return Trigger(IncidentKind.LOST, stamp, f"{record.node} had ended, and was started again")
+        return Trigger(
+            IncidentKind.LOST, min(max(started, now - LONG_AGO), now), f"{node} had ended, and was started again"
+        )
 
     def _on_state(self, state: DeviceState, now: int) -> Trigger | None:
         before, self._mode = self._mode, state.mode

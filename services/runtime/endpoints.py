@@ -98,8 +98,8 @@ SHORTEST = 0.5  # [s] that a report must cover
 class LoopStatistics:
     """Turns counters into one `NodeStatistics` a second."""
 
-    def __init__(self, node: str) -> None:
-        self._node = node
+    def __init__(self, identity: Identity) -> None:
+        self._identity = identity
         self._wall, self._cpu = time.monotonic(), time.process_time()
 
     def report(self, figures: LoopFigures, topics: tuple[TopicStatistics, ...]) -> NodeStatistics | None:
@@ -110,11 +110,12 @@ class LoopStatistics:
             return None
         message = NodeStatistics(
             stamp=time.time_ns(),
-            node=self._node,
+            node=self._identity.name,
             loop_rate=figures.steps / elapsed,
             loop_late_max=figures.late_max,
             cpu=(cpu - self._cpu) / elapsed,
             topics=topics,
+            started=self._identity.started,
         )
         self._wall, self._cpu = wall, cpu
         return message

@@ -101,7 +101,7 @@ class Node:
             raise
         self._log_to_bus = BusHandler(lambda record: self.publisher(LOG).put(record))
         self.log.addHandler(self._log_to_bus)
-        self._statistics = LoopStatistics(name)
+        self._statistics = LoopStatistics(self._identity)
 
     def __enter__(self) -> Self:
         return self

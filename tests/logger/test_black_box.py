@@ -31,8 +31,6 @@ from schemas.system import (
     Failure,
     LogLevel,
     LogRecord,
-    NodeInfo,
-    NodeRecord,
     NodeStatistics,
     Parameter,
     ParameterChange,
@@ -59,7 +57,7 @@ from services.logger.black_box import MOST, BlackBox, BlackBoxWriter
 from services.logger.incident_story import LONGEST, brief
 from services.recordings.incidents import Incident, IncidentKind, black_boxes, read_incident
 from services.recordings.reader import BadRecording
-from services.recordings.table import NODES, action_topics, exchanges_of, goal_request_of
+from services.recordings.table import action_topics, exchanges_of, goal_request_of
 from services.state_publisher.main import describe
 
 SECOND = 1_000_000_000
@@ -227,9 +225,9 @@ def test_a_reboot_is_one_and_a_refused_goal_is_told(rig):
     assert rig.story[0] == "goal 12345678 for follow_joint_trajectory refused: the device is not referenced"
 
 
-def beat(rig: Rig, seconds: float, *nodes: str) -> None:
+def beat(rig: Rig, seconds: float, *nodes: str, started: int = START) -> None:
     for _ in range(int(seconds)):
-        rig.say(STATISTICS, *(NodeStatistics(node=node) for node in nodes))
+        rig.say(STATISTICS, *(NodeStatistics(node=node, started=started) for node in nodes))
         rig.wait(1.0)
 
 
@@ -249,14 +247,22 @@ def test_a_silence_of_everybody_is_ours(rig):
 
 
 def test_a_service_that_is_back_within_a_second_has_failed_too(rig):
-    record = NodeRecord(node="planner", info=NodeInfo(started=START - 50 * SECOND))
-    rig.say(NODES, record, replace(record, parameters=(Parameter(name="x"),)))
-    rig.wait(5.0)
-    rig.say(NODES, replace(record, info=NodeInfo(started=rig.now - 2 * SECOND)))
-    rig.wait(4.0)
+    beat(rig, 5, "planner", started=START - 50 * SECOND)
+    beat(rig, 4, "planner", started=START + 3 * SECOND)
     assert rig.incident.kind is IncidentKind.LOST
     assert rig.incident.stamp == START + 3 * SECOND
     assert "planner had ended, and was started again" in rig.incident.sentence
+
+
+def test_a_service_whose_silence_was_told_is_not_told_again_when_it_is_back(rig):
+    beat(rig, 3, "planner", "stepper_gateway")
+    beat(rig, 20, "stepper_gateway")
+    assert len(rig.saved) == 1
+    again = rig.now
+    for _ in range(20):
+        rig.say(STATISTICS, NodeStatistics(node="planner", started=again))
+        beat(rig, 1, "stepper_gateway")
+    assert len(rig.saved) == 1
 
 
 def test_what_follows_within_3_s_is_of_the_same_story_and_files_are_10_s_apart(rig):
