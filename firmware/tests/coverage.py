@@ -19,25 +19,25 @@ REASONS = Path(__file__).with_name("uncovered.toml")
 Place = tuple[str, str]  # file, text of the line
 
 
-class Line(msgspec.Struct):
+class CoveredLine(msgspec.Struct):
     """How often gcov saw a line run, in one of its functions."""
 
     line_number: int
     count: int
 
 
-class Source(msgspec.Struct):
+class CoveredSource(msgspec.Struct):
     """A file, of the core or not."""
 
     file: str
-    lines: list[Line]
+    lines: list[CoveredLine]
 
 
 class Unit(msgspec.Struct):
     """What gcov says of one object file."""
 
     current_working_directory: str
-    files: list[Source]
+    files: list[CoveredSource]
 
 
 class Uncovered(msgspec.Struct, forbid_unknown_fields=True):
@@ -48,7 +48,7 @@ class Uncovered(msgspec.Struct, forbid_unknown_fields=True):
     reason: str
 
 
-class Table(msgspec.Struct, forbid_unknown_fields=True):
+class UncoveredTable(msgspec.Struct, forbid_unknown_fields=True):
     """uncovered.toml."""
 
     line: list[Uncovered] = []
@@ -97,7 +97,7 @@ def missed(counts: Counter[tuple[str, int]]) -> Counter[Place]:
 
 
 def reasons() -> Counter[Place]:
-    table = msgspec.convert(tomllib.loads(REASONS.read_text()), Table)
+    table = msgspec.convert(tomllib.loads(REASONS.read_text()), UncoveredTable)
     return Counter((line.file, line.text) for line in table.line if line.reason)
 
 

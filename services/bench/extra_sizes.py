@@ -10,11 +10,11 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
 from services.runtime.deployment import project_root
 
 EXTRAS = ("record", "broker", "planner", "view", "panel", "eyes")
-GOAL = Goal(median=150.0)  # [MB] of a host with nothing but a gateway
+GOAL = FigureGoal(median=150.0)  # [MB] of a host with nothing but a gateway
 INSTALLED_WITHIN = 600.0  # [s] of one environment
 
 

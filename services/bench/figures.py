@@ -27,7 +27,7 @@ class Figure(msgspec.Struct, frozen=True, kw_only=True):
     note: str = ""
 
 
-class Goal(msgspec.Struct, frozen=True, kw_only=True):
+class FigureGoal(msgspec.Struct, frozen=True, kw_only=True):
     """Upper bounds, and the least that a median may be, in the figure's unit."""
 
     median: float | None = None
@@ -54,7 +54,7 @@ def _or_infinity(bound: float | None) -> float:
 
 def of_samples(
     samples: Sequence[float],
-    goal: Goal | None = None,
+    goal: FigureGoal | None = None,
     reference: Mapping[str, float] | None = None,
     note: str = "",
 ) -> Figure:

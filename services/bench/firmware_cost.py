@@ -22,7 +22,7 @@ from services.runtime.serial_frames import packet
 RUN = "firmware/tests/rv32/run"
 
 
-class Cost(msgspec.Struct, frozen=True):
+class FirmwareCost(msgspec.Struct, frozen=True):
     """The JSON that the script prints."""
 
     figures: dict[str, float] = {}
@@ -31,12 +31,12 @@ class Cost(msgspec.Struct, frozen=True):
 
 
 @cache
-def cost() -> Cost:
+def cost() -> FirmwareCost:
     """Compiles and runs the core; raises NotMeasured if that fails or a tool is missing."""
     done = subprocess.run([project_root() / RUN, "--json"], capture_output=True, text=True, check=False)
     if done.returncode:
         raise NotMeasured(f"{RUN} failed: {done.stderr.strip()[-300:]}")
-    measured = msgspec.json.decode(done.stdout, type=Cost)
+    measured = msgspec.json.decode(done.stdout, type=FirmwareCost)
     if measured.missing:
         raise NotMeasured(measured.missing)
     return measured

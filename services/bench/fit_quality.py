@@ -24,7 +24,7 @@ from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm, load_arm
 from services.arm.model.urdf_edit import with_collisions
-from services.bench.figures import Figure, Goal, of_samples
+from services.bench.figures import Figure, FigureGoal, of_samples
 from services.collision_fitting.fit_writing import write_fits
 from services.collision_fitting.mesh_fit import LinkFit, fit_links
 from services.planner.collision.world import World
@@ -54,7 +54,7 @@ def fit_excess_mm() -> Figure:
             samples += [1e3 * fit.excess.p95 for fit in fits.bounded]
             reference |= compared(name, fits) | plans_solved(name, arm, fits)
     note = f"two arms of 6 joints, bound 5 mm; {PROBLEMS} problems each whose ends are {1e3 * CLEAR:g} mm free by mesh"
-    return of_samples(samples, Goal(p99=5.0), reference, note)
+    return of_samples(samples, FigureGoal(p99=5.0), reference, note)
 
 
 def bracket(index: int) -> trimesh.Trimesh:
@@ -182,7 +182,7 @@ def import_s() -> Figure:
     triangles = f"{len(part(0).faces)} and {len(heavy_part(0).faces)} triangles"
     note = f"two arms of {JOINTS} joints, {JOINTS + 1} links of {triangles} each; {RUNS} runs of both"
     samples = [each for seconds in took.values() for each in seconds]
-    return of_samples(samples, Goal(median=20.0), {**reference, "gemelo check of the heavy one": check}, note)
+    return of_samples(samples, FigureGoal(median=20.0), {**reference, "gemelo check of the heavy one": check}, note)
 
 
 def part(index: int) -> trimesh.Trimesh:

@@ -16,13 +16,13 @@ from services.arm.frames.frame_buffer import FrameBuffer
 from services.arm.frames.transforms import to_message
 from services.arm.kinematics.chain import joint_transform
 from services.arm.model.description import Arm
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from services.bench.scenes import rm1
 from services.bench.stack import Running, Stacks
 from services.bench.traffic import send_at_once
 from services.stepper_gateway.links.frames import BadFrame, State, decode
 
-LOOKUP_GOAL = Goal(median=10.0)  # [us]
+LOOKUP_GOAL = FigureGoal(median=10.0)  # [us]
 SECOND = 1_000_000_000  # [ns]
 RATE, SPAN = 50, 9  # [Hz], [s] of samples in the buffer
 BATCH, BATCHES = 100, 300  # a batch is timed as one: reading the clock takes long
@@ -76,7 +76,7 @@ def yourdfpy_us(arm: Arm) -> float:
     return quantile(samples, 0.5)
 
 
-LATENCY_GOAL = Goal(p99=5.0)  # [ms]
+LATENCY_GOAL = FigureGoal(p99=5.0)  # [ms]
 DURATION = 15.0  # [s]
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from functools import partial
 
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from services.bench.scenes import rm1
 from services.bench.virtual_time import until
 from services.virtual_arm.virtual_arm import VirtualArm, tcp_wire
 
 TRIES = 40
-REACTION_GOAL = Goal(p99=10.0)  # [ms] the slowest frame of the wire, 8 ms, and two slots
+REACTION_GOAL = FigureGoal(p99=10.0)  # [ms] the slowest frame of the wire, 8 ms, and two slots
 PAUSE = 0.0013  # [s] by which each try is later in the gateway's turn
 WAYS = (0.0, 0.05)  # [m] closed and open
 

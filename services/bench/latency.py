@@ -26,7 +26,7 @@ from schemas.topics import (
 )
 from services.arm.interpolation import TrajectorySampler
 from services.arm.model.description import Arm
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile, rounded
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
 from services.bench.stack import Running, Stacks
 
 CHUNKS = 600
@@ -59,7 +59,7 @@ def chunk_ack_ms(stacks: Stacks, broker: str) -> Figure:
         f"({len(echoes)} of {CHUNKS} came back); goal: 1.5 x the echo's p99"
     )
     reference = {"bare echo median": statistics.median(echoes), "bare echo p99": quantile(echoes, 0.99)}
-    return of_samples(took, Goal(p99=bound), reference, note)
+    return of_samples(took, FigureGoal(p99=bound), reference, note)
 
 
 def chunk_ack_tls_ms(stacks: Stacks) -> Figure:
@@ -76,7 +76,7 @@ def chunk_ack_tls_ms(stacks: Stacks) -> Figure:
         f"mosquitto with TLS, users and an ACL: {len(took)} chunks at {CHUNK_RATE:g} Hz, after {len(without)} without; "
         f"goal: {TLS_FACTOR:g} x the plain p99"
     )
-    return of_samples(took, Goal(p99=TLS_FACTOR * quantile(without, 0.99)), reference, note)
+    return of_samples(took, FigureGoal(p99=TLS_FACTOR * quantile(without, 0.99)), reference, note)
 
 
 def chunk_bytes(running: Running) -> int:
@@ -119,7 +119,7 @@ def start_echo(running: Running, size: int) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
 
-START_GOAL = Goal(median=25.0, p99=50.0)  # [ms]
+START_GOAL = FigureGoal(median=25.0, p99=50.0)  # [ms]
 START_ROUNDS = 40
 SHARE = 0.95  # of the first joint's acceleration limit
 RAMP = 0.2  # [s] of acceleration, and of deceleration

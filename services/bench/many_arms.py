@@ -42,7 +42,7 @@ GATEWAY, DEVICE = "services.stepper_gateway.main", "firmware.platform.host.main"
 
 
 @dataclass
-class Arm:
+class StandingArm:
     """One arm's processes, and what the client has heard of it."""
 
     name: str
@@ -84,7 +84,7 @@ class Load:
         return self.gateway + self.device + (self.router + self.broker) / self.arms
 
 
-class Site:
+class ArmsOnOneRouter:
     """A router, a mosquitto, a client on the bus, and as many arms as are asked for."""
 
     def __init__(self, folder: Path) -> None:
@@ -95,9 +95,9 @@ class Site:
             "GEMELO_ROUTER_PORT": str(self._router_port), "GEMELO_MQTT_PORT": str(mqtt),
             "GEMELO_MQTT_BROKER": "mosquitto", "GEMELO_DEVICE": "virtual", "GEMELO_WIRE": "mqtt",
         }  # fmt: skip
-        self.arms: list[Arm] = []
+        self.arms: list[StandingArm] = []
 
-    def __enter__(self) -> Site:
+    def __enter__(self) -> ArmsOnOneRouter:
         with ExitStack() as opened:
             self._closing = opened
             run = self._folder / "run"
@@ -139,8 +139,8 @@ class Site:
             router=router, broker=broker, memory=sum(map(rss_mb, parts)) / len(arms), machine=machine,
         )  # fmt: skip
 
-    def _arm(self, name: str) -> Arm:
-        arm = Arm(name, self._folder / name / "run")
+    def _arm(self, name: str) -> StandingArm:
+        arm = StandingArm(name, self._folder / name / "run")
         robot = _robot(self._folder / name / "robot", name)
         arm.processes = [self._start(module, arm.run, robot) for module in (GATEWAY, DEVICE)]
         self._bus.subscribe(f"{name}/{JOINT_STATES.key}", JOINT_STATES.delivery, arm.on_arrival, lambda missed: None)
@@ -189,7 +189,7 @@ def loads_of(counts: Sequence[int]) -> list[Load]:
     if not has_mosquitto():
         raise NotMeasured("mosquitto is not installed: apt-get install mosquitto")
     loads: list[Load] = []
-    with tempfile.TemporaryDirectory(prefix="gemelo-arms-") as folder, Site(Path(folder)) as site:
+    with tempfile.TemporaryDirectory(prefix="gemelo-arms-") as folder, ArmsOnOneRouter(Path(folder)) as site:
         for count in counts:
             site.grow(count)
             loads.append(site.load())

@@ -24,13 +24,13 @@ import msgspec
 
 from firmware.bindings.device import Device
 from firmware.bindings.motor import VirtualMotor
-from firmware.platform.host.sketch import AustinStepper, Sketch
+from firmware.platform.host.sketch import AustinStepper, HostSketch
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from schemas.robot import Dialect
 from services.arm.device.device_config import device_config
 from services.arm.model.description import Arm, heard_by_the_board
 from services.arm.motors.relative_moves import ramp_of
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples, rounded
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
 from services.bench.scenes import rm1
 from services.stepper_gateway.links.foreign.ra_messages import joints_message
 from services.stepper_gateway.links.foreign.text_exchange import TextExchange
@@ -54,7 +54,7 @@ def ra_remainder_steps() -> Figure:
     ramps = tuple(ramp_of(joint.drive) for joint in rm1().joints)
     worst = 0
     for truncates in (True, False):
-        sketch, left = Sketch(ramps, truncates), [0] * len(ramps)
+        sketch, left = HostSketch(ramps, truncates), [0] * len(ramps)
         for _ in range(MESSAGES):
             move = [rng.randint(-LARGEST_MOVE, LARGEST_MOVE) for _ in ramps]
             message = json.loads(joints_message(move, ramps, False))
@@ -77,7 +77,7 @@ def text_link_ms() -> Figure:
         f"{LINES} lines at {RATE:g} Hz; a pseudo-terminal takes no time, so the board waits for as long as line and "
         f"answer would take at {BAUD} baud; the published figure is a mean at 12.5 Hz"
     )
-    return of_samples(trips, Goal(median=10.0), {"published": PUBLISHED}, note)
+    return of_samples(trips, FigureGoal(median=10.0), {"published": PUBLISHED}, note)
 
 
 def round_trips(arm: Arm, path: str) -> list[float]:

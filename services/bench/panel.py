@@ -22,9 +22,9 @@ import gemelo
 from schemas.joints import JointState
 from services.arm.model.description import load_arm
 from services.bench.bare_browser import Said, bare_browser
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from services.bench.stack import Stacks, has_mosquitto
-from services.bench.stops import Wire
+from services.bench.stops import StopWire
 from services.panel.model.goal import GoalSolver
 from services.panel.model.pace import UNSEEN
 from services.panel.view.browser import STOP_SIGN
@@ -40,8 +40,8 @@ MEASURED = "/measured"  # the scene's node under which the measured arm is drawn
 AFTER_MOVE = 0.2  # [s]
 AMPLITUDE = 0.02  # [m] radius of the circle that is dragged
 PATIENCE = 60.0  # [s]
-REST_GOAL, MOVING_GOAL = Goal(median=5.0), Goal(median=15.0)  # [% of a core]
-DRAG_GOAL = Goal(least=20.0)  # [Hz]
+REST_GOAL, MOVING_GOAL = FigureGoal(median=5.0), FigureGoal(median=15.0)  # [% of a core]
+DRAG_GOAL = FigureGoal(least=20.0)  # [Hz]
 LAG = re.compile(r"· \d+ ms")  # in the header of a page that a browser has drawn
 
 
@@ -94,14 +94,14 @@ def panel_lag_ms(stacks: Stacks) -> Figure:
             with _chromium(twin):
                 lags = _lags(twin, drawn)
     note = f"{MOVES} moves from rest beside a browser without a graphics card; a bare browser does not draw"
-    return of_samples(lags, Goal(p99=60.0), _of_bare(bare), note)
+    return of_samples(lags, FigureGoal(p99=60.0), _of_bare(bare), note)
 
 
 def stop_key_ms(stacks: Stacks) -> Figure:
     """From the space bar to the STOP frame on the wire [ms], while the arm moves; the reference is from the word of a
     browser that does not draw."""
     with opened(stacks) as twin:
-        wire = Wire(int(twin.stack.deployment["GEMELO_MQTT_PORT"]), twin.arm.description.device.name)
+        wire = StopWire(int(twin.stack.deployment["GEMELO_MQTT_PORT"]), twin.arm.description.device.name)
         try:
             with bare_browser(twin.address, lambda said, at: None) as browser:
                 browser.wait_for(STOP_SIGN)
@@ -116,7 +116,7 @@ def stop_key_ms(stacks: Stacks) -> Figure:
         f"{STOPS} moves, from {SETTLE:g} s after a browser without a graphics card has drawn the page; the device "
         "slows in its next slot, see hold_reaction_ms; a bare browser does not draw"
     )
-    return of_samples(taken, Goal(p99=100.0), _of_bare(bare), note)
+    return of_samples(taken, FigureGoal(p99=100.0), _of_bare(bare), note)
 
 
 def goal_drag_hz(stacks: Stacks) -> Figure:
@@ -222,7 +222,7 @@ def _lags(twin: Opened, drawn: list[float]) -> list[float]:
     return lags
 
 
-def _stopped(twin: Opened, wire: Wire, press: Callable[[], object]) -> float:
+def _stopped(twin: Opened, wire: StopWire, press: Callable[[], object]) -> float:
     """[ms] of one stop, on the way to whichever of two states is farther."""
     joints, states = twin.arm.joints, twin.arm.states
     away = {name: max(abs(states[name][joint] - joints[joint]) for joint in joints) for name in ("home", "left")}

@@ -20,7 +20,7 @@ BEAT = 200_000  # [us]
 TRAJ_KNOTS = 60  # of one chunk
 
 
-class Knot(NamedTuple):
+class WireKnot(NamedTuple):
     """Q24.8 steps and steps/s of every joint."""
 
     position: tuple[int, ...]
@@ -56,7 +56,7 @@ def bench_config(joints: Sequence[JointConfig], tick_hz: int) -> DeviceConfig:
     return DeviceConfig(name="bench", joints=named, tick_hz=tick_hz)
 
 
-def play(device: Device, knots: Sequence[Knot], dt_us: int) -> Trace:
+def play(device: Device, knots: Sequence[WireKnot], dt_us: int) -> Trace:
     """Plays knots `dt_us` [us] apart, from rest to rest; raises NotMeasured if they are refused or played slower."""
     device.trace()
     sent, beats, next_beat = 0, 0, 0
@@ -80,7 +80,7 @@ def play(device: Device, knots: Sequence[Knot], dt_us: int) -> Trace:
     return Trace(device.take_trace(), origins.pop())
 
 
-def chunk_of(knots: Sequence[Knot], first: int, dt_us: int) -> bytes:
+def chunk_of(knots: Sequence[WireKnot], first: int, dt_us: int) -> bytes:
     """The encoded chunk that begins with the knot `first`."""
     rows = knots[first : first + TRAJ_KNOTS]
     flags = (ChunkFlag.FIRST if first == 0 else 0) | (ChunkFlag.LAST if first + TRAJ_KNOTS >= len(knots) else 0)

@@ -10,10 +10,10 @@ from gemelo.arm import Arm
 from gemelo.programs import Go, Point, Program, ProgramRun, Repeat, RunStatus
 from schemas.device import DeviceState
 from schemas.topics import DEVICE_STATE
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from services.bench.stack import Stacks
 
-GOAL = Goal(median=1.0, p99=5.0)  # [ms] it is 0 but for the error of the clock's synchronisation
+GOAL = FigureGoal(median=1.0, p99=5.0)  # [ms] it is 0 but for the error of the clock's synchronisation
 ROUNDS = 10  # of two legs
 REACH = 0.4  # [rad] or [m], of the first joint
 LONGEST = 120.0  # [s]

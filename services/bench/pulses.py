@@ -14,8 +14,8 @@ from firmware.bindings.frames import PinChange
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, InputConfig, InputRole
 from services.arm.device.device_config import device_config
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples
-from services.bench.probe import BOOT, FINE, Knot, bench_config, chunk_of, joint_of, play, pulses_of
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
+from services.bench.probe import BOOT, FINE, WireKnot, bench_config, chunk_of, joint_of, play, pulses_of
 from services.bench.scenes import parol6, rm1
 
 DT = 0.020  # [s] between knots
@@ -69,7 +69,7 @@ def is_exact(rate: int, tick_hz: int) -> bool:
     return is_timed and is_counted and device.max_slot_error <= HALF_STEP
 
 
-def to_and_fro(rate: int) -> Sequence[Knot]:
+def to_and_fro(rate: int) -> Sequence[WireKnot]:
     """Knots with constant accelerations between 0, `rate` and `-rate` [steps/s], ending where they begin."""
     half = (
         [rate * i / RAMP_KNOTS for i in range(RAMP_KNOTS)]
@@ -77,14 +77,14 @@ def to_and_fro(rate: int) -> Sequence[Knot]:
         + [rate * i / RAMP_KNOTS for i in range(RAMP_KNOTS, 0, -1)]
     )
     velocities = [*half, *(-v for v in half), 0.0]
-    knots, position = [Knot((0,), (0,))], 0.0
+    knots, position = [WireKnot((0,), (0,))], 0.0
     for before, after in pairwise(velocities):
         position += (before + after) / 2 * DT
-        knots.append(Knot((round(position * FINE),), (round(after * FINE),)))
+        knots.append(WireKnot((round(position * FINE),), (round(after * FINE),)))
     return knots
 
 
-ESTOP_GOAL = Goal(p99=1.0)  # [ticks]
+ESTOP_GOAL = FigureGoal(p99=1.0)  # [ticks]
 PRESSES = 10_000
 JOINTS, RATE = 6, 12_000
 TICK_HZ = 50_000
@@ -137,12 +137,12 @@ def last_rise(changes: Sequence[PinChange]) -> int:
     return last
 
 
-def six(knot: Knot) -> Knot:
+def six(knot: WireKnot) -> WireKnot:
     """The knot of one joint for all six."""
-    return Knot(knot.position * JOINTS, knot.velocity * JOINTS)
+    return WireKnot(knot.position * JOINTS, knot.velocity * JOINTS)
 
 
-TIME_GOAL = Goal(p99=20.0)  # [us] one tick of rm1
+TIME_GOAL = FigureGoal(p99=20.0)  # [us] one tick of rm1
 CRUISE = 0.5  # [s]
 RAMP_SHARE = 0.9  # of the acceleration limit, at its largest
 CROSSING = 1e-7  # [s] to which a crossing is found
@@ -182,7 +182,7 @@ def errors_of(config: DeviceConfig) -> list[float]:
     return errors
 
 
-def full_speed(config: DeviceConfig) -> list[Knot]:
+def full_speed(config: DeviceConfig) -> list[WireKnot]:
     """Knots of a smooth ramp to each joint's full speed, cruising, and a smooth ramp down, all in the same time."""
     speeds = [j.max_velocity_q8 / FINE / 1.02 for j in config.joints]
     slopes = [j.max_acceleration_q8 / FINE for j in config.joints]
@@ -192,7 +192,7 @@ def full_speed(config: DeviceConfig) -> list[Knot]:
     return [knot_at(speeds, min(i * DT, 2 * ramp + CRUISE), ramp, i in (0, count)) for i in range(count + 1)]
 
 
-def knot_at(speeds: Sequence[float], time: float, ramp: float, at_rest: bool) -> Knot:
+def knot_at(speeds: Sequence[float], time: float, ramp: float, at_rest: bool) -> WireKnot:
     """The knot at `time` [s] for joints of `speeds` [steps/s]; `ramp` [s] is the duration of each ramp."""
 
     def travelled(t: float) -> tuple[float, float]:
@@ -206,10 +206,10 @@ def knot_at(speeds: Sequence[float], time: float, ramp: float, at_rest: bool) ->
     place, pace = travelled(time) if is_up else travelled(2 * ramp + CRUISE - time)
     share = place if is_up else total - place
     velocity = (0,) * len(speeds) if at_rest else tuple(round(v * pace * FINE) for v in speeds)
-    return Knot(tuple(round(v * share * FINE) for v in speeds), velocity)
+    return WireKnot(tuple(round(v * share * FINE) for v in speeds), velocity)
 
 
-def crossings(knots: Sequence[Knot], joint: int) -> list[float]:
+def crossings(knots: Sequence[WireKnot], joint: int) -> list[float]:
     """Path times [s] at which a rising path crosses each half step."""
     times: list[float] = []
     for index, (a, b) in enumerate(pairwise(knots)):
@@ -219,7 +219,7 @@ def crossings(knots: Sequence[Knot], joint: int) -> list[float]:
     return times
 
 
-def crossing(a: Knot, b: Knot, joint: int, place: float) -> float:
+def crossing(a: WireKnot, b: WireKnot, joint: int, place: float) -> float:
     """Time [s] after knot `a` at which the path reaches `place` [steps], by bisection."""
     early, late = 0.0, DT
     while late - early > CROSSING:
@@ -231,7 +231,7 @@ def crossing(a: Knot, b: Knot, joint: int, place: float) -> float:
     return (early + late) / 2
 
 
-def hermite(a: Knot, b: Knot, joint: int, u: float) -> float:
+def hermite(a: WireKnot, b: WireKnot, joint: int, u: float) -> float:
     """Position [steps] at the fraction `u` between two knots: the cubic Hermite of firmware/PROTOCOL.md."""
     p, d = a.position[joint] / FINE, (b.position[joint] - a.position[joint]) / FINE
     m0, m1 = a.velocity[joint] / FINE * DT, b.velocity[joint] / FINE * DT

@@ -10,7 +10,7 @@ import msgspec
 
 from schemas.device import DeviceFault, DeviceMode, DeviceState
 from schemas.topics import DEVICE_STATE
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
 from services.bench.latency import swing
 from services.bench.stack import Running, Stacks, cpu_seconds, families
 from services.logger.black_box import BlackBox, write_black_box
@@ -27,7 +27,7 @@ WINDOW, WINDOWS = 5.0, 4  # [s]
 LOGGER = "logger"
 HEARD = 20.0  # [s] of motion that a minute is made of
 SECOND = 1_000_000_000  # [ns]
-BLACKBOX_GOAL = Goal(p99=2.0)  # [% of one core]
+BLACKBOX_GOAL = FigureGoal(p99=2.0)  # [% of one core]
 
 
 def record_cpu_percent(stacks: Stacks) -> Figure:

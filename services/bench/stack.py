@@ -14,16 +14,16 @@ import psutil
 
 from schemas.deployment import Deployment
 from services.arm.model.description import Arm, load_arm
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples, rounded
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.node import Node
 from services.stack.stack import Stack
 
-IDLE_GOAL = Goal(median=25.0)  # [% of one core]
+IDLE_GOAL = FigureGoal(median=25.0)  # [% of one core]
 SETTLE, WINDOW, WINDOWS = 3.0, 2.0, 5  # [s], [s]
-READY_GOAL = Goal(median=8.0)  # [s]
+READY_GOAL = FigureGoal(median=8.0)  # [s]
 READY_ROUNDS = 3
-CLI_GOAL = Goal(p99=500.0)  # [ms]
+CLI_GOAL = FigureGoal(p99=500.0)  # [ms]
 CLI_ROUNDS = 15
 CPUCLOCK_SCHED = 2  # the kernel's include/linux/posix-timers.h: with ~pid above it, the CPU clock of a whole process
 GEMELO = (sys.executable, "-m", "services.cli.main")

@@ -36,7 +36,7 @@ SMOOTH = 0.02  # [s] between points of a move
 STEP = 2000  # [us] between two places of the way
 
 
-class Hold(NamedTuple):
+class MeasuredHold(NamedTuple):
     """What was said when all was lost, and what came."""
 
     said: StoppingDistance
@@ -69,7 +69,7 @@ def stopping_distance(holds: int = QUICK) -> Figure:
     )
 
 
-def lost_in_motion(seed: int) -> Hold:
+def lost_in_motion(seed: int) -> MeasuredHold:
     """One hold in a motion of rm1; the same for the same seed."""
     rng, arm = random.Random(seed), rm1()
     wire = Wire(delay=rng.uniform(0.0003, 0.01), jitter=rng.uniform(0.0, 0.008), is_ordered=True, spared=())
@@ -137,7 +137,7 @@ def _place(arm: Arm, rng: random.Random) -> Vector:
     return tuple(random_place(joint, rng) for joint in arm.joints)
 
 
-def _lose_all(rig: VirtualArm, rng: random.Random) -> Hold:
+def _lose_all(rig: VirtualArm, rng: random.Random) -> MeasuredHold:
     said: StoppingDistance = rig.messages(STOPPING_DISTANCE)[-1]
     rig.gateway_is_on = False
     if rng.random() < 0.5:
@@ -145,7 +145,7 @@ def _lose_all(rig: VirtualArm, rng: random.Random) -> Hold:
     since, began = len(rig.path) - 1, rig.now
     if not rig.run(LONGEST, lambda: not rig.device.moving):
         raise NotMeasured("the arm did not come to rest")
-    return Hold(said, *_way(rig, since, began))
+    return MeasuredHold(said, *_way(rig, since, began))
 
 
 def _way(rig: VirtualArm, since: int, began: float) -> tuple[float, float]:

@@ -29,14 +29,14 @@ from schemas.joints import JointState
 from schemas.message import decode, encode
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.topics import DEVICE_CONFIGURE, DEVICE_INJECT, DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile, rounded
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
 from services.bench.latency import sharp_start
 from services.bench.stack import Running, Stacks, families
 from services.bench.traffic import OURS, connected, flood
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.zenoh_bus import ZenohBus
 
-GOAL = Goal(p99=20.0)  # [ms]
+GOAL = FigureGoal(p99=20.0)  # [ms]
 CALLS = 200  # for each condition in which the device answers
 CALLS_TO_A_FROZEN_DEVICE = 20  # each waits 2 s for its answer
 CALLS_TO_A_FROZEN_BROKER = 3  # as well
@@ -48,7 +48,7 @@ FLOOD_SECONDS = 60.0  # at the most
 SLEEP = 0.002  # [s] of the thread that measures how late the bench itself wakes
 
 
-class Wire:
+class StopWire:
     """Receives every STOP frame."""
 
     def __init__(self, port: int, device: str) -> None:
@@ -76,14 +76,14 @@ class Wire:
         self._client.loop_stop()
 
 
-class Caller:
+class StopCaller:
     """A client that calls for stops, and for what may delay them."""
 
     def __init__(self, running: Running) -> None:
         router = running.deployment.router
         self._running = running
         self.bus = ZenohBus(router, running.arm.name)
-        self.wire = Wire(running.deployment.mqtt.port, running.arm.device.name)
+        self.wire = StopWire(running.deployment.mqtt.port, running.arm.device.name)
         self.states = running.node.latest(JOINT_STATES)
 
     def stop(self) -> float:
@@ -180,7 +180,7 @@ def stop_ms(stacks: Stacks) -> Figure:
     """Time [ms] from the call of a stop to its frame on the wire, in the worst of all conditions."""
     running = stacks.with_broker("mosquitto")
     router, broker, robot = running.deployment.router.port, running.deployment.mqtt.port, running.arm.name
-    caller = Caller(running)
+    caller = StopCaller(running)
     under: dict[str, AbstractContextManager[None]] = {
         "idle": nullcontext(),
         **{f"flood of {what}": flood(what, router, robot, FLOOD_SECONDS) for what in ("requests", "commands", "holds")},
@@ -219,7 +219,7 @@ def stop_ms(stacks: Stacks) -> Figure:
     return of_samples(wire[worst], GOAL, reference, note)
 
 
-def _to_a_frozen_device(running: Running, caller: Caller) -> list[float]:
+def _to_a_frozen_device(running: Running, caller: StopCaller) -> list[float]:
     with _frozen(running, "virtual_esp32"):
         took = []
         for _ in range(CALLS_TO_A_FROZEN_DEVICE):
@@ -228,7 +228,7 @@ def _to_a_frozen_device(running: Running, caller: Caller) -> list[float]:
         return took
 
 
-def _to_a_frozen_broker(running: Running, caller: Caller) -> tuple[list[float], list[float]]:
+def _to_a_frozen_broker(running: Running, caller: StopCaller) -> tuple[list[float], list[float]]:
     """Times [ms] of stops from the call to the answer while the broker is frozen, and from its thaw to the wire."""
     to_answer, after_thaw = [], []
     for _ in range(CALLS_TO_A_FROZEN_BROKER):

@@ -10,7 +10,7 @@ from schemas.device import CommandAck, CommandChunk, DeviceMode
 from schemas.message import Message
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from services.arm.model.description import Arm
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from services.bench.scenes import rm1
 from services.stepper_gateway.device.clock import ClockSync
 from services.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire
@@ -98,7 +98,7 @@ def amplitude_of(arm: Arm, index: int) -> float:
 
 
 TRIES = 25
-HOLD_GOAL = Goal(p99=502.0)  # [ms] hold_timeout_ms of the configuration and two slots
+HOLD_GOAL = FigureGoal(p99=502.0)  # [ms] hold_timeout_ms of the configuration and two slots
 FIRST, LATER = 1.5, 0.037  # [s] into the move at which the loop hangs; later with each try
 SLOT = 0.001  # [s] between two checks
 LONGEST = 4.0  # [s]
@@ -146,7 +146,7 @@ EXCHANGE = 500_000  # [us] between two exchanges
 SAMPLE = 20_000  # [us] between two samples of the error
 SETTLING = 8_000_000  # [us] that is not counted
 CLOCK_DURATION = 600_000_000  # [us]
-CLOCK_GOAL = Goal(p99=500.0)  # [us] half a slot
+CLOCK_GOAL = FigureGoal(p99=500.0)  # [us] half a slot
 CLOCK_SEED = 20_261_121
 
 Delays = tuple[float, float]  # [us] there and back

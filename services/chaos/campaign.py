@@ -13,7 +13,7 @@ from services.arm.device.device_config import device_config
 from services.chaos.faults import BYSTANDERS, FAULTS, READY, Fault
 from services.chaos.invariants import jerks, jumps, misses, moved, segments
 from services.chaos.person import Person, quietly_cancel
-from services.chaos.site import Site
+from services.chaos.site import ChaosSite
 from services.chaos.slots import steps_in
 from services.chaos.slots import violations as slot_violations
 from services.stack.stack import StackError
@@ -59,7 +59,7 @@ def order(seed: int, faults: Sequence[Fault] = FAULTS) -> Iterator[tuple[int, Fa
 class Campaign:
     """Carries out episodes on a site, one after the other."""
 
-    def __init__(self, site: Site, say: Callable[[str], object]) -> None:
+    def __init__(self, site: ChaosSite, say: Callable[[str], object]) -> None:
         self.person = Person(site.arm)
         self.muted: list[tuple[int, int]] = []  # [ns] UNIX, from and to when records may be lost
         self._site, self._say = site, say

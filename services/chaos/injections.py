@@ -13,23 +13,23 @@ from random import Random
 import psutil
 
 import gemelo
-from services.chaos.site import Site, program
+from services.chaos.site import ChaosSite, program
 from services.stack.stack import StackError
 
-Begin = Callable[[Site, Random], str]  # does it; the words for what was chosen
-Heal = Callable[[Site], None]
+Begin = Callable[[ChaosSite, Random], str]  # does it; the words for what was chosen
+Heal = Callable[[ChaosSite], None]
 
 FEW, MANY = 20, 200  # frames
 SLIP = 0.05  # of a joint's travel, to either side
 LEAST_STEP, MOST_STEP = 0.2, 3600.0  # [s] of a clock
 
 
-def nothing(site: Site) -> None:
+def nothing(site: ChaosSite) -> None:
     """What heals by itself."""
 
 
 def killed(name: str) -> Begin:
-    def begin(site: Site, random: Random) -> str:
+    def begin(site: ChaosSite, random: Random) -> str:
         site.stack.kill(name)
         return f"kill -9 {name}"
 
@@ -37,7 +37,7 @@ def killed(name: str) -> Begin:
 
 
 def restarted(name: str) -> Begin:
-    def begin(site: Site, random: Random) -> str:
+    def begin(site: ChaosSite, random: Random) -> str:
         site.stack.kill(name, signal.SIGTERM)
         return f"restart {name}"
 
@@ -45,7 +45,7 @@ def restarted(name: str) -> Begin:
 
 
 def frozen(name: str) -> Begin:
-    def begin(site: Site, random: Random) -> str:
+    def begin(site: ChaosSite, random: Random) -> str:
         site.stack.kill(name, signal.SIGSTOP)
         return f"freeze {name}"
 
@@ -53,7 +53,7 @@ def frozen(name: str) -> Begin:
 
 
 def thawed(name: str) -> Heal:
-    def heal(site: Site) -> None:
+    def heal(site: ChaosSite) -> None:
         with suppress(StackError, ProcessLookupError):
             site.stack.kill(name, signal.SIGCONT)
 
@@ -63,7 +63,7 @@ def thawed(name: str) -> Heal:
 def injected(what: str, value: tuple[float, float] = (1.0, 1.0), on_joint: bool = False) -> Begin:
     """What a person's hand does: `what` with a value between both, in the unit of `device/inject`."""
 
-    def begin(site: Site, random: Random) -> str:
+    def begin(site: ChaosSite, random: Random) -> str:
         target = random.choice(site.arm.joint_names) if on_joint else ""
         amount = random.uniform(*value)
         site.arm.device.inject(what, target, round(amount, 3))
@@ -72,7 +72,7 @@ def injected(what: str, value: tuple[float, float] = (1.0, 1.0), on_joint: bool 
     return begin
 
 
-def slipped(site: Site, random: Random) -> str:
+def slipped(site: ChaosSite, random: Random) -> str:
     """A shaft slips as far as something can push it: not beyond the ends of its joint."""
     joint = random.choice(site.arm.description.joints)
     at, travel = site.arm.joints[joint.name], min(joint.upper - joint.lower, math.tau)
@@ -83,66 +83,66 @@ def slipped(site: Site, random: Random) -> str:
 
 
 def released(what: str) -> Heal:
-    def heal(site: Site) -> None:
+    def heal(site: ChaosSite) -> None:
         for target in site.arm.joint_names if what == "block" else ("",):
             site.arm.device.inject(what, target, 0.0)
 
     return heal
 
 
-def cut(site: Site, random: Random) -> str:
+def cut(site: ChaosSite, random: Random) -> str:
     site.link.cut()
     return "cut the link to the broker"
 
 
-def stalled(site: Site, random: Random) -> str:
+def stalled(site: ChaosSite, random: Random) -> str:
     site.link.is_stalled = True
     return "stall the link to the broker"
 
 
-def slowed(site: Site, random: Random) -> str:
+def slowed(site: ChaosSite, random: Random) -> str:
     site.link.delay = random.uniform(0.02, 0.15)
     return f"slow the link to the broker by {site.link.delay * 1e3:.0f} ms"
 
 
-def garbled(site: Site, random: Random) -> str:
+def garbled(site: ChaosSite, random: Random) -> str:
     site.link.garbling = random.uniform(0.01, 0.1)
     return f"garble {site.link.garbling:.0%} of what passes the link to the broker"
 
 
-def lossy(site: Site, random: Random) -> str:
+def lossy(site: ChaosSite, random: Random) -> str:
     site.link.losing = random.uniform(0.02, 0.3)
     return f"lose {site.link.losing:.0%} of the frames of QoS 0"
 
 
-def healed(site: Site) -> None:
+def healed(site: ChaosSite) -> None:
     site.link.heal()
 
 
-def doubled_frames(site: Site, random: Random) -> str:
+def doubled_frames(site: ChaosSite, random: Random) -> str:
     count = random.randint(FEW, MANY)
     site.wire.repeat(random, count)
     return f"say {count} frames again"
 
 
-def changed_frames(site: Site, random: Random) -> str:
+def changed_frames(site: ChaosSite, random: Random) -> str:
     count = random.randint(FEW, MANY)
     site.wire.garble(random, count)
     return f"say {count} frames with bytes changed"
 
 
-def frames_of_noise(site: Site, random: Random) -> str:
+def frames_of_noise(site: ChaosSite, random: Random) -> str:
     count = random.randint(FEW, MANY)
     site.wire.noise(random, count)
     return f"say {count} frames of random bytes"
 
 
-def noise_on_the_bus(site: Site, random: Random) -> str:
+def noise_on_the_bus(site: ChaosSite, random: Random) -> str:
     site.bus.noise(random)
     return "random bytes on every key of the bus"
 
 
-def worker_killed(site: Site, random: Random) -> str:
+def worker_killed(site: ChaosSite, random: Random) -> str:
     children = psutil.Process(site.stack.pid("planner")).children(recursive=True)
     if not children:
         return "no worker of the planner to kill"
@@ -150,12 +150,12 @@ def worker_killed(site: Site, random: Random) -> str:
     return "kill -9 a worker of the planner"
 
 
-def disk_full(site: Site, random: Random) -> str:
+def disk_full(site: ChaosSite, random: Random) -> str:
     resource.prlimit(site.stack.pid("logger"), resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
     return "no room on the logger's disk"
 
 
-def disk_freed(site: Site) -> None:
+def disk_freed(site: ChaosSite) -> None:
     with suppress(StackError, ProcessLookupError):
         unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
         resource.prlimit(site.stack.pid("logger"), resource.RLIMIT_FSIZE, unlimited)
@@ -164,7 +164,7 @@ def disk_freed(site: Site) -> None:
 def clocks_stepped(of_all: bool) -> Begin:
     """The wall clock of the host, or of one process as if it were on a host of its own, steps to either side."""
 
-    def begin(site: Site, random: Random) -> str:
+    def begin(site: ChaosSite, random: Random) -> str:
         ahead = random.choice((-1.0, 1.0)) * LEAST_STEP * (MOST_STEP / LEAST_STEP) ** random.random()
         names = site.clocks.names if of_all else (random.choice([*map(program, site.stack.processes)]),)
         site.clocks.set_ahead(ahead, names)
@@ -173,20 +173,20 @@ def clocks_stepped(of_all: bool) -> Begin:
     return begin
 
 
-def clocks_set_back(site: Site) -> None:
+def clocks_set_back(site: ChaosSite) -> None:
     site.clocks.set_ahead(0.0)
 
 
-def stopped(site: Site, random: Random) -> str:
+def stopped(site: ChaosSite, random: Random) -> str:
     site.arm.stop()
     return "a person's stop"
 
 
-def held(site: Site, random: Random) -> str:
+def held(site: ChaosSite, random: Random) -> str:
     site.arm.hold()
     return "a person's hold"
 
 
-def resumed(site: Site) -> None:
+def resumed(site: ChaosSite) -> None:
     with suppress(gemelo.Error):
         site.arm.resume()

@@ -24,8 +24,8 @@ from services.chaos.campaign import Campaign, Episode, order
 from services.chaos.faults import FAULTS, Fault
 from services.chaos.invariants import missing_records
 from services.chaos.options import add_chaos_options
-from services.chaos.report import Report, page_of, text_of
-from services.chaos.site import Site, installed_broker, processes_of
+from services.chaos.report import ChaosReport, page_of, text_of
+from services.chaos.site import ChaosSite, installed_broker, processes_of
 from services.runtime.deployment import load_deployment
 from services.runtime.process.ending import ended_by_signals
 from services.stack.results import new_results
@@ -94,7 +94,7 @@ def run(
     report; True if all is good."""
     new_results(out)
     episodes: list[Episode] = []
-    with Site(out, broker, seed) as site:
+    with ChaosSite(out, broker, seed) as site:
         say(f"seed {seed}, all ready after {site.stack.ready_seconds:.1f} s")
         campaign, begun = Campaign(site, say), time.monotonic()
         while time.monotonic() < begun + seconds and (next_one := next(wanted, None)) is not None:
@@ -110,7 +110,7 @@ def run(
     found += [f"{len(missing)} joint states are not recorded, the first at {missing[0]}"] if missing else []
     found += [f"{name} has raised an error: see {out / 'logs' / name}.log" for name, text in logs.items()
               if "Traceback" in text]  # fmt: skip
-    report = Report(
+    report = ChaosReport(
         seed=seed, robot=robot, broker=broker, seconds=took, episodes=tuple(episodes),
         only=only, states_heard=len(heard), states_lost=len(missing), violations=tuple(found),
     )  # fmt: skip

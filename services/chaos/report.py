@@ -16,7 +16,7 @@ WIDTH, ROW = 720, 18  # [px] of the drawing, and of one fault's line
 LONGEST = 25.0  # [s] at its right end
 
 
-class Report(msgspec.Struct, frozen=True, kw_only=True):
+class ChaosReport(msgspec.Struct, frozen=True, kw_only=True):
     """Everything that was done in one run. `violations` are those of no single episode: recordings, logs."""
 
     seed: int
@@ -35,7 +35,7 @@ class Report(msgspec.Struct, frozen=True, kw_only=True):
         return not self.violations and not any(each.violations for each in self.episodes)
 
 
-class Row(msgspec.Struct, frozen=True, kw_only=True):
+class FaultRow(msgspec.Struct, frozen=True, kw_only=True):
     """All episodes of one fault."""
 
     fault: str
@@ -48,7 +48,7 @@ class Row(msgspec.Struct, frozen=True, kw_only=True):
     violations: int
 
 
-def rows_of(episodes: Iterable[Episode]) -> list[Row]:
+def rows_of(episodes: Iterable[Episode]) -> list[FaultRow]:
     """One row a fault, in the order of their names."""
     by_fault: dict[str, list[Episode]] = {}
     for episode in episodes:
@@ -56,9 +56,9 @@ def rows_of(episodes: Iterable[Episode]) -> list[Row]:
     return [_row(name, by_fault[name]) for name in sorted(by_fault)]
 
 
-def _row(name: str, episodes: Sequence[Episode]) -> Row:
+def _row(name: str, episodes: Sequence[Episode]) -> FaultRow:
     ends = Counter(each.ended for each in episodes)
-    return Row(
+    return FaultRow(
         fault=name,
         count=len(episodes),
         ended=", ".join(f"{count} {word}" for word, count in ends.most_common()),
@@ -70,7 +70,7 @@ def _row(name: str, episodes: Sequence[Episode]) -> Row:
     )
 
 
-def text_of(report: Report) -> str:
+def text_of(report: ChaosReport) -> str:
     """The table, then every violation with the command that repeats it."""
     rows = rows_of(report.episodes)
     wide = max((len(row.fault) for row in rows), default=5)
@@ -89,13 +89,13 @@ def text_of(report: Report) -> str:
     return "\n".join([*lines, *report.violations])
 
 
-def again(report: Report, episode: Episode) -> str:
+def again(report: ChaosReport, episode: Episode) -> str:
     """The command that repeats one episode: which fault it was depends on the faults that were chosen too."""
     only = f" --only {shlex.join(report.only)}" if report.only else ""
     return f"gemelo chaos --seed {report.seed}{only} --broker {report.broker} --episode {episode.number}"
 
 
-def summary(report: Report) -> str:
+def summary(report: ChaosReport) -> str:
     """One sentence."""
     bad = sum(bool(each.violations) for each in report.episodes)
     verdict = "every invariant held" if report.is_good else f"{bad} faults and {len(report.violations)} checks violated"
@@ -106,7 +106,7 @@ def summary(report: Report) -> str:
     return f"{faults}: {verdict}; {slots} slots with steps judged; {lost}"
 
 
-def page_of(report: Report) -> str:
+def page_of(report: ChaosReport) -> str:
     """The page: summary, drawing, table, violations; everything in one file."""
     escape = html.escape
     cells = "".join(

@@ -58,7 +58,7 @@ def processes_of(deployment: Deployment) -> tuple[str, ...]:
     return tuple(name for name in PROCESSES if name not in EYES or cell_of(deployment))
 
 
-class Site:
+class ChaosSite:
     """Starts on entering, stops on leaving; `out` gets recordings and logs.
 
     `is_judged`: `processes_of` the deployment run, clocks can step, and `out` gets the slots of the device; else only
@@ -99,7 +99,7 @@ class Site:
         except ClockError as error:
             raise StackError(str(error)) from error
 
-    def __enter__(self) -> Site:
+    def __enter__(self) -> ChaosSite:
         with ExitStack() as closing:
             self.link = SlowLink(self._port, self._broker_port, self._seed)
             closing.callback(self.link.close)

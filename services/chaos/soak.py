@@ -24,7 +24,7 @@ from schemas.system import Parameter, SetParameter
 from schemas.topics import Request
 from services.chaos.options import add_soak_options
 from services.chaos.person import Person
-from services.chaos.site import Site, installed_broker
+from services.chaos.site import ChaosSite, installed_broker
 from services.runtime.deployment import load_deployment
 from services.runtime.process.ending import ended_by_signals
 from services.stack.results import new_results
@@ -42,7 +42,7 @@ FEWEST = 20  # samples after the warm-up below which a slope says nothing
 HOUR, MB = 3600.0, 1e6
 
 
-class Sample(msgspec.Struct, frozen=True):
+class ProcessSample(msgspec.Struct, frozen=True):
     """One process with its children at one time."""
 
     at: float  # [s] since the beginning
@@ -87,8 +87,8 @@ def main() -> None:
 def run(seconds: float, seed: int, broker: str, out: Path) -> bool:
     """Moves for `seconds` [s]; writes and prints the report; True if nothing grew and every move succeeded."""
     new_results(out)
-    random, samples, failures, moves = Random(seed), dict[str, list[Sample]](), list[str](), 0
-    with Site(out, broker, seed, is_judged=False) as site:
+    random, samples, failures, moves = Random(seed), dict[str, list[ProcessSample]](), list[str](), 0
+    with ChaosSite(out, broker, seed, is_judged=False) as site:
         change_files_often(site.arm, seconds)
         person, begun = Person(site.arm), time.monotonic()
         due, told = begun, begun + TOLD_EVERY
@@ -123,18 +123,20 @@ def change_files_often(arm: gemelo.Arm, seconds: float) -> None:
     arm.node.call(request, SetParameter(name="max_age_minutes", value=seconds / 60.0 / FILES), timeout=TO_SET)
 
 
-def progress(elapsed: float, seconds: float, moves: int, failed: int, samples: Mapping[str, Sequence[Sample]]) -> str:
+def progress(
+    elapsed: float, seconds: float, moves: int, failed: int, samples: Mapping[str, Sequence[ProcessSample]]
+) -> str:
     """One line of a soak that goes on; `elapsed` of `seconds` [s]."""
     memory = sum(of_one[-1].memory for of_one in samples.values())
     return f"{elapsed / 60.0:.0f} of {seconds / 60.0:.0f} min: {moves} moves, {failed} failed, {memory:.0f} MB in all"
 
 
-def sample_of(pid: int, at: float) -> Sample:
+def sample_of(pid: int, at: float) -> ProcessSample:
     """The process `pid` and all that it has started, `at` [s]."""
     process = psutil.Process(pid)
     family = [process, *process.children(recursive=True)]
     times = [each.cpu_times() for each in family]
-    return Sample(
+    return ProcessSample(
         at=at,
         memory=sum(each.memory_info().rss for each in family) / MB,
         cpu=sum(each.user + each.system for each in times),
@@ -144,7 +146,7 @@ def sample_of(pid: int, at: float) -> Sample:
     )
 
 
-def growth_of(name: str, samples: Sequence[Sample]) -> Growth:
+def growth_of(name: str, samples: Sequence[ProcessSample]) -> Growth:
     """The slope of the memory by least squares and the differences of the rest, after the warm-up."""
     kept = samples[int(WARM_UP * len(samples)) :]
     first, last = kept[0], kept[-1]

@@ -19,7 +19,7 @@ OK, DUPLICATE = 0, 1  # firmware/PROTOCOL.md, codes of ACK
 SAME_TIME = 1e-4  # [s]
 
 
-class Ledger:
+class StepTotals:
     """Totals of all messages so far; complete when the arm stands."""
 
     def __init__(self) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import gemelo
 from gemelo import topics
 from schemas.device import DeviceMode, DeviceState
-from services.demo.ledger import Ledger
+from services.demo.ledger import StepTotals
 from services.demo.report import Move
 from services.demo.script import SINE_RATE, SINE_TIME, Sine, TourMove, sine_of, tour
 
@@ -21,7 +21,7 @@ class Performance:
     """One run of the script."""
 
     def __init__(self, arm: gemelo.Arm, say: Callable[[str], None]) -> None:
-        self.ledger = Ledger()
+        self.ledger = StepTotals()
         self.moves: list[Move] = []
         self._arm, self._say = arm, say
         arm.node.subscribe(topics.STEP_ERRORS, self.ledger.on_errors)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import msgspec
 
 from services.cli.text_table import table
-from services.demo.ledger import Ledger
+from services.demo.ledger import StepTotals
 
 # Half a step is what rounding to whole steps alone makes; the path itself is known to 1/256 step.
 FOLLOWING_LIMIT = 0.5 + 1.0 / 256.0  # [steps]
@@ -56,7 +56,7 @@ class DemoReport(msgspec.Struct, frozen=True):
     joints: dict[str, JointTotals]
 
 
-def report_of(robot: str, moves: Sequence[Move], ledger: Ledger) -> DemoReport:
+def report_of(robot: str, moves: Sequence[Move], ledger: StepTotals) -> DemoReport:
     """The figures of a whole demonstration."""
     plans = [move.plan_ms for move in moves if move.plan_ms is not None]
     joints = {
@@ -83,7 +83,7 @@ def quantile(values: Sequence[float], share: float) -> float:
     return ordered[max(0, math.ceil(share * len(ordered)) - 1)] if ordered else 0.0
 
 
-def complaints(report: DemoReport, ledger: Ledger) -> list[str]:
+def complaints(report: DemoReport, ledger: StepTotals) -> list[str]:
     """Every bound that is not kept, one sentence each; empty if the demonstration succeeded."""
     found = []
     if report.succeeded < report.moves or report.moves == 0:

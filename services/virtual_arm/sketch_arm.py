@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import msgspec
 
-from firmware.platform.host.sketch import Sketch
+from firmware.platform.host.sketch import HostSketch
 from schemas.device import DeviceCommandKind
 from schemas.robot import Dialect
 from services.arm.model.description import Arm, heard_by_the_board
@@ -49,7 +49,7 @@ class SketchArm(GatewayDriver):
         self._beat = 0.0
         boots = itertools.count(1001)
         self.device = RaDevice(self.arm, lambda: next(boots), GATEWAY_ZERO)
-        self.sketch = Sketch([ramp_of(joint.drive) for joint in self.arm.joints], truncates)
+        self.sketch = HostSketch([ramp_of(joint.drive) for joint in self.arm.joints], truncates)
         self.messages_sent: list[bytes] = []
         self.is_cut = False  # between the sketch and the broker
         self._down: list[tuple[float, bytes]] = []

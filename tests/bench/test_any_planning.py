@@ -12,7 +12,7 @@ from schemas.planning import PlanCode, Refusal
 from services.arm.kinematics.kinematics import Kinematics
 from services.bench.any_arm.drawn_problems import ProblemDrawer, problems
 from services.bench.any_arm.families import FAMILIES, FEWEST, MOST, settings
-from services.bench.any_arm.generated_arms import Sketch, Solid, generated_arm, seven_joints, six_joints
+from services.bench.any_arm.generated_arms import ArmSketch, SketchSolid, generated_arm, seven_joints, six_joints
 from services.bench.planner import any_planning, near_planning, refusing
 from services.bench.planner.any_planning import AnyTrial, has_contact, planned, trial
 from services.planner.collision.clearance import CLEARANCE
@@ -56,11 +56,11 @@ def test_seven_has_40_to_60_spheres_and_six_17_solids_that_are_worth_as_many():
     assert 40 <= sum(np.prod(sides(solid)) / min(sides(solid)) ** 3 for solid in six) <= 60
 
 
-def solids_of(sketch: Sketch) -> list[Solid]:
+def solids_of(sketch: ArmSketch) -> list[SketchSolid]:
     return [*sketch.base, *(solid for link in sketch.links for solid in link.solids)]
 
 
-def sides(solid: Solid) -> tuple[float, ...]:
+def sides(solid: SketchSolid) -> tuple[float, ...]:
     match solid.size:
         case (radius,):
             return (2.0 * radius,) * 3

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from services.bench import main
-from services.bench.figures import Figure, Goal, NotMeasured, guarded, of_samples, quantile, report_of, text_of
+from services.bench.figures import Figure, FigureGoal, NotMeasured, guarded, of_samples, quantile, report_of, text_of
 from services.bench.main import FIGURES, function_of
 from services.bench.panel import DRAG_GOAL, judged_cpu
 from services.bench.stack import Stacks
@@ -62,7 +62,9 @@ def test_a_figure_without_planning_loads_no_planning_library(name):
 
 
 def test_the_json_has_the_form_of_the_architecture():
-    figure = guarded(lambda: of_samples([1.0, 2.0, 3.0], Goal(median=2.5, p99=10.0), {"echo": 0.123456}, "three"), "ms")
+    figure = guarded(
+        lambda: of_samples([1.0, 2.0, 3.0], FigureGoal(median=2.5, p99=10.0), {"echo": 0.123456}, "three"), "ms"
+    )
     report = json.loads(msgspec.json.encode(report_of({"plan_ms": figure}, Path(__file__).parents[2])))
     assert set(report) == {"commit", "machine", "figures"}
     assert report["figures"]["plan_ms"] == {
@@ -72,7 +74,7 @@ def test_the_json_has_the_form_of_the_architecture():
 
 
 def test_a_goal_that_is_not_met_is_said():
-    figure = of_samples([1.0, 20.0], Goal(p99=10.0))
+    figure = of_samples([1.0, 20.0], FigureGoal(p99=10.0))
     assert figure.met is False
     assert "p99 <= 10  NO" in text_of(report_of({"plan_ms": figure}, Path(__file__).parents[2]))
 

@@ -10,7 +10,7 @@ from services.arm.kinematics.kinematics import Kinematics
 from services.bench.problems.problem_sets import (
     COUNT,
     FILE,
-    Problem,
+    PlanningProblem,
     ProblemSet,
     path_length,
     problem_set,
@@ -64,7 +64,7 @@ def test_the_file_is_as_it_is_written():
 
 def test_what_is_written_is_what_is_read():
     sets = (
-        ProblemSet("one", "empty", 3, (Problem((0.1,), (0.2,), True, 0.5, "native"),)),
+        ProblemSet("one", "empty", 3, (PlanningProblem((0.1,), (0.2,), True, 0.5, "native"),)),
         ProblemSet("other", "full", 0, ()),
     )
     assert msgspec.json.decode(text_of(sets), type=tuple[ProblemSet, ...]) == sets

@@ -5,7 +5,7 @@ import pytest
 from firmware.bindings.frames import PinChange
 from services.bench import pulses
 from services.bench.figures import NotMeasured
-from services.bench.probe import Knot, Pulse, pulses_of
+from services.bench.probe import Pulse, WireKnot, pulses_of
 
 
 def test_pulses_are_counted_by_dir():
@@ -20,7 +20,7 @@ def test_a_rate_of_more_than_a_pulse_in_two_ticks_is_not_exact(rate, is_exact):
 
 
 def test_a_crossing_is_found_where_the_path_is():
-    a, b = Knot((0,), (0,)), Knot((2560,), (128_000,))
+    a, b = WireKnot((0,), (0,)), WireKnot((2560,), (128_000,))
     time = pulses.crossing(a, b, 0, 3.5)
     assert pulses.hermite(a, b, 0, time / pulses.DT) == pytest.approx(3.5, abs=1e-3)
 

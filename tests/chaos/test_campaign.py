@@ -14,7 +14,7 @@ from services.chaos.campaign import Episode, meddled, order, unexpected_hands, w
 from services.chaos.faults import FAULTS, Fault
 from services.chaos.main import chosen_faults, possible_faults, unfit
 from services.chaos.options import add_chaos_options
-from services.chaos.report import Report, page_of, rows_of, summary, text_of
+from services.chaos.report import ChaosReport, page_of, rows_of, summary, text_of
 from services.chaos.site import processes_of
 from services.stack.not_ready import NotReady
 from services.stack.stack import PROCESSES, StackError
@@ -29,8 +29,8 @@ def episode(number: int, name: str, *violations: str) -> Episode:
     return Episode(number=number, fault=name, chosen=name, ended="succeeded", to_ready=1.0, violations=violations)
 
 
-def report(*episodes: Episode) -> Report:
-    return Report(
+def report(*episodes: Episode) -> ChaosReport:
+    return ChaosReport(
         seed=7, robot="rm1", broker="mosquitto", seconds=60.0, episodes=episodes, states_heard=10, states_lost=0
     )
 

@@ -8,16 +8,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.chaos.soak import EVERY, FEW, FEWEST, HOUR, STEEPEST, WARM_UP, Growth, Sample, complaints, growth_of
+from services.chaos.soak import (
+    EVERY,
+    FEW,
+    FEWEST,
+    HOUR,
+    STEEPEST,
+    WARM_UP,
+    Growth,
+    ProcessSample,
+    complaints,
+    growth_of,
+)
 
 COUNT = int(HOUR / EVERY)
 
 
-def samples(memory: Sequence[float], **at_the_end: int) -> list[Sample]:
+def samples(memory: Sequence[float], **at_the_end: int) -> list[ProcessSample]:
     """One every `EVERY` seconds, of a process that takes a tenth of a core; `at_the_end` of the last one."""
     counts = {"files": 7, "sockets": 3, "threads": 5}
     return [
-        Sample(
+        ProcessSample(
             at=EVERY * k, memory=each, cpu=0.1 * EVERY * k, **(counts | (at_the_end if k == len(memory) - 1 else {}))
         )
         for k, each in enumerate(memory)

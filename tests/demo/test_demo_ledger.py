@@ -5,7 +5,7 @@ import pytest
 
 from schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState
 from schemas.joints import StepErrors
-from services.demo.ledger import Ledger, nearest_step
+from services.demo.ledger import StepTotals, nearest_step
 from services.demo.report import FOLLOWING_LIMIT, DemoReport, Move, complaints, report_of, text_of
 
 NAMES = ("brazo_joint", "efector_joint")
@@ -19,8 +19,8 @@ def at_rest(stream: int, *steps: int, mode: DeviceMode = DeviceMode.IDLE, veloci
     return DeviceState(stream=stream, name=NAMES, steps=steps, mode=mode, velocity=(velocity, 0.0), play_time=played)
 
 
-def a_good_run() -> Ledger:
-    ledger = Ledger()
+def a_good_run() -> StepTotals:
+    ledger = StepTotals()
     ledger.on_chunk(chunk(7, 0, 128, 0))
     ledger.on_chunk(chunk(7, 1, 25_700, -200))
     for seq in (0, 1):
@@ -66,7 +66,7 @@ def test_a_step_that_the_device_did_not_make_is_lost():
 
 
 def test_steps_are_counted_only_at_rest():
-    ledger = Ledger()
+    ledger = StepTotals()
     ledger.on_chunk(chunk(7, 0, 25_600, 0))
     ledger.on_state(at_rest(7, 50, 0, mode=DeviceMode.RUN, velocity=100.0))
     assert not ledger.is_settled
@@ -120,7 +120,7 @@ def test_an_error_between_two_messages_counts_too():
 
 
 def test_silence_is_not_success():
-    ledger = Ledger()
+    ledger = StepTotals()
     report = report_of("rm1", [], ledger)
     assert isinstance(report, DemoReport)
     assert complaints(report, ledger)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from firmware.platform.host.flash import Credentials
+from firmware.platform.host.flash import NetworkCredentials
 from firmware.platform.host.link import Connected, Denied, DeviceLink, Disconnected, Item
 from firmware.platform.host.network import AddressError, broker_address
 from services.credentials.authority import Authority
@@ -48,7 +48,7 @@ def section(tmp_path_factory):
 def told(section, **changes):
     """The broker as a board is told of it."""
     folder = Path(section.secure_folder)
-    credentials = Credentials(
+    credentials = NetworkCredentials(
         device="rm1",
         mqtt_uri=f"mqtts://127.0.0.1:{section.port}",
         mqtt_user="rm1",

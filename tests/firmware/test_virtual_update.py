@@ -9,7 +9,7 @@ import pytest
 from bed_firmware import Bed, wait_for
 from update_bed import NEWER, an_image
 
-from firmware.platform.host.flash import Credentials, Flash
+from firmware.platform.host.flash import Flash, NetworkCredentials
 from schemas.device import DeviceCommandKind
 from services.cli.errors import ExitCode
 from services.cli.main import run
@@ -24,7 +24,7 @@ def test_a_board_is_updated_over_mqtt_disarmed_only_and_is_armed_again_after_it(
     file.write_bytes(an_image())
     (tmp_path / "run").mkdir()
     flash = Flash(tmp_path / "run/virtual_esp32_flash.json", "rm1")
-    flash.keep_credentials(Credentials(update_key=key.with_suffix(".pub").read_text()))
+    flash.keep_credentials(NetworkCredentials(update_key=key.with_suffix(".pub").read_text()))
     bed.start_device()
     monkeypatch.setenv("GEMELO_MQTT_PORT", str(bed.port))
     words = ["device", "update", str(file), "--key", str(key)]

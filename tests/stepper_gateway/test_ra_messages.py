@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware.platform.host.sketch import AustinStepper, Sketch
-from schemas.robot import Sketch as SketchTable
+from firmware.platform.host.sketch import AustinStepper, HostSketch
+from schemas.robot import HostSketch as SketchTable
 from services.arm.errors import DescriptionError
 from services.arm.model.description import load_arm
 from services.arm.motors.relative_moves import Ramp, ramp_of
@@ -37,7 +37,7 @@ MESSAGES = int(os.environ.get("RA_MESSAGES", "3000"))
 def test_the_sum_of_random_messages_is_the_commanded_steps(truncates: bool) -> None:
     """A sketch that truncates and one that rounds, both with the ESP32's floats, make exactly the steps commanded."""
     rng, sender = random.Random(7), RaSender(RAMPS, (0, 0, 0), telemetry_time=1000.0)
-    sketch = Sketch(RAMPS, truncates)
+    sketch = HostSketch(RAMPS, truncates)
     wanted, shafts, now = [0, 0, 0], [0, 0, 0], 0.0
     for _ in range(MESSAGES):
         wanted = [count + rng.choice((0, 1, -1, rng.randint(-20000, 20000))) for count in wanted]
@@ -79,7 +79,7 @@ def test_what_a_path_commands_during_a_message_fits_into_the_next(message_time: 
 
 def test_a_message_that_comes_too_early_would_discard_the_rest() -> None:
     """The sketch's own defect, which the pacing is for: the test device has it."""
-    sketch = Sketch(RAMPS)
+    sketch = HostSketch(RAMPS)
     for index in range(10):
         sketch.receive(joints_message((466, 10, 0), RAMPS, False))
         sketch.advance(0.1 * (index + 1))
@@ -90,7 +90,7 @@ def test_a_message_that_comes_too_early_would_discard_the_rest() -> None:
 
 def test_the_old_publisher_at_10_hz_loses_what_the_sketch_has_not_done_in_time() -> None:
     """Ninety degrees in messages of 4.5: the reason for which messages wait for one another here."""
-    sketch = Sketch([ramp._replace(acceleration=3110.0) if ramp.name == "q1" else ramp for ramp in RAMPS])
+    sketch = HostSketch([ramp._replace(acceleration=3110.0) if ramp.name == "q1" else ramp for ramp in RAMPS])
     for index in range(20):
         sketch.receive(json.dumps({"q1": 4.5, "q2": 4.5, "q3": 0, "avanzar": 0}).encode())
         sketch.advance(0.1 * (index + 1))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from services.arm.model.description import Arm, load_arm
-from services.bench.vision.mounting import Trial, closed_form, level_trial, looking, six_joint_trial, tool_error
+from services.bench.vision.mounting import MountingTrial, closed_form, level_trial, looking, six_joint_trial, tool_error
 from services.runtime.deployment import project_root
 from services.vision.boards import Sighting, TagBoard
 from services.vision.calibration.mount import fit_mount
@@ -91,7 +91,7 @@ def _unturned(pose: np.ndarray) -> np.ndarray:
     return rigid(np.array([2.2, 2.0, 0.1]), pose[:3, 3])
 
 
-def _seen_again(trial: Trial, poses: list[np.ndarray]) -> Trial:
+def _seen_again(trial: MountingTrial, poses: list[np.ndarray]) -> MountingTrial:
     random = np.random.default_rng(9)
     views = []
     for view, pose in zip(trial.views, poses, strict=True):
@@ -100,7 +100,7 @@ def _seen_again(trial: Trial, poses: list[np.ndarray]) -> Trial:
         views.append(
             dataclasses.replace(view, base_from_link=pose, sighting=Sighting(view.sighting.points, pixels, 0.3))
         )
-    return Trial(views, trial.parent_from_camera, trial.carrier_from_board)
+    return MountingTrial(views, trial.parent_from_camera, trial.carrier_from_board)
 
 
 def test_a_pose_whose_tag_was_seen_two_pixels_off_is_named_and_left_out() -> None:

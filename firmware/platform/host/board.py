@@ -12,7 +12,7 @@ import msgspec
 from firmware.bindings.device import ConfigError, Device, joint_count
 from firmware.bindings.parsers import ProvisionRefused, asks_for_factory_reset
 from firmware.platform.host.firmware_slots import Booted, FirmwareSlots
-from firmware.platform.host.flash import Credentials, Flash
+from firmware.platform.host.flash import Flash, NetworkCredentials
 from firmware.platform.host.memory import BootState, PositionStore, StoredPosition
 from schemas.device_config import config_text
 from services.arm.device.device_config import device_config, reference_steps
@@ -66,7 +66,7 @@ class Board:
         self.is_on_trial = False  # the firmware that runs, until it has said status to somebody
 
     @property
-    def credentials(self) -> Credentials:
+    def credentials(self) -> NetworkCredentials:
         return self._flash.credentials
 
     @property

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 
-class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+class NetworkCredentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The credentials of the device's network; a virtual device ignores those of the Wi-Fi."""
 
     device: str = ""  # empty: the configuration's name
@@ -35,7 +35,7 @@ class Content(msgspec.Struct, frozen=True, kw_only=True):
 
     board: str
     configuration: str | None = None  # JSON text; None: what it left the factory with; empty: forgotten
-    credentials: Credentials = Credentials()
+    credentials: NetworkCredentials = NetworkCredentials()
 
 
 class Flash:
@@ -50,14 +50,14 @@ class Flash:
         return self._content.configuration
 
     @property
-    def credentials(self) -> Credentials:
+    def credentials(self) -> NetworkCredentials:
         return self._content.credentials
 
     def keep_configuration(self, text: str) -> None:
         """Keep the configuration over a restart."""
         self._write(msgspec.structs.replace(self._content, configuration=text))
 
-    def keep_credentials(self, credentials: Credentials) -> None:
+    def keep_credentials(self, credentials: NetworkCredentials) -> None:
         """Keep the credentials over a restart."""
         self._write(msgspec.structs.replace(self._content, credentials=credentials))
 

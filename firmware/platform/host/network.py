@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 from firmware.bindings.device import Device
 from firmware.bindings.frames import OutFrame
-from firmware.platform.host.flash import Credentials
+from firmware.platform.host.flash import NetworkCredentials
 from firmware.platform.host.link import REPORTS, DeviceLink, Item
 from services.mqtt.access import BrokerAccess
 
@@ -40,7 +40,7 @@ class Network:
         self._denied: set[str] = set()  # what was said of the broker's ACL
         self.is_connected = False
 
-    def join(self, device: Device, name: str, credentials: Credentials) -> None:
+    def join(self, device: Device, name: str, credentials: NetworkCredentials) -> None:
         """Connect for as long as it takes, with this device's last will; whatever was connected vanishes."""
         self.break_off()
         self._offline_status = offline_status(name, device.boot_id)
@@ -92,7 +92,7 @@ def offline_status(name: str, boot_id: int) -> bytes:
     return json.dumps({"online": False, "device": name, "boot_id": boot_id}).encode()
 
 
-def broker_address(credentials: Credentials, default: BrokerAccess) -> BrokerAccess:
+def broker_address(credentials: NetworkCredentials, default: BrokerAccess) -> BrokerAccess:
     """The provisioned broker, or `default` where none was; raises AddressError."""
     if not credentials.mqtt_uri:
         return default
@@ -115,7 +115,7 @@ def broker_address(credentials: Credentials, default: BrokerAccess) -> BrokerAcc
     )
 
 
-def _tls(credentials: Credentials) -> ssl.SSLContext:
+def _tls(credentials: NetworkCredentials) -> ssl.SSLContext:
     """Trusts the provisioned authority, else this system's; shows a provisioned certificate. Raises AddressError."""
     try:
         context = ssl.create_default_context(cadata=credentials.mqtt_ca or None)
@@ -126,7 +126,7 @@ def _tls(credentials: Credentials) -> ssl.SSLContext:
     return context
 
 
-def _show_ourselves(context: ssl.SSLContext, credentials: Credentials) -> None:
+def _show_ourselves(context: ssl.SSLContext, credentials: NetworkCredentials) -> None:
     with tempfile.TemporaryDirectory() as folder:  # ssl reads files only; this folder is for its owner alone
         certificate, key = Path(folder, "certificate"), Path(folder, "key")
         certificate.write_text(credentials.mqtt_certificate, encoding="ascii")

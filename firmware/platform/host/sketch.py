@@ -77,7 +77,7 @@ class AustinStepper:
 
 
 @dataclass
-class Sketch:
+class HostSketch:
     """One board; it hears and speaks only by `receive` and `advance`."""
 
     ramps: Sequence[Ramp]

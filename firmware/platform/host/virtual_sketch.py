@@ -9,7 +9,7 @@ import time
 from paho.mqtt import client as paho
 
 from firmware.platform.host.link import Item, MqttMessage, ShutdownRequested
-from firmware.platform.host.sketch import Sketch
+from firmware.platform.host.sketch import HostSketch
 from services.arm.model.description import Arm
 from services.arm.motors.relative_moves import ramp_of
 from services.mqtt.access import BrokerAccess
@@ -27,7 +27,7 @@ class VirtualSketch:
     """One sketch on one broker; its shafts start at zero, wherever the arm is believed to be."""
 
     def __init__(self, arm: Arm, broker: BrokerAccess, inbox: queue.SimpleQueue[Item], readiness: Readiness) -> None:
-        self.sketch = Sketch([ramp_of(joint.drive) for joint in arm.joints])
+        self.sketch = HostSketch([ramp_of(joint.drive) for joint in arm.joints])
         self._inbox, self._readiness = inbox, readiness
         self._broker = broker
         self._client = MqttClient(broker, "", speaks_5=False, reconnect_on_failure=True)

@@ -28,7 +28,7 @@ MESHED = (2, 3)  # links of which meshes are made: the upper arm and the forearm
 
 
 @dataclass(frozen=True)
-class Solid:
+class SketchSolid:
     """A cylinder along `axis` with (radius, length), a ball with (radius,), or a box with its edges; [m]."""
 
     size: tuple[float, ...]
@@ -49,15 +49,15 @@ class MovingLink:
     twist: float
     limits: tuple[float, float]  # [rad]
     velocity: float  # [rad/s]
-    solids: tuple[Solid, ...]
+    solids: tuple[SketchSolid, ...]
 
 
 @dataclass(frozen=True)
-class Sketch:
+class ArmSketch:
     """An arm; the tool is `tool` [m] in the last link's frame, turned by `tool_twist` [rad] about x."""
 
     name: str
-    base: tuple[Solid, ...]
+    base: tuple[SketchSolid, ...]
     links: tuple[MovingLink, ...]
     tool: Point
     excused: tuple[tuple[int, int], ...]  # links that never touch, or always do; the base is 0
@@ -65,13 +65,13 @@ class Sketch:
     tool_twist: float = 0.0
 
 
-def balls(start: Point, end: Point, radius: float, count: int) -> tuple[Solid, ...]:
+def balls(start: Point, end: Point, radius: float, count: int) -> tuple[SketchSolid, ...]:
     """So many balls of `radius` [m] from one centre to another [m]."""
     rows = np.linspace(start, end, count).tolist()
-    return tuple(Solid((radius,), (x, y, z)) for x, y, z in rows)
+    return tuple(SketchSolid((radius,), (x, y, z)) for x, y, z in rows)
 
 
-def six_joints(name: str = "six") -> Sketch:
+def six_joints(name: str = "six") -> ArmSketch:
     """UR5: a [m], d [m] and alpha [rad] behind each joint."""
     table = (
         (0.0, 0.089159, HALF),
@@ -82,25 +82,25 @@ def six_joints(name: str = "six") -> Sketch:
         (0.0, 0.0823, 0.0),
     )
     solids = (
-        (Solid((0.058, 0.10), (0.0, 0.0, 0.095)), Solid((0.06,), (0.0, 0.0, 0.10))),
+        (SketchSolid((0.058, 0.10), (0.0, 0.0, 0.095)), SketchSolid((0.06,), (0.0, 0.0, 0.10))),
         (
-            Solid((0.058, 0.12), (0.0, 0.0, 0.125)),
-            Solid((0.05, 0.36), (-0.2125, 0.0, 0.136), "x"),
-            Solid((0.053,), (-0.425, 0.0, 0.136)),
-            Solid((0.10, 0.09, 0.09), (-0.05, 0.0, 0.136)),
+            SketchSolid((0.058, 0.12), (0.0, 0.0, 0.125)),
+            SketchSolid((0.05, 0.36), (-0.2125, 0.0, 0.136), "x"),
+            SketchSolid((0.053,), (-0.425, 0.0, 0.136)),
+            SketchSolid((0.10, 0.09, 0.09), (-0.05, 0.0, 0.136)),
         ),
         (
-            Solid((0.045, 0.07), (0.0, 0.0, 0.045)),
-            Solid((0.042, 0.33), (-0.20, 0.0, 0.016), "x"),
-            Solid((0.044,), (-0.39225, 0.0, 0.016)),
+            SketchSolid((0.045, 0.07), (0.0, 0.0, 0.045)),
+            SketchSolid((0.042, 0.33), (-0.20, 0.0, 0.016), "x"),
+            SketchSolid((0.044,), (-0.39225, 0.0, 0.016)),
         ),
-        (Solid((0.038, 0.09), (0.0, 0.0, 0.085)), Solid((0.04,), (0.0, 0.0, 0.10915))),
-        (Solid((0.037, 0.10), (0.0, 0.0, 0.07)),),
+        (SketchSolid((0.038, 0.09), (0.0, 0.0, 0.085)), SketchSolid((0.04,), (0.0, 0.0, 0.10915))),
+        (SketchSolid((0.037, 0.10), (0.0, 0.0, 0.07)),),
         (
-            Solid((0.034, 0.05), (0.0, 0.0, 0.06)),
-            Solid((0.07, 0.12, 0.05), (0.0, 0.0, 0.112)),
-            Solid((0.02, 0.015, 0.05), (0.0, 0.045, 0.162)),
-            Solid((0.02, 0.015, 0.05), (0.0, -0.045, 0.162)),
+            SketchSolid((0.034, 0.05), (0.0, 0.0, 0.06)),
+            SketchSolid((0.07, 0.12, 0.05), (0.0, 0.0, 0.112)),
+            SketchSolid((0.02, 0.015, 0.05), (0.0, 0.045, 0.162)),
+            SketchSolid((0.02, 0.015, 0.05), (0.0, -0.045, 0.162)),
         ),
     )
     before: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0), *table[:-1])
@@ -108,12 +108,12 @@ def six_joints(name: str = "six") -> Sketch:
         MovingLink((a, 0.0, d), alpha, (-math.tau, math.tau) if number != 2 else (-math.pi, math.pi), math.pi, shapes)
         for number, ((a, d, alpha), shapes) in enumerate(zip(before, solids, strict=True))
     )
-    base = (Solid((0.07, 0.04), (0.0, 0.0, 0.02)),)
+    base = (SketchSolid((0.07, 0.04), (0.0, 0.0, 0.02)),)
     excused = ((0, 2), (3, 5), (4, 6))
-    return Sketch(name, base, links, (0.0, 0.0, 0.182), excused, (0.0, -1.57, 1.2, -1.2, -1.57, 0.0))
+    return ArmSketch(name, base, links, (0.0, 0.0, 0.182), excused, (0.0, -1.57, 1.2, -1.2, -1.57, 0.0))
 
 
-def seven_joints() -> Sketch:
+def seven_joints() -> ArmSketch:
     """Panda: a [m], d [m] and alpha [rad] before each joint, its limits [rad] and its velocity [rad/s]."""
     table = (
         (0.0, 0.333, 0.0, -2.8973, 2.8973, 2.175),
@@ -154,7 +154,7 @@ def seven_joints() -> Sketch:
     base = balls((-0.09, 0.0, 0.065), (0.0, 0.0, 0.065), 0.062, 3)
     excused = tuple((index, index + 2) for index in range(6))
     home = (0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785)
-    return Sketch("seven", base, links, (0.0, 0.0, 0.2104), excused, home)
+    return ArmSketch("seven", base, links, (0.0, 0.0, 0.2104), excused, home)
 
 
 @cache
@@ -169,7 +169,7 @@ def generated_arm(name: str) -> Arm:
 ARMS = ("six", "six_mesh", "seven")
 
 
-def written(sketch: Sketch, folder: Path, with_meshes: bool) -> Path:
+def written(sketch: ArmSketch, folder: Path, with_meshes: bool) -> Path:
     """The robot's folder with robot.urdf, robot.srdf, robot.toml, and meshes where asked."""
     folder.mkdir(parents=True)
     solids = [sketch.base, *(link.solids for link in sketch.links)]
@@ -199,7 +199,7 @@ def _joint(number: int, link: MovingLink) -> str:
     )
 
 
-def _link(folder: Path, number: int, solids: Sequence[Solid], with_meshes: bool) -> str:
+def _link(folder: Path, number: int, solids: Sequence[SketchSolid], with_meshes: bool) -> str:
     if not with_meshes:
         shapes = "".join(
             f"<collision>{_origin(solid.at, solid.turn)}<geometry>{_form(solid)}</geometry></collision>"
@@ -212,7 +212,7 @@ def _link(folder: Path, number: int, solids: Sequence[Solid], with_meshes: bool)
     return f'<link name="link_{number}"><collision><geometry><mesh filename="{name}"/></geometry></collision></link>'
 
 
-def _form(solid: Solid) -> str:
+def _form(solid: SketchSolid) -> str:
     match solid.size:
         case (radius,):
             return f'<sphere radius="{radius:.9g}"/>'
@@ -221,7 +221,7 @@ def _form(solid: Solid) -> str:
     return f'<box size="{" ".join(f"{edge:.9g}" for edge in solid.size)}"/>'
 
 
-def _meshed(solid: Solid) -> trimesh.Trimesh:
+def _meshed(solid: SketchSolid) -> trimesh.Trimesh:
     match solid.size:
         case (radius,):
             mesh = trimesh.creation.icosphere(subdivisions=BALL_DIVISIONS, radius=radius)
@@ -234,7 +234,7 @@ def _meshed(solid: Solid) -> trimesh.Trimesh:
     return mesh
 
 
-def _srdf(sketch: Sketch) -> str:
+def _srdf(sketch: ArmSketch) -> str:
     adjacent = [(number, number + 1) for number in range(len(sketch.links))]
     lines = [f'<robot name="{sketch.name}">', '<group name="arm"><chain base_link="link_0" tip_link="tool"/></group>']
     values = (f'<joint name="joint_{number}" value="{value:g}"/>' for number, value in enumerate(sketch.home, 1))

@@ -19,7 +19,7 @@ from services.bench.any_arm.drawn_problems import DrawnProblem, problems
 from services.bench.any_arm.families import FAMILIES
 from services.bench.any_arm.generated_arms import ARMS, generated_arm
 from services.bench.figures import Figure, NotMeasured, of_samples, quantile, rounded
-from services.bench.planner.references import Answer, CoalChecker, PlainOmpl, Reference, Roboplan
+from services.bench.planner.references import CoalChecker, PlainOmpl, Reference, ReferenceResult, Roboplan
 from services.bench.planner.trials import PHASES, WARMING, spread
 from services.bench.problems.problem_sets import ALLOWED, path_length
 from services.planner.collision.world import World
@@ -50,7 +50,7 @@ class AnyTrial:
     has_contact: bool  # on the exact shapes, `SAMPLED` apart
     length: float  # [s at full speed]
     best: float  # [s at full speed] of the shortest path known
-    others: dict[str, Answer | None]
+    others: dict[str, ReferenceResult | None]
 
     @property
     def is_solved(self) -> bool:

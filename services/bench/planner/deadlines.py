@@ -12,7 +12,7 @@ from schemas.joints import JointState
 from schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.model.description import Arm
-from services.bench.figures import Figure, Goal, of_samples, quantile
+from services.bench.figures import Figure, FigureGoal, of_samples, quantile
 from services.bench.planner.mesh_planning import dented_ball
 from services.bench.scenes import rm1
 from services.planner.collision.world import World
@@ -22,7 +22,7 @@ ALLOWED = (0.1, 0.3)  # [s]
 PLANNERS = ("native", "RRTConnect", "PRM", "")
 SEEDS = 4
 START, BEYOND = (0.0, 0.3, 0.05), (1.2, 0.3, 0.05)  # of rm1, on both sides of a wall that it cannot turn past
-GOAL = Goal(p99=100.0)  # [ms]
+GOAL = FigureGoal(p99=100.0)  # [ms]
 
 
 def deadline_overrun_ms() -> Figure:

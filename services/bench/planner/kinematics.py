@@ -13,7 +13,7 @@ from services.arm.frames.transforms import inverse, multiply
 from services.arm.kinematics.chain import link_transforms
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile, rounded
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
 from services.bench.scenes import parol6, random_configurations, rm1
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.targets import Target
@@ -21,7 +21,7 @@ from services.planner.request.deadline import NEVER
 
 Array = NDArray[np.float64]
 
-GOAL = Goal(median=0.2, p99=1.0)  # [ms]
+GOAL = FigureGoal(median=0.2, p99=1.0)  # [ms]
 SUCCESS_GOAL = 99.9  # [%]
 POSES, SEARCHED, TRIES = 2000, 200, 3
 SUCCESS_POSES, SUCCESS_SEARCHED = 10_000, 300
@@ -30,7 +30,7 @@ TURNED_ENOUGH = 1e-3  # [rad]
 
 
 @dataclass(frozen=True)
-class Problem:
+class ToolProblem:
     """A target for the tool."""
 
     target: Target
@@ -84,22 +84,22 @@ def ik_success() -> Figure:
     )
 
 
-def random_problems(arm: Arm, kinematics: Kinematics, count: int, is_full: bool) -> list[Problem]:
+def random_problems(arm: Arm, kinematics: Kinematics, count: int, is_full: bool) -> list[ToolProblem]:
     """Full poses, or positions alone; the same ones in every run."""
     rows = random_configurations(arm, 2 * count)
     made = []
     for solution, near in zip(rows[:count], rows[count:], strict=True):
         pose = kinematics.tool(solution)
-        made.append(Problem(Target(pose.position, pose.rotation if is_full else None), near, solution))
+        made.append(ToolProblem(Target(pose.position, pose.rotation if is_full else None), near, solution))
     return made
 
 
-def solve(solver: InverseKinematics, problem: Problem) -> Array | None:
+def solve(solver: InverseKinematics, problem: ToolProblem) -> Array | None:
     """The first solution (n,) [rad] or [m]; None if there is none."""
     return next(solver.solutions(problem.target, problem.near, NEVER), None)
 
 
-def solving_ms(solver: InverseKinematics, problems: list[Problem], tries: int) -> list[float]:
+def solving_ms(solver: InverseKinematics, problems: list[ToolProblem], tries: int) -> list[float]:
     """Time [ms] of every problem: the fastest of `tries`, because other processes are not to be measured."""
     samples = []
     for problem in problems:
@@ -120,7 +120,7 @@ def solved(arm: Arm, count: int, is_full: bool = True, is_numeric: bool = False)
     return sum(is_solved(arm, problem, solve(solver, problem)) for problem in problems)
 
 
-def is_solved(arm: Arm, problem: Problem, answer: Array | None) -> bool:
+def is_solved(arm: Arm, problem: ToolProblem, answer: Array | None) -> bool:
     """True if `answer` (n,) [rad] or [m] is within limits and meets the target, by kinematics other than the
     solver's."""
     if answer is None or not all(j.is_within(v) for j, v in zip(arm.joints, answer.tolist(), strict=True)):

@@ -9,14 +9,14 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples, rounded
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
 from services.bench.planner.references import PlainOmpl, Reference, Roboplan
 from services.bench.planner.trials import PHASES, Trial, every_trial, spread, trials
 from services.bench.problems.problem_sets import ALLOWED, COUNT, problem_set, problem_sets
 from services.bench.scenes import SCENES, parol6, rm1
 from services.planner.core import Planner
 
-GOAL = Goal(median=2.0, p99=20.0)  # [ms]
+GOAL = FigureGoal(median=2.0, p99=20.0)  # [ms]
 REFERENCED = 40  # problems a scene and arm for the references, which take a hundred times as long
 REFERENCES: tuple[tuple[str, type[Reference]], ...] = (
     ("OMPL RRTConnect on coal", PlainOmpl),
@@ -108,7 +108,7 @@ def plan_success() -> Figure:
     )
 
 
-PYTHON_GOAL = Goal(median=50.0, p99=1000.0)  # [ms]
+PYTHON_GOAL = FigureGoal(median=50.0, p99=1000.0)  # [ms]
 PYTHON_COUNT = 40  # problems a scene and arm, the first ones of plan_ms
 PYTHON_TIMEOUT = 400.0  # [s]
 # The core's import fails in this process, as where it is not compiled: OMPL searches and coal checks everything.
@@ -120,7 +120,7 @@ print_runs(int(sys.argv[1]), float(sys.argv[2]))
 """
 
 
-class Run(msgspec.Struct, frozen=True):
+class PythonRun(msgspec.Struct, frozen=True):
     """One plan in Python alone."""
 
     took: float  # [ms] of the clock
@@ -142,13 +142,13 @@ def plan_python_ms() -> Figure:
     return of_samples([run.took for run in runs], PYTHON_GOAL, reference, note)
 
 
-def runs_without_core(count: int, allowed: float = ALLOWED) -> list[Run]:
+def runs_without_core(count: int, allowed: float = ALLOWED) -> list[PythonRun]:
     """The first `count` problems of each scene, planned in a process without the core, `allowed` [s] each."""
     command = [sys.executable, "-c", PROGRAM, str(count), str(allowed)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=PYTHON_TIMEOUT)
     if done.returncode != 0:
         raise NotMeasured(f"the process without the core ended with {done.returncode}: {done.stderr.strip()[-300:]}")
-    return msgspec.json.decode(done.stdout.splitlines()[-1], type=list[Run])
+    return msgspec.json.decode(done.stdout.splitlines()[-1], type=list[PythonRun])
 
 
 def print_runs(count: int, allowed: float) -> None:
@@ -156,7 +156,7 @@ def print_runs(count: int, allowed: float) -> None:
     planners = (Planner(rm1()), Planner(parol6()))
     gc.freeze()  # as the planner's workers do
     runs = [
-        Run(trial.took, trial.worked, trial.is_solved, trial.response.planner_id)
+        PythonRun(trial.took, trial.worked, trial.is_solved, trial.response.planner_id)
         for planner in planners
         for name in SCENES
         for trial in trials(planner, name, count, allowed=allowed)

@@ -75,7 +75,7 @@ def solid_of(shape: Shape) -> coal.CollisionGeometry:
     raise ValueError(f"the bench's scenes have boxes and cylinders, not {shape}")
 
 
-class Answer(NamedTuple):
+class ReferenceResult(NamedTuple):
     """What a reference has found: times [ms] of the clock and of the CPU, and the polyline (m, n) [rad] or [m]."""
 
     took: float
@@ -87,7 +87,7 @@ class Reference(Protocol):
     """A planner for one arm in one scene."""
 
     def __init__(self, arm: Arm, scene: PlanningScene) -> None: ...
-    def shortened_path(self, start: JointValues, goal: JointValues, seed: int) -> Answer | None:
+    def shortened_path(self, start: JointValues, goal: JointValues, seed: int) -> ReferenceResult | None:
         """A shortened path; None if none is found within `ALLOWED`."""
 
 
@@ -113,7 +113,7 @@ class PlainOmpl:
         self._information.setStateValidityCheckingResolution(STEP / space.getMaximumExtent())
         self._information.setup()
 
-    def shortened_path(self, start: JointValues, goal: JointValues, seed: int) -> Answer | None:
+    def shortened_path(self, start: JointValues, goal: JointValues, seed: int) -> ReferenceResult | None:
         """A path from `start` to `goal`, (n,) [rad] or [m], shortened; None if none is found within `ALLOWED`."""
         self._util.RNG.setSeed(seed + 1)
         began, before = time.perf_counter(), time.process_time()
@@ -129,7 +129,7 @@ class PlainOmpl:
         self._geometric.PathSimplifier(self._information).simplifyMax(path)
         took, worked = time.perf_counter() - began, time.process_time() - before
         rows = [[state[index] for index in range(len(start))] for state in path.getStates()]
-        return Answer(took * 1e3, worked * 1e3, np.array(rows))
+        return ReferenceResult(took * 1e3, worked * 1e3, np.array(rows))
 
     def _state(self, configuration: JointValues) -> Any:
         state = self._information.allocState()
@@ -160,7 +160,7 @@ class Roboplan:
         )
         self._planner = rrt.RRT(self._scene, options)
 
-    def shortened_path(self, start: JointValues, goal: JointValues, seed: int) -> Answer | None:
+    def shortened_path(self, start: JointValues, goal: JointValues, seed: int) -> ReferenceResult | None:
         """A path from `start` to `goal`, (n,) [rad] or [m], shortened; None if none is found within `ALLOWED`."""
         names = self._scene.getJointNames()
         ends = [self._core.JointConfiguration(names, np.array(values)) for values in (start, goal)]
@@ -173,7 +173,7 @@ class Roboplan:
             return None
         short = self._core.PathShortcutter(self._scene, options).shortcut(path)
         took, worked = time.perf_counter() - began, time.process_time() - before
-        return Answer(took * 1e3, worked * 1e3, np.array(short.positions))
+        return ReferenceResult(took * 1e3, worked * 1e3, np.array(short.positions))
 
     def _add_objects(self, scene: PlanningScene) -> None:
         for item in scene.objects:

@@ -11,14 +11,14 @@ from schemas.planning import PlanCode, PlanRequest, PoseGoal
 from services.bench.any_arm.drawn_problems import DrawnProblem, ProblemDrawer
 from services.bench.any_arm.families import FAMILIES
 from services.bench.any_arm.generated_arms import ARMS, generated_arm
-from services.bench.figures import Figure, Goal, of_samples
+from services.bench.figures import Figure, FigureGoal, of_samples
 from services.bench.planner.trials import WARMING, spread
 from services.bench.problems.problem_sets import tool_pose
 from services.planner.collision.world import World
 from services.planner.core import Planner
 
 BEYOND = 3.0  # times as far from the base as the drawn pose: no arm of these reaches so far
-GOAL = Goal(median=10.0, p99=100.0)  # [ms]
+GOAL = FigureGoal(median=10.0, p99=100.0)  # [ms]
 Asked = tuple[str, DrawnProblem, PlanRequest, PlanCode]
 
 

@@ -13,7 +13,7 @@ import pinocchio as pin
 from schemas.frames import Transform
 from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, SphereShape
 from services.arm.kinematics.self_collisions import load_collision_geometry
-from services.bench.figures import Figure, Goal, of_samples, quantile
+from services.bench.figures import Figure, FigureGoal, of_samples, quantile
 from services.bench.scenes import parol6, rm1
 from services.planner.collision.scene_shapes import shape_of
 from services.planner.collision.world import World
@@ -21,7 +21,7 @@ from services.planner.collision_geometry.coal_shapes import geometry_of
 from services.planner.core import Planner
 
 OBJECTS, SCENES = 40, 40
-GOAL = Goal(median=5.0)  # [ms]
+GOAL = FigureGoal(median=5.0)  # [ms]
 
 
 def scene_intake_ms() -> Figure:

@@ -12,7 +12,7 @@ from schemas.planning import JogCommand, LinearMotion, PlanCode, PlanRequest, Po
 from schemas.scene import PlanningScene
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
-from services.bench.figures import Figure, Goal, of_samples, quantile
+from services.bench.figures import Figure, FigureGoal, of_samples, quantile
 from services.bench.planner.path_quality import least_time
 from services.bench.scenes import CHECK_SCENE, parol6, rm1
 from services.planner.collision.world import World
@@ -134,7 +134,7 @@ class PlainLines:
 JOG_COMMANDS, JOG_STEPS = 40, 25  # each command is held for half a second
 JOG_SPEED = 0.15  # [m/s]
 # [us] a quarter of the period: a late step slows the arm, and other processes need the core too.
-JOG_GOAL = Goal(p99=0.25 * PERIOD * 1e6)
+JOG_GOAL = FigureGoal(p99=0.25 * PERIOD * 1e6)
 
 
 def jog_tick_us() -> Figure:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from schemas.motion import JointTrajectory
 from schemas.planning import PlanningTimes, PlanResponse
 from services.bench.figures import quantile
-from services.bench.problems.problem_sets import ALLOWED, COUNT, Problem, problem_set, request_of
+from services.bench.problems.problem_sets import ALLOWED, COUNT, PlanningProblem, problem_set, request_of
 from services.bench.scenes import SCENES, parol6, rm1
 from services.planner.collision.world import World
 from services.planner.core import Planner
@@ -30,7 +30,7 @@ WARMING = 2  # problems planned beforehand: some tables are built when first use
 class Trial:
     """One planned problem."""
 
-    problem: Problem
+    problem: PlanningProblem
     took: float  # [ms] of the clock
     worked: float  # [ms] of the CPU
     response: PlanResponse  # without its trajectory, to save memory
@@ -76,7 +76,7 @@ def trials(
     return [trial(planner, problem, planner_id, allowed) for problem in chosen]
 
 
-def trial(planner: Planner, problem: Problem, planner_id: str, allowed: float = ALLOWED) -> Trial:
+def trial(planner: Planner, problem: PlanningProblem, planner_id: str, allowed: float = ALLOWED) -> Trial:
     """Plans one problem within `allowed` [s]."""
     request = request_of(problem, planner.arm, planner.kinematics, planner_id, allowed)
     began, before = time.perf_counter(), time.process_time()

@@ -20,7 +20,7 @@ from services.bench.problems.known_paths import JointGrid, shortest
 from services.bench.problems.problem_sets import (
     COUNT,
     FILE,
-    Problem,
+    PlanningProblem,
     ProblemSet,
     path_length,
     problem_sets,
@@ -62,7 +62,7 @@ class Maker:
 
     def made(self) -> ProblemSet:
         """The whole set; the goals are joint values and tool poses in turns."""
-        generator, problems, drawn = random.Random(SEED), list[Problem](), 0
+        generator, problems, drawn = random.Random(SEED), list[PlanningProblem](), 0
         while len(problems) < COUNT:
             drawn += 1
             start, goal = self.free_configuration(generator), self.free_configuration(generator)
@@ -80,16 +80,16 @@ class Maker:
             if is_within and self._around.keeps(configuration, CLEARANCE):
                 return configuration
 
-    def problem(self, start: tuple[float, ...], goal: tuple[float, ...], is_pose: bool) -> Problem | None:
+    def problem(self, start: tuple[float, ...], goal: tuple[float, ...], is_pose: bool) -> PlanningProblem | None:
         """The problem from `start` to `goal`, (n,) [rad] or [m]; None if no path between them is known."""
         begin, end = np.array(start), np.array(goal)
         known = self.any_path(begin, end)
         if known is None:
             return None
-        wanted = Problem(start, goal, is_pose, 0.0, "")
+        wanted = PlanningProblem(start, goal, is_pose, 0.0, "")
         goals = self.configurations(wanted) if is_pose else [end]
         rows, found_by = min((known, *self.better(begin, goals)), key=lambda path: path_length(path[0], self._speeds))
-        return Problem(start, goal, is_pose, round(path_length(rows, self._speeds), DIGITS), found_by)
+        return PlanningProblem(start, goal, is_pose, round(path_length(rows, self._speeds), DIGITS), found_by)
 
     def any_path(self, start: Array, goal: Array) -> tuple[Array, str] | None:
         """Any free polyline (m, n) [rad] or [m] and what found it; None if no path is known."""
@@ -119,7 +119,7 @@ class Maker:
             paths += [] if found is None else [found]
         return paths
 
-    def configurations(self, problem: Problem) -> list[Array]:
+    def configurations(self, problem: PlanningProblem) -> list[Array]:
         """Free configurations (n,) [rad] or [m] of the tool pose, the problem's own first."""
         goal = request_of(problem, self.arm, self.kinematics).goal
         found = Goals(self.arm, self.kinematics, self._around).candidates(goal, problem.start, NEVER)

@@ -24,7 +24,7 @@ COUNT = 200  # a scene and arm
 ALLOWED = 1.0  # [s]
 
 
-class Problem(msgspec.Struct, frozen=True, array_like=True):
+class PlanningProblem(msgspec.Struct, frozen=True, array_like=True):
     """From rest to rest; joint values [rad] or [m] in the arm's order."""
 
     start: tuple[float, ...]
@@ -40,7 +40,7 @@ class ProblemSet(msgspec.Struct, frozen=True):
     arm: str
     scene: str
     drawn: int  # pairs of free configurations, until COUNT had a known path
-    problems: tuple[Problem, ...]
+    problems: tuple[PlanningProblem, ...]
 
 
 @cache
@@ -68,7 +68,7 @@ def _text(each: ProblemSet) -> str:
 
 
 def request_of(
-    problem: Problem, arm: Arm, kinematics: Kinematics, planner_id: str = "", allowed: float = ALLOWED
+    problem: PlanningProblem, arm: Arm, kinematics: Kinematics, planner_id: str = "", allowed: float = ALLOWED
 ) -> PlanRequest:
     """The request that a client sends for `problem`, with `allowed` [s] for it."""
     names = arm.joint_names

@@ -43,7 +43,7 @@ SOURCE = 'kind = "folder"\npath = "images"\n'
 
 
 @dataclass(frozen=True)
-class Cost:
+class CameraCost:
     """What was measured with one kind of camera."""
 
     camera: list[float]  # [% of a core] of each window
@@ -79,7 +79,7 @@ def image_to_detection_ms() -> Figure:
 
 
 @cache
-def cost(is_virtual: bool) -> Cost:
+def cost(is_virtual: bool) -> CameraCost:
     """A stack of its own with one camera."""
     with tempfile.TemporaryDirectory() as folder:
         cell = _cell(Path(folder), is_virtual)
@@ -89,7 +89,7 @@ def cost(is_virtual: bool) -> Cost:
                 return _measured(stack, node)
 
 
-def _measured(stack: Stack, node: Node) -> Cost:
+def _measured(stack: Stack, node: Node) -> CameraCost:
     delays: list[float] = []
     node.subscribe(camera_detections(CAMERA), lambda found: delays.append((time.time_ns() - found.stamp) * 1e-6))
     processes = families(stack)
@@ -104,7 +104,7 @@ def _measured(stack: Stack, node: Node) -> Cost:
     rate = len(delays) / (time.monotonic() - began)
     if not delays:
         raise NotMeasured("no detection has come")
-    return Cost([each for each, _ in shares], [each for _, each in shares], usual, delays, rate)
+    return CameraCost([each for each, _ in shares], [each for _, each in shares], usual, delays, rate)
 
 
 def _shares(node: Node, *families: list[psutil.Process]) -> list[float]:

@@ -22,7 +22,7 @@ from services.bench.vision.images import (
     tag_surface,
 )
 from services.bench.vision.mount_images import Setup, Sight, board_on_tool, camera_on_link, tag_on_level_tool, take
-from services.bench.vision.mounting import Trial, closed_form, level_trial, six_joint_trial, tool_error
+from services.bench.vision.mounting import MountingTrial, closed_form, level_trial, six_joint_trial, tool_error
 from services.bench.vision.naive import APRILTAG_SHIFT, METHODS, opencv_corners, opencv_pose
 from services.vision.boards import TagBoard
 from services.vision.boxes import colour_strength, coloured_regions, fit_box, region_centre
@@ -44,7 +44,7 @@ SAID = "30 mm tag at 0.5 m, 45 to 85 degrees above the table, 640 x 480, noise 3
 
 
 @dataclass(frozen=True)
-class View:
+class TagView:
     """One tag on the table."""
 
     image: Image
@@ -56,18 +56,18 @@ class View:
         return 1000.0 * float(np.linalg.norm(pose[:3, 3] - self.camera_from_tag[:3, 3]))
 
 
-def views(count: int, conditions: Conditions | None = None, seed: int = 1) -> Iterator[View]:
+def views(count: int, conditions: Conditions | None = None, seed: int = 1) -> Iterator[TagView]:
     """Views from all sides; the same ones in every run."""
     random = np.random.default_rng(seed)
     for number in range(count):
         table = looking_down(DISTANCE, np.radians(random.uniform(45.0, 85.0)), random.uniform(0.0, 6.28))
         place = flat(np.array([random.uniform(-0.1, 0.1), random.uniform(-0.08, 0.08), random.uniform(0.0, 6.28)]))
         pose = table @ place
-        yield View(render(MODEL, [tag_surface(pose, SIZE, number % 30)], random, conditions), table, pose)
+        yield TagView(render(MODEL, [tag_surface(pose, SIZE, number % 30)], random, conditions), table, pose)
 
 
 @cache
-def common_views() -> tuple[View, ...]:
+def common_views() -> tuple[TagView, ...]:
     """Those that several figures are measured on."""
     return tuple(views(TAGS))
 
@@ -222,13 +222,13 @@ def mount_images(setup: Setup) -> tuple[list[float], list[float]]:
         if fit.faults:
             raise NotMeasured("; ".join(fit.faults))
         ours.append(tool_error(fit.parent_from_camera, sight.truth, carrier))
-        trial = Trial(list(taken.views), sight.truth, setup.carrier_from_board)
+        trial = MountingTrial(list(taken.views), sight.truth, setup.carrier_from_board)
         found = closed_form(trial, sight.model, carrier, cv2.CALIB_HAND_EYE_PARK)
         park += [] if found is None else [tool_error(found, sight.truth, carrier)]
     return ours, park
 
 
-def mount_error(trial: Trial, carrier: Carrier, height: float | None = None) -> float:
+def mount_error(trial: MountingTrial, carrier: Carrier, height: float | None = None) -> float:
     """Error [mm] of our own solution; `height` [m] as of `fit_mount`."""
     fit = fit_mount(trial.views, MODEL, carrier, height)
     return tool_error(fit.parent_from_camera, trial.parent_from_camera, carrier)

@@ -16,7 +16,7 @@ from services.vision.rigid import Array, apply, inverse, rigid, step, turn
 
 
 @dataclass(frozen=True)
-class Trial:
+class MountingTrial:
     """Views of a board, and the truth."""
 
     views: list[View]
@@ -35,7 +35,7 @@ def looking(position: Array, at: Array) -> Array:
 def six_joint_trial(
     model: CameraModel, carrier: Carrier, board: TagBoard, count: int, random: np.random.Generator,
     noise: float = 0.3, arm_error: float = 0.0, tilt: float = np.radians(30.0),
-) -> Trial:  # fmt: skip
+) -> MountingTrial:  # fmt: skip
     """Poses of a tool that tilts freely by up to `tilt` [rad]; `noise` [px], `arm_error` 1 is 0.5 mm and 2 mrad."""
     points = board.points()
     if carrier is Carrier.CAMERA:
@@ -49,7 +49,7 @@ def six_joint_trial(
         pose = _drawn(carrier, camera, carried, tilt, random)
         seen = inverse(camera) @ (pose @ carried if carrier is Carrier.BOARD else inverse(pose) @ carried)
         _add(views, model, points, seen, pose, noise, arm_error, random)
-    return Trial(views, camera, carried)
+    return MountingTrial(views, camera, carried)
 
 
 def _drawn(carrier: Carrier, camera: Array, board: Array, tilt: float, random: np.random.Generator) -> Array:
@@ -80,7 +80,7 @@ def _add(
 def level_trial(
     arm: Arm, model: CameraModel, board: TagBoard, count: int, random: np.random.Generator,
     noise: float = 0.3, joint_noise: float = 0.0,
-) -> Trial:  # fmt: skip
+) -> MountingTrial:  # fmt: skip
     """Poses of rm1, which cannot tilt its tool: the camera stands, the board is on the tool and looks up.
 
     `noise` [pixels] of each corner, `joint_noise` [rad] of each joint.
@@ -108,7 +108,7 @@ def level_trial(
         )
         if len(views) > before and (inverse(camera) @ true @ carried)[2, 2] > -0.3:
             views.pop()
-    return Trial(views, camera, carried)
+    return MountingTrial(views, camera, carried)
 
 
 def tool_error(found: Array, truth: Array, carrier: Carrier) -> float:
@@ -118,7 +118,7 @@ def tool_error(found: Array, truth: Array, carrier: Carrier) -> float:
     return 1000.0 * float(np.median(np.linalg.norm(apply(found, seen) - apply(truth, seen), axis=1)))
 
 
-def closed_form(trial: Trial, model: CameraModel, carrier: Carrier, method: int) -> Array | None:
+def closed_form(trial: MountingTrial, model: CameraModel, carrier: Carrier, method: int) -> Array | None:
     """parent_from_camera (4, 4) by one of OpenCV's methods; None where it gives none."""
     poses = [v.base_from_link if carrier is Carrier.CAMERA else inverse(v.base_from_link) for v in trial.views]
     boards = []

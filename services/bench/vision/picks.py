@@ -18,7 +18,7 @@ from schemas.cell import PosePlace
 from schemas.detections import Detections
 from schemas.topics import camera_truth
 from services.arm.cell.cell_file import load_cell
-from services.bench.figures import Figure, Goal, NotMeasured, of_samples
+from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
 from services.runtime.deployment import project_root
 from services.runtime.topics import Latest
 from services.stack.stack import Stack
@@ -32,11 +32,11 @@ POST = (0.025, 0.025, 0.1)  # [m]
 TO_TELL = 10.0  # [s] in which the camera tells where things are now, as it does every second
 FLOOR = {"rm1": 1.65e-3, "parol6": 0.2e-3}  # [m] the nearest full step of the joints, at its worst place
 MM = 1e3
-GOAL = Goal(p99=0.5)  # [mm] of what is beyond the floor
+GOAL = FigureGoal(p99=0.5)  # [mm] of what is beyond the floor
 
 
 @dataclass(frozen=True)
-class Table:
+class PickTable:
     """Where things may stand around an arm, and where it stands aside while the camera looks."""
 
     near: float  # [m] from the base's axis
@@ -45,11 +45,11 @@ class Table:
     aside: str  # a named state
 
 
-TABLES = {"rm1": Table(0.22, 0.34, 1.0, "folded"), "parol6": Table(0.2, 0.3, 0.9, "ready")}
+TABLES = {"rm1": PickTable(0.22, 0.34, 1.0, "folded"), "parol6": PickTable(0.2, 0.3, 0.9, "ready")}
 
 
 @dataclass(frozen=True)
-class Trial:
+class PickTrial:
     """One pick."""
 
     thing: str
@@ -112,7 +112,7 @@ def arm_at_table(robot: str, seed: int) -> Iterator[gemelo.Arm]:
 
 
 @cache
-def picks(robot: str, count: int, seed: int) -> tuple[Trial, ...]:
+def picks(robot: str, count: int, seed: int) -> tuple[PickTrial, ...]:
     """So many things brought from where they are to a free place, each drawn by `seed`."""
     draw = random.Random(seed)
     taken: dict[str, str] = {}  # the place of each thing that was moved
@@ -133,7 +133,7 @@ def picks(robot: str, count: int, seed: int) -> tuple[Trial, ...]:
                 arm.wait_for(partial(_is_since, truth, ended), TO_TELL)
                 assert isinstance(place, PosePlace)
                 off = math.dist(_where(truth.message, ended, thing), place.position[:2])
-            trials.append(Trial(thing, place.name, off, reason))
+            trials.append(PickTrial(thing, place.name, off, reason))
     return tuple(trials)
 
 

@@ -45,7 +45,7 @@ ROUNDS = 20  # of Newton's method
 
 
 @dataclass(frozen=True)
-class Scene:
+class BoardScene:
     """The board at one place before the camera."""
 
     base_from_board: Array  # (4, 4)
@@ -71,7 +71,7 @@ def mount_touch_mm() -> Figure:
     return replace(figure, goal=f"median <= {MOST:g}", met=quantile(ours, 0.5) <= MOST)
 
 
-def scene_of(arm: Arm, random: np.random.Generator) -> Scene:
+def scene_of(arm: Arm, random: np.random.Generator) -> BoardScene:
     """The board flat within the arm's reach, and the arm aside."""
     place = np.array([random.uniform(0.24, 0.3), random.uniform(-0.08, 0.08), 0.002])
     yaw = float(random.uniform(-0.6, 0.6))
@@ -90,10 +90,10 @@ def scene_of(arm: Arm, random: np.random.Generator) -> Scene:
         found = BOARD.find(np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), dtype=np.uint8), model)
         assert found is not None
         seen.append(found)
-    return Scene(board, from_transform(info.parent_from_camera), model, tuple(seen))
+    return BoardScene(board, from_transform(info.parent_from_camera), model, tuple(seen))
 
 
-def errors(scenes: list[Scene], count: int, images: int, stepping: Arm | None = None) -> list[float]:
+def errors(scenes: list[BoardScene], count: int, images: int, stepping: Arm | None = None) -> list[float]:
     """[mm] of `HANDS` people in each scene. `stepping`: the arm, if its tip stands beside the points at whole steps."""
     points = BOARD.points()[spread_points(list(BOARD.points()), count)]
     off = []
