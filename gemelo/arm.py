@@ -14,9 +14,9 @@ from gemelo.frames import Frames
 from gemelo.gripping import Gripped, Gripping, OnGripping
 from gemelo.homing import OnHoming, home
 from gemelo.homing_report import HomingReport
-from gemelo.jog import Jogging, Streaming, jog_command
+from gemelo.jog import JogCommands, Streaming, jog_command
 from gemelo.ledger import Ledger, Requirement, read_ledger
-from gemelo.motion import Motion, Motions, OnMotion
+from gemelo.motion import Motion, MotionRegistry, OnMotion
 from gemelo.picking import OnPicking, Picked, named, pick
 from gemelo.planning import (
     Configurations,
@@ -65,8 +65,8 @@ class Arm:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._requirement, self._control = Requirement(session), Control(session)
-        self._frames, self._motions = Frames(session), Motions(session, self._require_motion)
-        self._jogging, self._streaming = Jogging(session), Streaming(session)
+        self._frames, self._motions = Frames(session), MotionRegistry(session, self._require_motion)
+        self._jogging, self._streaming = JogCommands(session), Streaming(session)
         self._scene, self._device = Scene(session), Device(session, self._control.prepare)
         self._gripping, self._eyes = Gripping(session, self._scene), Eyes(session, self._scene)
 

@@ -27,7 +27,7 @@ REMEDY = "arm.take_control()"
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldControl:
     """One hold of this connection."""
 
     secret: str
@@ -44,7 +44,7 @@ class Control:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._own: Held | None = None
+        self._own: HeldControl | None = None
         self._joined = ""  # the secret of the hold that this node shares, of another process of this user
         self.shares = True  # False: takes no part in the hold of another process of this user
 
@@ -106,7 +106,7 @@ class Control:
         node, secret = self._session.node, secrets.token_hex(32)
         question = ControlTake(name=name or node.name[:40], client=node.token, secret=secret, force=force)
         answer = self._require(self._session.call(CONTROL_TAKE, question, TO_REST), "take")
-        self._own = Held(secret, answer.epoch, answer.number)
+        self._own = HeldControl(secret, answer.epoch, answer.number)
         self._session.changed()
         if not self._session.wait_for(lambda: self.is_mine, TO_BE_TOLD):
             self.require_kept()
@@ -117,7 +117,7 @@ class Control:
 
         >>> arm.control.give()
         Traceback (most recent call last):
-        gemelo.errors.Refused: refused: this connection does not hold control: nothing to give back
+        gemelo.errors.RequestRefused: refused: this connection does not hold control: nothing to give back
         """
         own, self._own = self._own, None
         if own is None:
@@ -223,7 +223,7 @@ def shared_secret(robot: str, deployment: Deployment) -> str:
 
 def join(node: Node, secret: str) -> None:
     """Shares a hold; where that is refused the gateway refuses the motion by name, so nothing is said here."""
-    with suppress(runtime.Refused, runtime.NoAnswer, runtime.BusError):
+    with suppress(runtime.RequestRefused, runtime.NoAnswer, runtime.BusError):
         node.call(CONTROL_JOIN, ControlJoin(client=node.token, secret=secret), TO_ANSWER)
 
 

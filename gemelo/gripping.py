@@ -137,7 +137,7 @@ class Gripping:
         except runtime.GoalRefused as error:
             check = check_of(error, "gripper")
             raise Refused(f"refused: {error}", check=check, code=error.code, reason=str(error)) from error
-        except runtime.Refused as error:
+        except runtime.RequestRefused as error:
             raise Refused(str(error)) from error
         except (runtime.NoAnswer, runtime.BusError) as error:
             raise Lost(str(error)) from error

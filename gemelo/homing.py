@@ -29,7 +29,7 @@ Command = Callable[[DeviceCommand | StopKind], object]
 OnHoming = Callable[[HomingProgress], object]
 
 
-class Homing:
+class HomingWait:
     """The homing of some joints: takes events and states from before the command on. Pure."""
 
     def __init__(self, arm: Description, joints: Sequence[Joint]) -> None:
@@ -105,7 +105,7 @@ def home(
     on_cancel: Callable[[], object] | None,
 ) -> HomingReport:
     """Homes the joints named, or all that can; raises `Refused`, `Aborted`, `Interrupted` or `Lost`."""
-    homing = Homing(session.description, homing_joints(session.description, names))
+    homing = HomingWait(session.description, homing_joints(session.description, names))
     _require_ready(session)
     events = session.node.subscribe(DEVICE_EVENTS, homing.on_event)
     states = session.node.subscribe(DEVICE_STATE, homing.on_state)
@@ -163,7 +163,7 @@ def _require_ready(session: Session) -> None:
 
 def _follow(
     session: Session,
-    homing: Homing,
+    homing: HomingWait,
     command: Command,
     on_progress: OnHoming | None,
     on_cancel: Callable[[], object] | None,
@@ -180,7 +180,7 @@ def _follow(
             told = HomingProgress(homing.phases, homing.steps_off, elapsed)
             on_progress(told)
 
-    watch = Watch(session, homing)
+    watch = HomingEnd(session, homing)
     is_interrupted = False
     try:
         command(HomeCommand(name=tuple(joint.name for joint in homing.joints)))
@@ -202,7 +202,7 @@ def _follow(
     return report
 
 
-def _report(homing: Homing, took: float, watch: Watch) -> HomingReport:
+def _report(homing: HomingWait, took: float, watch: HomingEnd) -> HomingReport:
     """How it ended, after `took` [s]."""
     if homing.is_done:
         return HomingReport(homing.homed, homing.steps_off, took)
@@ -211,10 +211,10 @@ def _report(homing: Homing, took: float, watch: Watch) -> HomingReport:
     return HomingReport(homing.homed, homing.steps_off, took, reason)
 
 
-class Watch:
+class HomingEnd:
     """Why a homing is waited for no longer."""
 
-    def __init__(self, session: Session, homing: Homing) -> None:
+    def __init__(self, session: Session, homing: HomingWait) -> None:
         self._homing, self._node = homing, session.node
         self._status, self._state = session.latest(DEVICE_STATUS), session.latest(DEVICE_STATE)
         self._began = self._node.monotonic()

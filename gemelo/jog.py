@@ -28,7 +28,7 @@ FASTEST = 1.0  # [m/s] of the tool of a desktop arm
 FASTEST_TURN = math.pi  # [rad/s] of its tool
 
 
-class Jogging:
+class JogCommands:
     """One connection's commands, and what the planner says to them."""
 
     def __init__(self, session: Session) -> None:

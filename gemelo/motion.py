@@ -188,7 +188,7 @@ class Motion:
             raise Refused(
                 f"refused by {client.action.server}: {error}", check=check, code=error.code, reason=str(error)
             ) from error
-        except runtime.Refused as error:
+        except runtime.RequestRefused as error:
             raise Refused(str(error)) from error
         except (runtime.NoAnswer, runtime.BusError) as error:
             raise Lost(str(error)) from error
@@ -255,7 +255,7 @@ def check_of(refused: runtime.GoalRefused, usual: str) -> str:
     return "control" if refused.code == FollowErrorCode.NOT_IN_CONTROL else usual
 
 
-class Motions:
+class MotionRegistry:
     """All motions of one connection: sends them, and cancels those that are attached when it closes."""
 
     def __init__(self, session: Session, check: Callable[[], None]) -> None:

@@ -185,7 +185,7 @@ def _as_own_errors() -> Iterator[None]:
     """Raises the errors of the runtime as `Refused` and `Lost`."""
     try:
         yield
-    except runtime.Refused as error:
+    except runtime.RequestRefused as error:
         raise Refused(str(error)) from error
     except (runtime.NoAnswer, runtime.BusError) as error:
         raise Lost(str(error)) from error

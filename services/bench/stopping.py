@@ -25,7 +25,7 @@ from services.arm.model.description import Arm, Joint
 from services.bench.figures import Figure, NotMeasured, quantile, rounded
 from services.bench.scenes import rm1
 from services.virtual_arm.gateway_driver import asked
-from services.virtual_arm.virtual_arm import VirtualArm, Wire
+from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 
 HOLDS = 1000
 QUICK = 100  # holds of `make bench`
@@ -72,7 +72,7 @@ def stopping_distance(holds: int = QUICK) -> Figure:
 def lost_in_motion(seed: int) -> MeasuredHold:
     """One hold in a motion of rm1; the same for the same seed."""
     rng, arm = random.Random(seed), rm1()
-    wire = Wire(delay=rng.uniform(0.0003, 0.01), jitter=rng.uniform(0.0, 0.008), is_ordered=True, spared=())
+    wire = VirtualWire(delay=rng.uniform(0.0003, 0.01), jitter=rng.uniform(0.0, 0.008), is_ordered=True, spared=())
     start = _place(arm, rng)
     rig = VirtualArm(
         wire, seed=seed, start=start, arm=arm, phase_us=rng.randrange(0, 20_000, STEP), step_us=STEP

@@ -20,12 +20,12 @@ from services.arm.cell.camera_model import believed_info, exact_info
 from services.arm.cell.cell_file import Cell
 from services.arm.model.description import Arm
 from services.camera.core import CameraCore
-from services.camera.reader import Reader
-from services.camera.sources.source import Frame, Source
+from services.camera.reader import ImageReader
+from services.camera.sources.source import CameraSource, EncodedImage
 from services.camera.sources.stored import FolderOfImages, Video
 from services.camera.sources.v4l2 import V4l2Camera
 from services.camera.virtual.virtual_camera import VirtualCamera, true_detections
-from services.camera.virtual.world import World
+from services.camera.virtual.world import CameraWorld
 from services.runtime.node import Node
 from services.runtime.node_clock import NodeClock
 
@@ -61,7 +61,7 @@ class Cameras:
 class _Camera:
     """One camera between its thread and the bus."""
 
-    def __init__(self, node: Node, arm: Arm, cell: Cell, record: CameraRecord, world: World | None) -> None:
+    def __init__(self, node: Node, arm: Arm, cell: Cell, record: CameraRecord, world: CameraWorld | None) -> None:
         self._node, self._record, self._cell = node, record, cell
         self._exact, self._world = exact_info(record, arm.base_frame), world
         self._image = node.publisher(camera_image(record.name))
@@ -69,7 +69,7 @@ class _Camera:
         source = self._source(record, cell)
         self._core = CameraCore(record.name, record.fps, source.is_live, node.now())
         self._said, self._reopened = "", 0
-        self.reader = Reader(source, lambda: node.post(self._take), name=record.name)
+        self.reader = ImageReader(source, lambda: node.post(self._take), name=record.name)
         self.reader.start()
 
     def step(self, now: int) -> None:
@@ -85,7 +85,7 @@ class _Camera:
     def _take(self) -> None:
         now = self._node.now()
         for event in self.reader.take():
-            if isinstance(event, Frame):
+            if isinstance(event, EncodedImage):
                 image = self._core.on_frame(event, now)
                 if image is not None:
                     self._image.put(image)
@@ -109,7 +109,7 @@ class _Camera:
             truth = true_detections(self._world.snapshot(), self._exact, things)
             self._node.publisher(camera_truth(self._record.name)).put(truth)
 
-    def _source(self, record: CameraRecord, cell: Cell) -> Source:
+    def _source(self, record: CameraRecord, cell: Cell) -> CameraSource:
         match record.source:
             case V4l2Source():
                 return V4l2Camera(record, record.source)
@@ -122,11 +122,11 @@ class _Camera:
                 return VirtualCamera(record, record.source, self._exact, self._world.snapshot)
 
 
-def _watched_world(node: Node, arm: Arm, cell: Cell) -> World | None:
+def _watched_world(node: Node, arm: Arm, cell: Cell) -> CameraWorld | None:
     """The world that virtual cameras look at, kept up to date; None where there is none of them."""
     if not any(isinstance(record.source, VirtualSource) for record in cell.cameras):
         return None
-    world = World(arm, cell, NodeClock(node, GATEWAY).to_own)
+    world = CameraWorld(arm, cell, NodeClock(node, GATEWAY).to_own)
     node.subscribe(JOINT_STATES, world.on_joint_state)
     node.subscribe(GRIPPER_STATE, world.on_gripper_state)
     node.subscribe(SCENE, world.on_scene)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from schemas.camera import CameraCondition, CameraImage, CameraStatus
-from services.camera.sources.source import CameraFault, Frame
+from services.camera.sources.source import CameraFault, EncodedImage
 
 SILENT = 1.5  # [s] without a new image before it counts as frozen
 SILENT_PERIODS = 4.0  # and as many of its periods at least
@@ -35,7 +35,7 @@ class CameraCore:
         """What is wrong and the remedy; empty while nothing is."""
         return self._text
 
-    def on_frame(self, frame: Frame, now: int) -> CameraImage | None:
+    def on_frame(self, frame: EncodedImage, now: int) -> CameraImage | None:
         """The message of an image; None where it is the same again, of a camera whose images cannot be."""
         if self._is_live and frame.data == self._last:
             return None

@@ -9,24 +9,24 @@ from collections.abc import Callable
 import cv2
 
 from schemas.camera import CameraCondition
-from services.camera.sources.source import CameraFault, Frame, Source
+from services.camera.sources.source import CameraFault, CameraSource, EncodedImage
 
 RETRY = 0.5  # [s] between two attempts to open
 
-Event = Frame | CameraFault
+Event = EncodedImage | CameraFault
 
 
-class Reader:
+class ImageReader:
     """Reads until `stop`; `wake` is called from its thread when there is something to `take`, once until it is taken.
 
     A reader that is slower than the camera loses all but the newest image, and no fault.
     """
 
-    def __init__(self, source: Source, wake: Callable[[], None], name: str = "camera") -> None:
+    def __init__(self, source: CameraSource, wake: Callable[[], None], name: str = "camera") -> None:
         self._source, self._wake = source, wake
         self._lock = threading.Lock()
         self._faults: list[CameraFault] = []
-        self._frame: Frame | None = None
+        self._frame: EncodedImage | None = None
         self._stop, self._anew = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 

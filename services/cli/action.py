@@ -12,7 +12,7 @@ from services.cli.errors import CommandError, ExitCode, unknown, usage
 from services.cli.forms import json_line, print_value
 from services.cli.messages import dump, fields_of, message_of
 from services.cli.parser import Choices, Options, Parser, json_option
-from services.cli.session import Session, connect, share_control
+from services.cli.session import CommandSession, connect, share_control
 from services.cli.terminal import CANCELLING, two_stage_interrupt
 from services.cli.text_table import table
 from services.runtime.errors import GoalRefused
@@ -114,7 +114,7 @@ def goal_text(source: str) -> str:
 
 
 def send_goal(
-    session: Session,
+    session: CommandSession,
     action: Action[Message, Message, Message],
     goal: Message,
     with_feedback: bool,

@@ -13,7 +13,7 @@ from services.cli.errors import CommandError, ExitCode, unknown, usage
 from services.cli.field_path import FieldPath
 from services.cli.forms import Form, count_options, csv_lines, form_options, json_line, yaml_document
 from services.cli.parser import Options, Parser
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.runtime.actions import keys
 from services.runtime.errors import NoAnswer
 
@@ -59,7 +59,7 @@ def run_echo(options: Options) -> ExitCode:
 PARTS = ("status", "feedback", "result")
 
 
-class Said(NamedTuple):
+class GoalStatement(NamedTuple):
     """One thing that was said of a goal."""
 
     part: str  # of PARTS
@@ -95,7 +95,7 @@ class ActionView:
         self.part, self._form = part, form
         self._field = FieldPath(kinds[part], path) if path else None
 
-    def print(self, said: Said) -> bool:
+    def print(self, said: GoalStatement) -> bool:
         """True if it was wanted, and is printed."""
         if self.part not in ("", said.part):
             return False
@@ -108,7 +108,7 @@ class ActionView:
         return True
 
 
-def cancel(session: Session, action: Action[Any, Any, Any], begin: str) -> tuple[str, ...]:
+def cancel(session: CommandSession, action: Action[Any, Any, Any], begin: str) -> tuple[str, ...]:
     """The goals that are being cancelled: those whose id begins so; raises `CommandError` where there is none."""
     goal = _whole(session, action, begin) if begin else ""
     answer = session.node.call(keys.cancel_request(action), CancelRequest(goal_id=goal), timeout=TIMEOUT)
@@ -117,7 +117,7 @@ def cancel(session: Session, action: Action[Any, Any, Any], begin: str) -> tuple
     return answer.canceling
 
 
-def _whole(session: Session, action: Action[Any, Any, Any], begin: str) -> str:
+def _whole(session: CommandSession, action: Action[Any, Any, Any], begin: str) -> str:
     """The id that begins so."""
     latest, until = session.node.latest(keys.status_topic(action)), session.node.monotonic() + TIMEOUT
     while latest.message is None and session.node.monotonic() < until:
@@ -131,7 +131,7 @@ def _whole(session: Session, action: Action[Any, Any, Any], begin: str) -> str:
     return found[0]
 
 
-def echo(session: Session, action: Action[Any, Any, Any], count: int | None, shown: ActionView) -> ExitCode:
+def echo(session: CommandSession, action: Action[Any, Any, Any], count: int | None, shown: ActionView) -> ExitCode:
     """Prints what becomes of each goal, its feedback and its result.
 
     Ends after `count` goals have ended, or so many lines of the only part that is shown.
@@ -139,7 +139,7 @@ def echo(session: Session, action: Action[Any, Any, Any], count: int | None, sho
     known: dict[str, GoalStatus] = {}
     node, counted = session.node, 0
 
-    def say(said: Said) -> None:
+    def say(said: GoalStatement) -> None:
         nonlocal counted
         if count is not None and counted >= count:
             return
@@ -154,12 +154,12 @@ def echo(session: Session, action: Action[Any, Any, Any], count: int | None, sho
             known[goal.goal_id] = goal
             if before is not None and before.status is goal.status:
                 continue
-            say(Said("status", goal.goal_id, goal))
+            say(GoalStatement("status", goal.goal_id, goal))
             if goal.status.is_terminal:
                 say(_result(session, action, goal.goal_id))
 
     def on_feedback(feedback: GoalFeedback) -> None:
-        say(Said("feedback", feedback.goal_id, decode(action.feedback, bytes(feedback.feedback))))
+        say(GoalStatement("feedback", feedback.goal_id, decode(action.feedback, bytes(feedback.feedback))))
 
     node.subscribe(keys.status_topic(action), on_statuses)
     node.subscribe(keys.feedback_topic(action), on_feedback)
@@ -167,9 +167,9 @@ def echo(session: Session, action: Action[Any, Any, Any], count: int | None, sho
     return ExitCode.OK
 
 
-def _result(session: Session, action: Action[Any, Any, Any], goal: str) -> Said:
+def _result(session: CommandSession, action: Action[Any, Any, Any], goal: str) -> GoalStatement:
     try:
         answer = session.node.call(keys.result_request(action), ResultRequest(goal_id=goal), timeout=TIMEOUT)
     except NoAnswer as error:
-        return Said("result", goal, None, str(error))
-    return Said("result", goal, decode(action.result, bytes(answer.result)))
+        return GoalStatement("result", goal, None, str(error))
+    return GoalStatement("result", goal, decode(action.result, bytes(answer.result)))

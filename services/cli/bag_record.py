@@ -14,7 +14,7 @@ from schemas.topics import DESCRIPTION, Delivery, Topic
 from services.cli.bag import one_sentence
 from services.cli.errors import ExitCode, unknown
 from services.cli.parser import Options, Parser, positive_number
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.recordings.channels import Entry
 from services.recordings.mcap_file import McapFile
 from services.recordings.origin import metadata_of
@@ -50,7 +50,7 @@ def run(options: Options) -> ExitCode:
 class Files:
     """The file that is being written, and those before it; each begins with what is latched."""
 
-    def __init__(self, session: Session, options: Options) -> None:
+    def __init__(self, session: CommandSession, options: Options) -> None:
         self.written: list[Path] = []
         self.messages = 0
         self._session, self._options = session, options
@@ -98,7 +98,7 @@ class Files:
         )
 
 
-def record(session: Session, options: Options) -> None:
+def record(session: CommandSession, options: Options) -> None:
     """Writes until the node is stopped or the time is over; raises `CommandError` for a pattern without a topic."""
     files = Files(session, options)
     node = session.node

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options, Parser, positive_integer
-from services.cli.provision import BAUD, Line, open_line
+from services.cli.provision import BAUD, BoardLine, open_line
 from services.runtime.serial_frames import JsonFrame, PacketDecoder, packet, parse_json_frame, sync_frame
 
 BOOT_BAUD = 115_200  # of the chip's own boot loader, which is in ROM
@@ -20,7 +20,7 @@ LOOP = 3  # starts within LISTENING
 MANUAL = "firmware/README.md"
 
 
-class Heard(NamedTuple):
+class MeasuredArrivals(NamedTuple):
     """What came at one rate."""
 
     baud: int
@@ -28,7 +28,7 @@ class Heard(NamedTuple):
     status: bool  # gemelo's firmware has said who it is
 
 
-class Diagnosis(NamedTuple):
+class BoardDiagnosis(NamedTuple):
     """The likely cause, and what to do."""
 
     cause: str
@@ -78,7 +78,7 @@ def run(options: Options) -> ExitCode:
     raise CommandError(f"{finding.cause}: {finding.remedy}")
 
 
-def listen(line: Line, baud: int, seconds: float) -> Heard:
+def listen(line: BoardLine, baud: int, seconds: float) -> MeasuredArrivals:
     """Everything that comes in `seconds` [s], or until gemelo's firmware answers; it is asked meanwhile."""
     packets, data = PacketDecoder(), bytearray()
     deadline, ask = time.monotonic() + seconds, 0.0
@@ -91,47 +91,47 @@ def listen(line: Line, baud: int, seconds: float) -> Heard:
         for frame in packets.feed(piece):
             found = parse_json_frame(frame)
             if found is not None and found.kind is JsonFrame.STATUS:
-                return Heard(baud, bytes(data), True)
-    return Heard(baud, bytes(data), False)
+                return MeasuredArrivals(baud, bytes(data), True)
+    return MeasuredArrivals(baud, bytes(data), False)
 
 
-def diagnose(heard: list[Heard]) -> Diagnosis:
+def diagnose(heard: list[MeasuredArrivals]) -> BoardDiagnosis:
     """The likely cause of what was heard at each rate, and the remedy."""
     for each in heard:
         if each.status:
-            return Diagnosis(
+            return BoardDiagnosis(
                 "gemelo's firmware runs and answers", "`gemelo device provision` tells it its networks", True
             )
     everything = b"\n".join(each.data for each in heard)
     for pattern, cause, remedy in SIGNS:
         if re.search(pattern, everything):
-            return Diagnosis(cause, remedy)
+            return BoardDiagnosis(cause, remedy)
     starts = max(len(START.findall(each.data)) for each in heard)
     if starts >= LOOP:
-        return Diagnosis(
+        return BoardDiagnosis(
             f"it starts again and again, {starts} times in {LISTENING:g} s",
             "disconnect all but USB and look again; then its supply, then flash it anew",
         )
     return _by_amount(heard, starts)
 
 
-def _by_amount(heard: list[Heard], starts: int) -> Diagnosis:
+def _by_amount(heard: list[MeasuredArrivals], starts: int) -> BoardDiagnosis:
     spoken = [each for each in heard if len(each.data) >= SPOKEN]
     if not spoken:
-        return Diagnosis(
+        return BoardDiagnosis(
             "it says nothing",
             "press EN while this listens; then: is this its port, is the cable one for data, is it the socket marked "
             "UART, and is EN held low by something wired to it?",
         )
     if starts:
-        return Diagnosis("its boot loader runs, gemelo's firmware does not answer", f"flash it anew: {MANUAL}")
+        return BoardDiagnosis("its boot loader runs, gemelo's firmware does not answer", f"flash it anew: {MANUAL}")
     if any(_share_of_text(each.data) >= READABLE for each in spoken):
-        return Diagnosis("another firmware speaks there", f"flash gemelo's: {MANUAL}, Build and flash")
+        return BoardDiagnosis("another firmware speaks there", f"flash gemelo's: {MANUAL}, Build and flash")
     rates = ", ".join(str(each.baud) for each in heard)
-    return Diagnosis(f"what it says is no text at {rates} baud", "another --baud, or a bad cable or ground")
+    return BoardDiagnosis(f"what it says is no text at {rates} baud", "another --baud, or a bad cable or ground")
 
 
-def lines_of(heard: list[Heard], most: int = 6) -> list[str]:
+def lines_of(heard: list[MeasuredArrivals], most: int = 6) -> list[str]:
     """The last readable lines, without control characters."""
     readable = [each.data for each in heard if each.data and _share_of_text(each.data) >= READABLE]
     text = b"\n".join(readable).decode("ascii", "replace")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from schemas.deployment import Deployment
 from services.arm.model.description import load_arm
-from services.cli.credentials import WIFI_PASSWORD, Credentials, certificate, password, require_sound
+from services.cli.credentials import WIFI_PASSWORD, CredentialsChange, certificate, password, require_sound
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.provision import BAUD, PASSWORDS, provision
@@ -67,9 +67,9 @@ def _folder(options: Options, deployment: Deployment) -> Path:
     return Path(deployment.mqtt.secure_folder or project_root() / FOLDER)
 
 
-def credentials_of(folder: Path, device: str, uri: str, wifi: str | None = None) -> Credentials:
+def credentials_of(folder: Path, device: str, uri: str, wifi: str | None = None) -> CredentialsChange:
     """What a board needs to join the broker at `uri`; raises `AccessError`."""
-    return Credentials(
+    return CredentialsChange(
         device=device,
         wifi_ssid=wifi,
         wifi_password=None if wifi is None else password("Wi-Fi password", WIFI_PASSWORD, os.environ),

@@ -19,7 +19,7 @@ from services.arm.cell.cell_file import Cell, deployed_cell
 from services.arm.errors import DescriptionError
 from services.cli.errors import CommandError, ExitCode, unknown, usage
 from services.cli.parser import Choices, Options, Parser, json_option
-from services.cli.session import Session, connect, load_robot
+from services.cli.session import CommandSession, connect, load_robot
 from services.cli.text_table import table
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def _seen_of(robot: Robot, cell: Cell) -> dict[str, CameraReport]:
         return {}
 
 
-def _seen(session: Session, name: str, needs_image: bool = False) -> CameraReport:
+def _seen(session: CommandSession, name: str, needs_image: bool = False) -> CameraReport:
     """What comes within `PATIENCE`."""
     heard: dict[str, Any] = {}
     subscriptions: list[Any] = [

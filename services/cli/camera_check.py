@@ -34,7 +34,7 @@ REMEDIES = {
 DOWN = (0.0, 0.0, -1.0)
 
 
-class Pointing(NamedTuple):
+class TagPointing(NamedTuple):
     """One tag that was pointed at."""
 
     seen: Seen
@@ -67,7 +67,7 @@ def run(options: Options) -> ExitCode:
     return ExitCode.OK
 
 
-def _pointings(arm: Arm, camera: Subject, height: float, most: int) -> Iterator[Pointing]:
+def _pointings(arm: Arm, camera: Subject, height: float, most: int) -> Iterator[TagPointing]:
     """Looks once, while the arm is out of the way, then points."""
     with _in_scene(arm, camera.name) as seen:
         tags = [each for each in seen if each.kind == "tag" and not each.trouble][:most]
@@ -82,7 +82,7 @@ def _pointings(arm: Arm, camera: Subject, height: float, most: int) -> Iterator[
                 arm.move(position=(x, y, z + height), along=DOWN)
             question = f"how far beside the middle of {each.name} is the tip, along x and y of the base?"
             said = ask_offset(f"{question} `1.5mm -0.4mm`; Enter: not at all")
-            yield Pointing(each, said, step_floor(arm))
+            yield TagPointing(each, said, step_floor(arm))
 
 
 @contextmanager
@@ -96,7 +96,7 @@ def _in_scene(arm: Arm, camera: str) -> Iterator[tuple[Seen, ...]]:
             arm.scene.remove(name)
 
 
-def report(camera: Subject, pointings: list[Pointing]) -> Accuracy:
+def report(camera: Subject, pointings: list[TagPointing]) -> Accuracy:
     """Prints each pointing, what was to be expected, and the cause with its remedy."""
     for each in pointings:
         x, y = (1e3 * value for value in each.offset)

@@ -20,7 +20,7 @@ from services.arm.cell.camera_file import CAMERA_FILE, write_measured
 from services.arm.cell.cell_file import Cell, deployed_cell
 from services.arm.errors import DescriptionError
 from services.cli.errors import CommandError, unknown, usage
-from services.cli.session import Session
+from services.cli.session import CommandSession
 from services.runtime.deployment import load_deployment
 from services.vision.rigid import Array, to_transform
 from services.vision.tags import GreyImage
@@ -147,7 +147,7 @@ def from_folder(path: Path, size: tuple[int, int]) -> Iterator[GreyImage]:
         yield np.asarray(image, dtype=np.uint8)
 
 
-def from_bus(session: Session, name: str) -> Iterator[GreyImage]:
+def from_bus(session: CommandSession, name: str) -> Iterator[GreyImage]:
     """The newest image, again and again; raises `CommandError` where none comes."""
     newest: list[CameraImage] = []
     subscription = session.node.subscribe(camera_image(name), newest.append)
@@ -166,7 +166,7 @@ def from_bus(session: Session, name: str) -> Iterator[GreyImage]:
         subscription.close()
 
 
-def info_of(session: Session, name: str) -> CameraInfo:
+def info_of(session: CommandSession, name: str) -> CameraInfo:
     """What is known of the camera's lens; raises `CommandError` where nobody tells it."""
     heard: list[CameraInfo] = []
     subscription = session.node.subscribe(camera_info(name), heard.append)

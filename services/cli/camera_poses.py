@@ -28,7 +28,7 @@ from services.vision.boards import Sighting, TagBoard
 from services.vision.calibration.link_pose import link_pose
 from services.vision.calibration.mount import FEWEST_POSES, MountFit, fit_mount
 from services.vision.calibration.poses import Belief, Chosen, choose_poses
-from services.vision.calibration.reprojection import Carrier, View
+from services.vision.calibration.reprojection import BoardView, Carrier
 from services.vision.calibration.shots import one_of, without_hidden
 from services.vision.camera_model import model_of
 from services.vision.rigid import Array, from_transform, rigid, to_transform
@@ -125,7 +125,7 @@ def measure(arm: Arm, eye: Eye, task: Task, is_agreed: bool) -> MountFit:
     start = _standing(arm)
     link_at = link_pose(arm.description, task.link)
     try:
-        first = View(link_at(start), _look(eye, task))
+        first = BoardView(link_at(start), _look(eye, task))
     except ValueError as error:
         raise CommandError(
             f"{error} where the arm stands now: bring it to where {task.camera.name} sees them (`gemelo jog`, or the "
@@ -231,10 +231,10 @@ def _rigid_links(arm: Description, link: str) -> list[str]:
     return sorted(found)
 
 
-def _drive(arm: Arm, eye: Eye, task: Task, poses: Sequence[Array]) -> tuple[list[View], list[int]]:
+def _drive(arm: Arm, eye: Eye, task: Task, poses: Sequence[Array]) -> tuple[list[BoardView], list[int]]:
     """What is seen from each pose, and which poses those are, counted from 1; the others are named."""
     link_at = link_pose(arm.description, task.link)
-    views: list[View] = []
+    views: list[BoardView] = []
     numbers: list[int] = []
     for number, joints in enumerate(poses, 1):
         try:
@@ -247,7 +247,7 @@ def _drive(arm: Arm, eye: Eye, task: Task, poses: Sequence[Array]) -> tuple[list
             print(f"pose {number} is left out: {error}", flush=True)
             continue
         print(f"pose {number}: {len(sighting.points) // 4} tags", flush=True)
-        views.append(View(link_at(_standing(arm)), sighting))
+        views.append(BoardView(link_at(_standing(arm)), sighting))
         numbers.append(number)
     return views, numbers
 
@@ -259,7 +259,7 @@ def _look(eye: Eye, task: Task) -> Sighting:
     return without_hidden(seen, model)
 
 
-def solved(views: list[View], numbers: Sequence[int], belief: Belief) -> MountFit:
+def solved(views: list[BoardView], numbers: Sequence[int], belief: Belief) -> MountFit:
     """The camera's place from views of the poses `numbers`, 0 being the first one; raises `CommandError`."""
     try:
         fit = fit_mount(views, belief.model, belief.carrier, belief.height)

@@ -21,7 +21,7 @@ LONGEST_PEM = 2048  # [bytes] that a board keeps of one
 WPA = (8, 63)  # [characters] of a passphrase
 
 
-class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+class CredentialsChange(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The JSON of `provision` in firmware/PROTOCOL.md; None leaves what the device has."""
 
     device: str | None = None
@@ -49,7 +49,7 @@ class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
         return ", ".join([*said, *(f"{name} given" for name in hidden)])
 
 
-def require_sound(credentials: Credentials) -> Credentials:
+def require_sound(credentials: CredentialsChange) -> CredentialsChange:
     """Returns `credentials`; raises `CommandError` for values that no board could use."""
     ssid, uri = credentials.wifi_ssid, credentials.mqtt_uri
     if ssid is not None and len(ssid.encode()) > LONGEST_SSID:
@@ -62,7 +62,7 @@ def require_sound(credentials: Credentials) -> Credentials:
         raise usage(f"--serial-baud {credentials.serial_baud} is not within {BAUD[0]} to {BAUD[1]}")
     if (credentials.mqtt_certificate is None) != (credentials.mqtt_key is None):
         raise usage("--mqtt-cert and --mqtt-key belong together: a certificate is worth nothing without its key")
-    if credentials == Credentials():
+    if credentials == CredentialsChange():
         raise usage("nothing to tell the device: give --device, --wifi-ssid, --mqtt-uri, ... or --factory-reset")
     return credentials
 

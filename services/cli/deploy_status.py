@@ -23,7 +23,7 @@ from services.hosts.layout import BROKER, ROLE_OF, ROUTER
 from services.hosts.status import SeenNode, SeenRobot, ServiceState, ServiceStatus, is_well, site_status
 from services.runtime.clock_offset import ClockOffset
 from services.runtime.deployment import load_deployment
-from services.runtime.errors import BusError, NoAnswer, Refused
+from services.runtime.errors import BusError, NoAnswer, RequestRefused
 from services.runtime.node import Node
 from services.runtime.node_clock import ask_about
 
@@ -122,7 +122,7 @@ def seen_nodes(node: Node) -> dict[str, SeenNode]:
     for name in sorted(each for each in node.alive() if not each.startswith("cli-")):
         try:
             found[name] = SeenNode(*ask_about(node, name, TO_ANSWER))
-        except (NoAnswer, Refused):
+        except (NoAnswer, RequestRefused):
             found[name] = SeenNode()
     return found
 

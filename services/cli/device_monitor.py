@@ -17,7 +17,7 @@ from services.cli.device_status import text_of
 from services.cli.errors import ExitCode
 from services.cli.forms import Form, count_options, form_of, form_options
 from services.cli.parser import Options, Parser
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.cli.terminal import LiveBlock
 from services.cli.units import positive_seconds
 
@@ -41,14 +41,14 @@ def run(options: Options) -> ExitCode:
         return monitor(session, options.count, options.duration, form, is_live=form is timed_line)
 
 
-class Change(msgspec.Struct, frozen=True):
+class MonitorLine(msgspec.Struct, frozen=True):
     """One line of --json and --csv."""
 
     stamp: int  # [ns] UNIX time of its reception
     text: str
 
 
-def timed_line(change: Change) -> str:
+def timed_line(change: MonitorLine) -> str:
     """A change for a person, with the time of day."""
     time = datetime.datetime.fromtimestamp(change.stamp / 1e9).strftime("%H:%M:%S.%f")[:-3]
     return f"{time} {change.text}"
@@ -57,7 +57,7 @@ def timed_line(change: Change) -> str:
 class Monitor:
     """Prints every change once, at most `count` of them."""
 
-    def __init__(self, session: Session, block: LiveBlock, count: int | None, form: Form) -> None:
+    def __init__(self, session: CommandSession, block: LiveBlock, count: int | None, form: Form) -> None:
         self._session, self._block, self._count, self._form = session, block, count, form
         self._status: DeviceStatus | None = None
         self._state: DeviceState | None = None
@@ -87,13 +87,13 @@ class Monitor:
             if self._count is not None and self._said >= self._count:
                 return
             self._said += 1
-            self._block.say(self._form(Change(now, line)))
+            self._block.say(self._form(MonitorLine(now, line)))
         if self._count is not None and self._said >= self._count:
             self._session.node.stop()
 
 
 def monitor(
-    session: Session, count: int | None, duration: float | None, form: Form = timed_line, is_live: bool = True
+    session: CommandSession, count: int | None, duration: float | None, form: Form = timed_line, is_live: bool = True
 ) -> ExitCode:
     """Runs until Ctrl-C, `count` lines or `duration` [s]; `is_live`: the device's status is shown below the lines."""
     block = LiveBlock() if is_live else LiveBlock(is_live=False)

@@ -12,7 +12,7 @@ from schemas.device import DeviceConfiguration, DeviceState, DeviceStatus, Senso
 from schemas.device_faults import FaultDescription, explain
 from schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATE, DEVICE_STATUS, SENSORS
 from services.cli.errors import CommandError, ExitCode
-from services.cli.session import Session, other_robots
+from services.cli.session import CommandSession, other_robots
 
 if TYPE_CHECKING:
     from services.arm.model.description import Arm
@@ -26,7 +26,7 @@ OPEN_LOOP = "SENT, NOT VERIFIED: this board does not say what it has executed; t
 class DeviceView:
     """The newest message of every topic about the device."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: CommandSession) -> None:
         self.session = session
         node = session.node
         self.status = node.latest(DEVICE_STATUS)

@@ -16,7 +16,7 @@ from services.cli.device_snapshot import (
 )
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.cli.text_table import table
 
 FOR_SENSORS = 0.5  # [s] that `gemelo device status` waits for readings
@@ -39,7 +39,7 @@ def run_sensors(options: Options) -> ExitCode:
         return sensors(session, options.json)
 
 
-def status(session: Session, as_json: bool) -> ExitCode:
+def status(session: CommandSession, as_json: bool) -> ExitCode:
     """Prints the snapshot of the device."""
     view = DeviceView(session)
     view.require_heard()
@@ -50,7 +50,7 @@ def status(session: Session, as_json: bool) -> ExitCode:
     return ExitCode.OK
 
 
-def sensors(session: Session, as_json: bool) -> ExitCode:
+def sensors(session: CommandSession, as_json: bool) -> ExitCode:
     """Prints every sensor's reading; raises `CommandError` if there is none."""
     if not session.arm.sensors:
         raise CommandError("robot.toml has no [[sensor]], so there is none to read")

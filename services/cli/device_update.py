@@ -11,7 +11,7 @@ from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.provision import BAUD, open_line
 from services.cli.terminal import LiveBlock
-from services.cli.update_transfer import SerialWire, Transfer, UpdateStatus, Wire, await_status, mqtt_wire
+from services.cli.update_transfer import SerialWire, Transfer, UpdateStatus, UpdateWire, await_status, mqtt_wire
 from services.credentials.private_files import AccessError, require_private
 from services.mqtt.access import gateway_access
 from services.runtime.deployment import load_deployment, project_root
@@ -84,7 +84,7 @@ def read_image(file: Path) -> tuple[bytes, ImageHeader]:
 
 
 @contextmanager
-def wire_of(options: Options) -> Iterator[Wire]:
+def wire_of(options: Options) -> Iterator[UpdateWire]:
     """Yields the wire that was asked for; raises `CommandError`."""
     if options.serial is not None:
         with open_line(options.serial, options.baud) as line:
@@ -100,7 +100,7 @@ def wire_of(options: Options) -> Iterator[Wire]:
         yield wire
 
 
-def update(wire: Wire, image: bytes, signature: bytes) -> ExitCode:
+def update(wire: UpdateWire, image: bytes, signature: bytes) -> ExitCode:
     """Brings the image there and waits for what becomes of it; raises `CommandError` unless it runs in the end."""
     before = await_status(wire, TO_ANSWER, lambda _: True)
     if before is None:

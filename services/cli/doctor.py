@@ -23,7 +23,7 @@ from schemas.topics import DEVICE_STATE, DEVICE_STATUS
 from services.cli.errors import CommandError, ExitCode
 from services.cli.node import TIMEOUT, living
 from services.cli.parser import Options
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.cli.text_table import table
 from services.cli.version import gemelo_version, version_text
 from services.credentials.private_files import AccessError
@@ -182,7 +182,7 @@ def _twin() -> Iterator[Diagnosis]:
         yield Diagnosis(Verdict.ERROR, "twin", str(error))
 
 
-def twin(session: Session) -> Iterator[Diagnosis]:
+def twin(session: CommandSession) -> Iterator[Diagnosis]:
     """Of the nodes, the device and the clocks."""
     node = session.node
     statuses: list[DeviceStatus] = []
@@ -198,7 +198,7 @@ def twin(session: Session) -> Iterator[Diagnosis]:
     yield clocks({name: clock for name, (_, clock) in told.items() if clock is not None})
 
 
-def _told(session: Session, nodes: Iterable[str]) -> dict[str, tuple[NodeInfo, ClockOffset | None]]:
+def _told(session: CommandSession, nodes: Iterable[str]) -> dict[str, tuple[NodeInfo, ClockOffset | None]]:
     """What each node says of itself, and its clock."""
     from services.runtime.errors import NoAnswer  # 0.1 s, for a twin that runs
     from services.runtime.node_clock import ask_about

@@ -16,7 +16,7 @@ from schemas.joints import JointTargets
 from schemas.topics import DEVICE_ECHO, JOINT_STATES, JOINT_TARGETS
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.parser import Options, Parser, positive_integer, positive_number
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.cli.text_table import table
 from services.cli.units import parse_joints
 from services.runtime.deployment import project_root
@@ -68,7 +68,7 @@ def run(options: Options) -> ExitCode:
 
 
 def measure(
-    session: Session, rate: float, count: int, swing: Callable[[float], None]
+    session: CommandSession, rate: float, count: int, swing: Callable[[float], None]
 ) -> tuple[list[float | None], float]:
     """Round trips [s] at `rate` [1/s], None for a lost one, and what all of them took [s]; Ctrl-C ends it early."""
     node, trips = session.node, list[float | None]()
@@ -91,7 +91,7 @@ def _trip(answer: EchoResponse, is_first: bool) -> float | None:
     return answer.round_trip if answer.answered else None
 
 
-def swinging(session: Session, assignment: str) -> Callable[[float], None]:
+def swinging(session: CommandSession, assignment: str) -> Callable[[float], None]:
     """Streams a sine about where the joint is, at each time [s]; raises `CommandError` where it is none."""
     ((name, amount),) = parse_joints([assignment], session.arm.joints).items()
     states, targets = session.node.latest(JOINT_STATES), session.node.publisher(JOINT_TARGETS)

@@ -12,11 +12,11 @@ from schemas.system import Empty, TopicInterface
 from schemas.topics import TOPICS, Topic
 from services.cli.errors import unknown
 from services.cli.node import TIMEOUT, living
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.recordings.table import living_topic
 from services.runtime.deployment import load_deployment
 from services.runtime.endpoints import interfaces_request
-from services.runtime.errors import NoAnswer, Refused
+from services.runtime.errors import NoAnswer, RequestRefused
 
 KNOWN = {topic.key: topic for topic in TOPICS}
 
@@ -27,7 +27,7 @@ def known_topic(name: str) -> Topic[Any] | None:
 
 
 @contextmanager
-def connected(name: str) -> Iterator[tuple[Session, Topic[Any]]]:
+def connected(name: str) -> Iterator[tuple[CommandSession, Topic[Any]]]:
     """Yields a session and the topic of that key; raises `CommandError` with the nearest key where there is none."""
     if known_topic(name) is None and not router_listens():  # nobody can say more than the table
         raise unknown("topic", name, list(KNOWN))
@@ -53,7 +53,7 @@ def router_listens() -> bool:
     return True
 
 
-def topic_on(session: Session, name: str) -> Topic[Any]:
+def topic_on(session: CommandSession, name: str) -> Topic[Any]:
     """The topic of that key, of our table or of a living node; raises `CommandError` with the nearest key."""
     known = known_topic(name)
     if known is not None:
@@ -65,7 +65,7 @@ def topic_on(session: Session, name: str) -> Topic[Any]:
     raise unknown("topic", name, [*KNOWN, *(topic.key for topic in others)])
 
 
-def other_topics(session: Session) -> list[Topic[Any]]:
+def other_topics(session: CommandSession) -> list[Topic[Any]]:
     """The topics of all living nodes that our table does not have, by key."""
     found: dict[str, Topic[Any]] = {}
     for name in living(session):
@@ -75,8 +75,8 @@ def other_topics(session: Session) -> list[Topic[Any]]:
     return [found[key] for key in sorted(found)]
 
 
-def _interfaces(session: Session, name: str) -> tuple[TopicInterface, ...]:
+def _interfaces(session: CommandSession, name: str) -> tuple[TopicInterface, ...]:
     try:
         return session.node.call(interfaces_request(name), Empty(), timeout=TIMEOUT).topics
-    except (NoAnswer, Refused):  # it has just ended, or is older
+    except (NoAnswer, RequestRefused):  # it has just ended, or is older
         return ()

@@ -9,7 +9,7 @@ from schemas.topics import LOG
 from services.cli.errors import ExitCode, unknown
 from services.cli.forms import Form, count_options, form_of, form_options
 from services.cli.parser import Options, Parser
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 
 
 def log_options(parser: Parser) -> None:
@@ -41,7 +41,7 @@ def line_of(record: LogRecord) -> str:
     return f"{time} {record.level.name:<7} {record.node}: {record.text}"
 
 
-def follow(session: Session, level: LogLevel, node: str | None, count: int | None, form: Form) -> ExitCode:
+def follow(session: CommandSession, level: LogLevel, node: str | None, count: int | None, form: Form) -> ExitCode:
     """Prints records of `level` and above until Ctrl-C, or `count` of them."""
     printed = 0
 

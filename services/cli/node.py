@@ -13,7 +13,7 @@ from services.cli.errors import CommandError, ExitCode, unknown
 from services.cli.forms import print_value
 from services.cli.messages import dump
 from services.cli.parser import Options, Parser, json_option
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.cli.text_table import table
 from services.runtime.clock_offset import ClockOffset
 
@@ -45,13 +45,13 @@ def run_info(options: Options) -> ExitCode:
     return print_value(info, options.json, lambda: dump(info))
 
 
-def information_of(session: Session, name: str) -> NodeInfo:
+def information_of(session: CommandSession, name: str) -> NodeInfo:
     """The keys that a node publishes, subscribes to and serves; raises `CommandError` if no such node is alive."""
     require_alive(session, name)
     return session.node.call(Request(f"@node/{name}/info", Empty, NodeInfo, name, ""), Empty(), timeout=TIMEOUT)
 
 
-def told_information_of(session: Session, name: str) -> NodeInfo | None:
+def told_information_of(session: CommandSession, name: str) -> NodeInfo | None:
     """As `information_of`; None of a node that does not answer, or has just ended."""
     from services.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
 
@@ -61,7 +61,7 @@ def told_information_of(session: Session, name: str) -> NodeInfo | None:
         return None
 
 
-def require_alive(session: Session, name: str) -> None:
+def require_alive(session: CommandSession, name: str) -> None:
     """Raises `CommandError` with the nearest name if no such node is alive."""
     alive = living(session)
     if name not in alive:
@@ -69,7 +69,7 @@ def require_alive(session: Session, name: str) -> None:
         raise CommandError(str(error), ExitCode.FAILED)
 
 
-def living(session: Session) -> list[str]:
+def living(session: CommandSession) -> list[str]:
     """The nodes that are alive, other than this command's own."""
     return [name for name in sorted(session.node.alive()) if not name.startswith("cli-")]
 
@@ -82,7 +82,7 @@ class NodeState(msgspec.Struct, frozen=True, kw_only=True):
     clock: ClockOffset | None = None  # against this host's
 
 
-def standings(session: Session) -> list[NodeState]:
+def standings(session: CommandSession) -> list[NodeState]:
     """Of every living node."""
     from services.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
     from services.runtime.node_clock import ask_about

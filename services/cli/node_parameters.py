@@ -12,11 +12,11 @@ from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.node import living
 from services.cli.param import change_parameter, parameter_of, parameters_of, require_in_range, value_of, written
 from services.cli.parser import Options, Parser
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.runtime.saved_parameters import toml
 
 
-class Change(NamedTuple):
+class NewValue(NamedTuple):
     """A parameter of a node, and the value that it is to have."""
 
     node: str
@@ -51,7 +51,7 @@ def run_load(options: Options) -> ExitCode:
     return ExitCode.OK
 
 
-def dumped(session: Session, names: list[str]) -> str:
+def dumped(session: CommandSession, names: list[str]) -> str:
     """A table for every node that has parameters; ranges and meanings are comments."""
     blocks = []
     for name in names or living(session):
@@ -77,11 +77,11 @@ def read(file: str) -> dict[str, dict[str, object]]:
     return tables
 
 
-def load(session: Session, tables: dict[str, dict[str, object]], save: bool = False) -> list[str]:
+def load(session: CommandSession, tables: dict[str, dict[str, object]], save: bool = False) -> list[str]:
     """Sets what differs, or saves all; a line for each. Where one is refused, those before it are set back."""
     changes = [_change(session, node, name, value) for node, table in tables.items() for name, value in table.items()]
     lines: list[str] = []
-    done: list[Change] = []
+    done: list[NewValue] = []
     for change in changes:
         if change.value == change.parameter.value and not save:
             continue
@@ -95,7 +95,7 @@ def load(session: Session, tables: dict[str, dict[str, object]], save: bool = Fa
     return lines or ["every parameter has that value already"]
 
 
-def _change(session: Session, node: str, name: str, value: object) -> Change:
+def _change(session: CommandSession, node: str, name: str, value: object) -> NewValue:
     """Checked for its type and its range, before anything is set."""
     parameter = parameter_of(session, node, name)
     if not isinstance(value, bool | int | float | str):
@@ -104,4 +104,4 @@ def _change(session: Session, node: str, name: str, value: object) -> Change:
         raise usage(f'{value!r} is not a {parameter.type} for parameter "{name}" of {node}')
     wanted = value_of(parameter, written(value))
     require_in_range(node, parameter, wanted)
-    return Change(node, parameter, wanted)
+    return NewValue(node, parameter, wanted)

@@ -14,7 +14,7 @@ from services.cli.forms import print_value
 from services.cli.messages import dump
 from services.cli.node import TIMEOUT, living, node_option, require_alive
 from services.cli.parser import Options, Parser, json_option
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.cli.text_table import table
 
 
@@ -27,7 +27,7 @@ def parameters_options(parser: Parser) -> None:
 def run_parameters(options: Options) -> ExitCode:
     """Prints the table of parameters."""
     with connect() as session:
-        found = [Named(name, parameters_of(session, name)) for name in options.nodes or living(session)]
+        found = [NodeParameters(name, parameters_of(session, name)) for name in options.nodes or living(session)]
     rows = [{"node": name} | msgspec.structs.asdict(each) for name, declared in found for each in declared]
     return print_value(rows, options.json, lambda: parameter_table(found))
 
@@ -72,21 +72,21 @@ def run_set(options: Options) -> ExitCode:
     return ExitCode.OK
 
 
-def parameters_of(session: Session, name: str) -> tuple[Parameter, ...]:
+def parameters_of(session: CommandSession, name: str) -> tuple[Parameter, ...]:
     """The declared parameters of a node."""
     require_alive(session, name)
     request = Request(f"@node/{name}/parameters/list", Empty, Parameters, name, "")
     return session.node.call(request, Empty(), timeout=TIMEOUT).parameters
 
 
-class Named(NamedTuple):
+class NodeParameters(NamedTuple):
     """The parameters of a node."""
 
     node: str
     parameters: tuple[Parameter, ...]
 
 
-def parameter_table(found: Iterable[Named]) -> str:
+def parameter_table(found: Iterable[NodeParameters]) -> str:
     """The table for a person."""
     rows = [
         (name, each.name, each.type, written(each.value), written(each.default), range_of(each), each.description)
@@ -108,7 +108,7 @@ def range_of(parameter: Parameter) -> str:
     return f"{low}..{high}" if low or high else "-"
 
 
-def parameter_of(session: Session, node: str, name: str) -> Parameter:
+def parameter_of(session: CommandSession, node: str, name: str) -> Parameter:
     """One parameter of a node; raises `CommandError` with the nearest name."""
     known = {parameter.name: parameter for parameter in parameters_of(session, node)}
     if name not in known:
@@ -118,14 +118,14 @@ def parameter_of(session: Session, node: str, name: str) -> Parameter:
     return known[name]
 
 
-def set_parameter(session: Session, node: str, name: str, text: str, save: bool = False) -> str:
+def set_parameter(session: CommandSession, node: str, name: str, text: str, save: bool = False) -> str:
     """Sets a parameter and returns a line about it; the node itself refuses a value out of range."""
     parameter = parameter_of(session, node, name)
     return change_parameter(session, node, parameter, value_of(parameter, text), save)
 
 
 def change_parameter(
-    session: Session, node: str, parameter: Parameter, value: ParameterValue, save: bool = False
+    session: CommandSession, node: str, parameter: Parameter, value: ParameterValue, save: bool = False
 ) -> str:
     """Sets `parameter` of `node` to `value`, also for later starts if `save`, and returns a line about it."""
     request = Request(f"@node/{node}/parameters/set", SetParameter, Parameter, node, "")

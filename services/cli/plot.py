@@ -15,7 +15,7 @@ from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.field_path import FieldPath, leaves
 from services.cli.living_topics import connected, known_topic, topic_on
 from services.cli.parser import Choices, Options, Parser, positive_integer
-from services.cli.session import Session
+from services.cli.session import CommandSession
 from services.cli.terminal import LiveBlock
 from services.cli.units import positive_seconds
 
@@ -90,7 +90,7 @@ class Field:
             raise CommandError(f"{self.topic.key}.{self._path} has no number: `gemelo topic echo` shows what it holds")
 
 
-class Sample(NamedTuple):
+class CurvePoints(NamedTuple):
     """Where a curve's points are kept."""
 
     unit: str
@@ -102,7 +102,7 @@ class Plot:
 
     def __init__(self, window: float) -> None:
         self._window = window
-        self._curves: dict[str, Sample] = {}
+        self._curves: dict[str, CurvePoints] = {}
         self.began: float | None = None  # [s] when the first point came
 
     def add(self, name: str, unit: str, time: float, value: float) -> None:
@@ -111,7 +111,7 @@ class Plot:
             raise CommandError(
                 f"{name} is more than the {len(COLOURS)} curves that can be told apart: name fewer fields"
             )
-        points = self._curves.setdefault(name, Sample(unit, deque(maxlen=LARGEST))).points
+        points = self._curves.setdefault(name, CurvePoints(unit, deque(maxlen=LARGEST))).points
         points.append((time, value))
         while points[0][0] < time - self._window:
             points.popleft()
@@ -137,7 +137,7 @@ class Plot:
 
 
 def plot(
-    session: Session, fields: list[Field], window: float, is_once: bool = False, count: int | None = None,
+    session: CommandSession, fields: list[Field], window: float, is_once: bool = False, count: int | None = None,
     block: LiveBlock | None = None,
 ) -> ExitCode:  # fmt: skip
     """Draws until Ctrl-C, until the window [s] is full or until `count` messages have come; the last picture stays."""

@@ -15,7 +15,7 @@ from services.cli.credentials import (
     MQTT_DEVICE_PASSWORD,
     MQTT_PASSWORD,
     WIFI_PASSWORD,
-    Credentials,
+    CredentialsChange,
     certificate,
     password,
     private_key,
@@ -74,9 +74,9 @@ def run(options: Options) -> ExitCode:
         if any(each is not None for each in given):
             raise usage("--factory-reset forgets everything: tell the device anew afterwards, in a command of its own")
         confirm(f"The device at {options.serial} forgets its networks, passwords and configuration.", options.yes)
-        return provision(options.serial, options.baud, Credentials(factory_reset=True))
+        return provision(options.serial, options.baud, CredentialsChange(factory_reset=True))
     wifi, mqtt = options.wifi_ssid, options.mqtt_user
-    credentials = Credentials(
+    credentials = CredentialsChange(
         device=options.device,
         wifi_ssid=wifi,
         mqtt_uri=options.mqtt_uri,
@@ -94,7 +94,7 @@ def run(options: Options) -> ExitCode:
     return provision(options.serial, options.baud, require_sound(credentials))
 
 
-class Line(Protocol):
+class BoardLine(Protocol):
     """A serial line; `read` waits a moment at most."""
 
     def write(self, data: bytes, /) -> int | None: ...
@@ -115,7 +115,7 @@ class BoardStatus(msgspec.Struct, frozen=True):
     firmware: str = ""
 
 
-def provision(port: str, baud: int, credentials: Credentials) -> ExitCode:
+def provision(port: str, baud: int, credentials: CredentialsChange) -> ExitCode:
     """Sends the credentials and prints the answer; raises `CommandError` if the board refuses or is silent."""
     with open_line(port, baud) as line:
         exchange = BoardExchange(line)
@@ -135,7 +135,7 @@ def provision(port: str, baud: int, credentials: Credentials) -> ExitCode:
 class BoardExchange:
     """The exchange of frames with one board."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: BoardLine) -> None:
         self._line = line
         self._packets = PacketDecoder()
 
@@ -178,7 +178,7 @@ def _decoded(text: bytes, kind: type[T]) -> T:
 
 
 @contextmanager
-def open_line(port: str, baud: int) -> Iterator[Line]:
+def open_line(port: str, baud: int) -> Iterator[BoardLine]:
     """Yields the port at `baud` [bit/s]; raises `CommandError` if it cannot be opened or fails.
 
     Its control lines stay low: many boards reset by them.

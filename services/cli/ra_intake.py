@@ -20,7 +20,7 @@ class RefusedMessage(ValueError):
     """A message that is not followed; the text says why."""
 
 
-class Wanted(NamedTuple):
+class RequestedMotion(NamedTuple):
     """What one message asks for; None where it says nothing of it."""
 
     moves: tuple[Fraction, ...] | None  # [steps] by joint, relative
@@ -42,7 +42,7 @@ class RaIntake:
             return None
         return tuple(_position(joint, steps) for joint, steps in zip(self._joints, self.target_steps, strict=True))
 
-    def take(self, payload: bytes, stands: Sequence[int]) -> Wanted:
+    def take(self, payload: bytes, stands: Sequence[int]) -> RequestedMotion:
         """A message, while the arm stands at `stands` [steps]; raises `RefusedMessage`, and the target before stays."""
         wanted = self._read(payload)
         if wanted.moves is None:
@@ -70,21 +70,21 @@ class RaIntake:
         if not self.is_reached(stands):
             self.forget()
 
-    def _read(self, payload: bytes) -> Wanted:
+    def _read(self, payload: bytes) -> RequestedMotion:
         found = _object(payload)
         output = found.get(OUTPUT)
         if output is not None and (isinstance(output, str) or output not in (0, 1)):
             raise RefusedMessage(f'"{OUTPUT}" is {output!r}: write 0 or 1')
         missing = [name for name in self._names if name not in found]
         if len(missing) == len(self._names) and output is not None:
-            return Wanted(None, bool(output))
+            return RequestedMotion(None, bool(output))
         if missing:
             raise RefusedMessage(
                 f"{', '.join(missing)} missing: the sketch moves only by {', '.join(self._names)} together"
             )
         moves = zip(self._joints, self._names, strict=True)
         steps = tuple(_degrees(found[name], name) * joint.steps.steps_per_turn / 360 for joint, name in moves)
-        return Wanted(steps, None if output is None else bool(output))
+        return RequestedMotion(steps, None if output is None else bool(output))
 
 
 def _object(payload: bytes) -> dict[str, object]:

@@ -22,8 +22,8 @@ from schemas.topics import (
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options
 from services.cli.ra_intake import OUTPUT, RaIntake, RefusedMessage
-from services.cli.session import Session, connect, share_control
-from services.runtime.errors import NoAnswer, Refused
+from services.cli.session import CommandSession, connect, share_control
+from services.runtime.errors import NoAnswer, RequestRefused
 
 JOINTS, STATES, READINGS = "ra/juntas", "ra/estados", "ra/sensores"
 PERIOD = 0.05  # [s] between two targets; the gateway brakes after 0.5 s without one
@@ -49,7 +49,7 @@ def run(options: Options) -> ExitCode:
 class Listener:
     """One publisher's arm."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: CommandSession) -> None:
         self._session, node = session, session.node
         self._intake = RaIntake(session.arm)
         self._state, self._status = node.latest(DEVICE_STATE), node.latest(DEVICE_STATUS)
@@ -136,7 +136,7 @@ class Listener:
         request = DeviceCommandRequest(command=OutputCommand(output=OUTPUT, on=on))
         try:
             answer = self._session.node.call(DEVICE_COMMAND, request)
-        except (Refused, NoAnswer) as error:
+        except (RequestRefused, NoAnswer) as error:
             print(f"refused: {OUTPUT}: {error}", flush=True)
             return
         if not answer.accepted:

@@ -12,7 +12,7 @@ from services.cli.forms import count_options, form_of, form_options, print_value
 from services.cli.messages import dump, message_of
 from services.cli.node import information_of, living
 from services.cli.parser import Choices, Options, Parser, json_option
-from services.cli.session import Session, connect, share_control
+from services.cli.session import CommandSession, connect, share_control
 from services.cli.text_table import table
 from services.cli.topic import echo
 from services.recordings.table import exchanges_of, goal_request_of
@@ -84,7 +84,7 @@ def request_of(name: str) -> Request[Message, Message]:
     raise unknown("request", name, [request.key for request in REQUESTS])
 
 
-def asked_on(session: Session, name: str) -> Request[Any, Any]:
+def asked_on(session: CommandSession, name: str) -> Request[Any, Any]:
     """The request of that key, of our table or of a living node; raises `CommandError` with the nearest key."""
     key = name.strip("/")
     for request in REQUESTS:
@@ -99,7 +99,9 @@ def asked_on(session: Session, name: str) -> Request[Any, Any]:
     return Request(key, Message, Message, others[key], "")
 
 
-def call(session: Session, request: Request[Message, Message], message: Message, as_json: bool = False) -> ExitCode:
+def call(
+    session: CommandSession, request: Request[Message, Message], message: Message, as_json: bool = False
+) -> ExitCode:
     """Sends `message` and prints the answer as YAML or JSON."""
     if request.key == DEVICE_COMMAND.key:
         share_control(session)

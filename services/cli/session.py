@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from services.runtime.node import Node
 
 
-class Session(NamedTuple):
+class CommandSession(NamedTuple):
     """A robot, and this command's own node on its bus."""
 
     deployment: Deployment
@@ -63,28 +63,28 @@ def reported(robot: Robot) -> Iterator[None]:
 
 
 @contextmanager
-def connect(robot: Robot | None = None) -> Iterator[Session]:
+def connect(robot: Robot | None = None) -> Iterator[CommandSession]:
     """Yields a session with a node for `robot`, by default the deployment's own.
 
     Raises `CommandError` if there is no router, if nobody answers, or if a server refuses.
     """
     deployment, arm = robot or load_robot()
     require_router(deployment)
-    from services.runtime.errors import BusError, NoAnswer, Refused, ServerLost  # slow to load: the bus
+    from services.runtime.errors import BusError, NoAnswer, RequestRefused, ServerLost  # slow to load: the bus
     from services.runtime.node import Node
 
     try:
         with Node(own_name(), deployment, robot=arm.name) as node:
-            yield Session(deployment, arm, node)
+            yield CommandSession(deployment, arm, node)
     except NoAnswer as error:
         raise CommandError(other_robots(deployment, arm) or str(error), ExitCode.NO_STACK) from error
     except BusError as error:
         raise CommandError(str(error), ExitCode.NO_STACK) from error
-    except (Refused, ServerLost) as error:
+    except (RequestRefused, ServerLost) as error:
         raise CommandError(str(error)) from error
 
 
-def share_control(session: Session) -> None:
+def share_control(session: CommandSession) -> None:
     """Shares the hold of control that another process of this user has on this host, if there is one."""
     from gemelo.control import join_shared  # slow to load: the bus
 

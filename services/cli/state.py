@@ -26,7 +26,7 @@ from services.arm.frames.frame_buffer import FrameBuffer, FrameError
 from services.cli.device_snapshot import OPEN_LOOP
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options, Parser
-from services.cli.session import Session, connect, other_robots
+from services.cli.session import CommandSession, connect, other_robots
 from services.cli.text_table import table
 from services.cli.units import SHOWN
 
@@ -65,7 +65,7 @@ class JointLine(msgspec.Struct, frozen=True):
     verified_at: int = 0  # [ns] UNIX time; 0: never
 
 
-class Snapshot(msgspec.Struct, frozen=True):
+class StateSnapshot(msgspec.Struct, frozen=True):
     """Everything that `gemelo state` shows."""
 
     robot: str
@@ -95,8 +95,8 @@ def snapshot(
     ledger: StepLedger | None = None,
     stopping: StoppingDistance | None = None,
     control: ControlState | None = None,
-) -> Snapshot:
-    """The `Snapshot` of the messages received so far, None for one that was not; `tool` is (3,) [m] in the base
+) -> StateSnapshot:
+    """The `StateSnapshot` of the messages received so far, None for one that was not; `tool` is (3,) [m] in the base
     frame."""
     states, errors = states or JointState(), errors or StepErrors()
     position = dict(zip(states.name, states.position, strict=False))
@@ -120,7 +120,7 @@ def snapshot(
         )
         for joint in arm.joints
     )  # fmt: skip
-    return Snapshot(
+    return StateSnapshot(
         robot=arm.name,
         joints=lines,
         tool_frame=arm.tool_frame,
@@ -139,7 +139,7 @@ def snapshot(
     )
 
 
-def text_of(view: Snapshot) -> str:
+def text_of(view: StateSnapshot) -> str:
     """The snapshot as a table and three lines."""
     headings = ("joint", "position", "unit", "velocity [unit/s]", "commanded [steps]", "executed [steps]",
                 "error [steps]", "sure", "verified by")  # fmt: skip
@@ -214,7 +214,7 @@ def _number(value: float | None, factor: float, digits: int) -> str:
 class StateView:
     """Collects the newest of every message that a snapshot needs."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: CommandSession) -> None:
         self._arm = session.arm
         node = session.node
         self.frames = FrameBuffer()
@@ -254,7 +254,7 @@ class StateView:
         except FrameError:
             return None
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> StateSnapshot:
         """Everything received so far."""
         return snapshot(
             self._arm,
@@ -269,7 +269,7 @@ class StateView:
         )
 
 
-def state(session: Session, watch: bool, as_json: bool) -> ExitCode:
+def state(session: CommandSession, watch: bool, as_json: bool) -> ExitCode:
     """Prints one snapshot, or one after another until Ctrl-C."""
     view = StateView(session)
     wait_for(session, view)
@@ -279,7 +279,7 @@ def state(session: Session, watch: bool, as_json: bool) -> ExitCode:
     return _watch(session, view, as_json)
 
 
-def wait_for(session: Session, view: StateView) -> None:
+def wait_for(session: CommandSession, view: StateView) -> None:
     """Waits for all messages, at most `PATIENCE` [s]; raises `CommandError` if there is none at all."""
     began = session.node.monotonic()
     while not view.is_complete and session.node.monotonic() < began + PATIENCE:
@@ -296,7 +296,7 @@ def _render(view: StateView, as_json: bool) -> str:
     return msgspec.json.encode(shown).decode() if as_json else text_of(shown)
 
 
-def _watch(session: Session, view: StateView, as_json: bool) -> ExitCode:
+def _watch(session: CommandSession, view: StateView, as_json: bool) -> ExitCode:
     clear = "\x1b[H\x1b[2J" if sys.stdout.isatty() and not as_json else ""
 
     def step(now: int) -> None:

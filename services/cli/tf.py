@@ -20,7 +20,7 @@ from services.cli.errors import CommandError, ExitCode, unknown
 from services.cli.field_path import FieldPath
 from services.cli.forms import Form, count_options, form_of, form_options, print_value, rows_form_of, yaml_document
 from services.cli.parser import Choices, Options, Parser, json_option, positive_number
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.cli.text_table import table
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ REPORT_EVERY = 1.0  # [s]
 ROW, INDENT, WIDTH, HEIGHT, SIGN = 34, 30, 210, 24, 7.2  # [pixels] of the picture; SIGN of a letter
 
 
-class Link(NamedTuple):
+class FrameLink(NamedTuple):
     """How a frame hangs on its parent."""
 
     parent: str
@@ -94,19 +94,19 @@ def choices(robot: Robot | None) -> Choices:
 
 
 @dataclass
-class Heard:
+class HeardFrames:
     """What has come of the frames."""
 
     buffer: FrameBuffer = field(default_factory=FrameBuffer)
-    links: dict[str, Link] = field(default_factory=dict)  # by child
+    links: dict[str, FrameLink] = field(default_factory=dict)  # by child
 
     def take(self, frames: FrameTransforms, is_static: bool) -> None:
         self.buffer.insert_all(frames, is_static)
         for frame in frames.transforms:
-            self.links[frame.child] = Link(frame.parent, is_static)
+            self.links[frame.child] = FrameLink(frame.parent, is_static)
 
 
-def heard(session: Session) -> Heard:
+def heard(session: CommandSession) -> HeardFrames:
     """The frames that come within a while; raises `CommandError` where none does."""
     known = _listen(session)
     session.node.wait(HEARD_FOR)
@@ -116,15 +116,15 @@ def heard(session: Session) -> Heard:
     return known
 
 
-def _listen(session: Session) -> Heard:
-    known = Heard()
+def _listen(session: CommandSession) -> HeardFrames:
+    known = HeardFrames()
     session.node.subscribe(STATIC_FRAMES, lambda frames: known.take(frames, True))
     session.node.subscribe(FRAMES, lambda frames: known.take(frames, False))
     return known
 
 
 def echo(
-    session: Session, target: str, source: str, rate: float, count: int | None, form: Form, field: FieldPath
+    session: CommandSession, target: str, source: str, rate: float, count: int | None, form: Form, field: FieldPath
 ) -> ExitCode:
     """Prints the pose of `source` in `target`, or a field of it, `rate` [1/s] times.
 
@@ -164,7 +164,7 @@ def pose_text(found: FrameTransform) -> str:
     )
 
 
-def _children(links: Mapping[str, Link]) -> tuple[list[str], dict[str, list[str]]]:
+def _children(links: Mapping[str, FrameLink]) -> tuple[list[str], dict[str, list[str]]]:
     """The frames without a parent, and of every frame those that hang on it, by name."""
     below: dict[str, list[str]] = {}
     for child, link in sorted(links.items()):
@@ -172,7 +172,7 @@ def _children(links: Mapping[str, Link]) -> tuple[list[str], dict[str, list[str]
     return sorted(set(below) - set(links)), below
 
 
-def tree_rows(links: Mapping[str, Link]) -> list[tuple[int, str]]:
+def tree_rows(links: Mapping[str, FrameLink]) -> list[tuple[int, str]]:
     """Every frame with its depth, in the order in which a tree is drawn from the top."""
     roots, below = _children(links)
     rows: list[tuple[int, str]] = []
@@ -184,7 +184,7 @@ def tree_rows(links: Mapping[str, Link]) -> list[tuple[int, str]]:
     return rows
 
 
-def tree_frames(links: Mapping[str, Link]) -> list[dict[str, object]]:
+def tree_frames(links: Mapping[str, FrameLink]) -> list[dict[str, object]]:
     """Every frame with its parent, None for a root, in the same order."""
     parents = {name: link.parent for name, link in links.items()}
     return [
@@ -193,7 +193,7 @@ def tree_frames(links: Mapping[str, Link]) -> list[dict[str, object]]:
     ]
 
 
-def tree_text(links: Mapping[str, Link]) -> str:
+def tree_text(links: Mapping[str, FrameLink]) -> str:
     """A line for every frame, indented by its depth; fixed ones say so."""
     lines = []
     for depth, name in tree_rows(links):
@@ -202,7 +202,7 @@ def tree_text(links: Mapping[str, Link]) -> str:
     return "\n".join(lines)
 
 
-def tree_picture(links: Mapping[str, Link]) -> str:
+def tree_picture(links: Mapping[str, FrameLink]) -> str:
     """The same as SVG: a box for every frame, a dashed line to a fixed one."""
     rows = tree_rows(links)
     place = {name: row for row, (_, name) in enumerate(rows)}
@@ -253,7 +253,7 @@ class FrameRate(msgspec.Struct, frozen=True, kw_only=True):
     delay_max: float  # [s]
 
 
-def monitor(session: Session, count: int | None, form: Form) -> ExitCode:
+def monitor(session: CommandSession, count: int | None, form: Form) -> ExitCode:
     """Prints rate and delay of every moving frame once a second."""
     arrivals: dict[str, Arrivals] = {}
     node, reports, last = session.node, 0, session.node.monotonic()

@@ -14,7 +14,7 @@ from services.cli.errors import ExitCode
 from services.cli.forms import Form, count_options, csv_rows, form_options, json_line
 from services.cli.node import told_information_of
 from services.cli.parser import Options, Parser
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.cli.text_table import table
 
 EVERY = 1.0  # [s] every node tells its figures once a second
@@ -50,7 +50,7 @@ class SlowTopic(msgspec.Struct, frozen=True, kw_only=True):
         return f"{heard}; {self.writer} promises {self.promised:g}"
 
 
-class Report(msgspec.Struct, frozen=True, kw_only=True):
+class TopReport(msgspec.Struct, frozen=True, kw_only=True):
     """What is said once a second."""
 
     nodes: tuple[NodeFigures, ...]
@@ -77,7 +77,7 @@ class Figures(NamedTuple):
         return {each.key: (each.received - before.get(each.key, 0)) / self.seconds for each in self.now.topics}
 
 
-def figures_by_node(session: Session) -> dict[str, Figures]:
+def figures_by_node(session: CommandSession) -> dict[str, Figures]:
     """Fills, as the nodes speak, with those that have spoken twice."""
     newest: dict[str, NodeStatistics] = {}
     figures: dict[str, Figures] = {}
@@ -111,7 +111,7 @@ def form_of_reports(options: Options) -> Form:
     return lambda report: rows(report.nodes)
 
 
-def watch(session: Session, count: int | None, form: Form = str) -> ExitCode:
+def watch(session: CommandSession, count: int | None, form: Form = str) -> ExitCode:
     """Prints `count` reports."""
     infos: dict[str, NodeInfo | None] = {}
     node, printed, last = session.node, 0, session.node.monotonic() + FIRST - EVERY
@@ -136,10 +136,10 @@ def watch(session: Session, count: int | None, form: Form = str) -> ExitCode:
     return ExitCode.OK
 
 
-def report(figures: Mapping[str, Figures], infos: Mapping[str, NodeInfo | None]) -> Report:
+def report(figures: Mapping[str, Figures], infos: Mapping[str, NodeInfo | None]) -> TopReport:
     """A row for each node, and the topics that come too seldom."""
     nodes = tuple(_row(name, each, infos.get(name)) for name, each in figures.items())
-    return Report(nodes=nodes, slow_topics=tuple(slow_topics(figures)))
+    return TopReport(nodes=nodes, slow_topics=tuple(slow_topics(figures)))
 
 
 def _row(name: str, each: Figures, info: NodeInfo | None) -> NodeFigures:

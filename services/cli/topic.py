@@ -15,7 +15,7 @@ from services.cli.forms import Form, count_options, form_of, form_options, print
 from services.cli.living_topics import all_topics, connected, known_topic, router_listens
 from services.cli.messages import dump, fields_of, message_of
 from services.cli.parser import Choices, Options, Parser, json_option, positive_integer, positive_number
-from services.cli.session import Session, connect
+from services.cli.session import CommandSession, connect
 from services.cli.text_table import table
 from services.cli.topic_ends import Ends, ends
 from services.recordings.table import LivingTopic
@@ -147,7 +147,7 @@ def head_of(topic: Topic[Message]) -> dict[str, object]:
     }  # fmt: skip
 
 
-def echo(session: Session, topic: Topic[Message], field: FieldPath, form: Form, count: int | None) -> ExitCode:
+def echo(session: CommandSession, topic: Topic[Message], field: FieldPath, form: Form, count: int | None) -> ExitCode:
     """Prints messages, or their field, as they come, until Ctrl-C or `count` of them; raises `CommandError` where a
     message has no such element."""
     printed = 0
@@ -165,7 +165,7 @@ def echo(session: Session, topic: Topic[Message], field: FieldPath, form: Form, 
 
 
 def listen(
-    session: Session,
+    session: CommandSession,
     topic: Topic[Any],
     on_message: Callable[[Message], None],
     step: Callable[[int], None] = lambda now: None,
@@ -176,7 +176,7 @@ def listen(
 
 
 def publish(
-    session: Session, topic: Topic[Message], message: Message, rate: float | None, count: int | None
+    session: CommandSession, topic: Topic[Message], message: Message, rate: float | None, count: int | None
 ) -> ExitCode:
     """Publishes once, `count` times, or at `rate` [Hz] until Ctrl-C."""
     if topic.writer != "any":

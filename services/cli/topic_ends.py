@@ -10,7 +10,7 @@ from schemas.message import Message
 from schemas.system import NodeInfo
 from schemas.topics import Topic
 from services.cli.node import living, told_information_of
-from services.cli.session import Session
+from services.cli.session import CommandSession
 from services.cli.top import FIRST, Figures, figures_by_node
 
 
@@ -21,7 +21,7 @@ class Writer(msgspec.Struct, frozen=True, kw_only=True):
     rate_hz: float
 
 
-class Reader(msgspec.Struct, frozen=True, kw_only=True):
+class TopicReader(msgspec.Struct, frozen=True, kw_only=True):
     """A node that reads the topic, with its own counters; None: it has not told them."""
 
     process: str
@@ -35,10 +35,10 @@ class Ends(msgspec.Struct, frozen=True, kw_only=True):
     """Both by the names of the nodes."""
 
     written_by: dict[str, Writer]
-    read_by: dict[str, Reader]
+    read_by: dict[str, TopicReader]
 
 
-def ends(session: Session, topic: Topic[Any]) -> Ends:
+def ends(session: CommandSession, topic: Topic[Any]) -> Ends:
     """Listens to the topic and to the counters of all nodes for `FIRST` [s]; one that does not answer is left out."""
     node = session.node
     heard: dict[str, list[float]] = {}  # [s] monotonic, by writer
@@ -62,11 +62,11 @@ def ends(session: Session, topic: Topic[Any]) -> Ends:
     return told
 
 
-def _reader(info: NodeInfo, key: str, figures: Figures | None) -> Reader:
+def _reader(info: NodeInfo, key: str, figures: Figures | None) -> TopicReader:
     counters = [each for each in figures.now.topics if each.key == key] if figures is not None else []
     if figures is None or not counters:
-        return Reader(process=_process(info))
-    return Reader(
+        return TopicReader(process=_process(info))
+    return TopicReader(
         process=_process(info),
         rate_hz=round(figures.received()[key], 1),
         received=sum(each.received for each in counters),

@@ -16,13 +16,13 @@ from services.cli.errors import ExitCode, usage
 from services.cli.forms import Form, count_options, form_of, form_options
 from services.cli.living_topics import connected
 from services.cli.parser import Options, Parser, positive_integer
-from services.cli.session import Session
+from services.cli.session import CommandSession
 from services.cli.topic import listen, topic_option
 
 REPORT_EVERY = 1.0  # [s]
 
 
-class Rate(msgspec.Struct, frozen=True, kw_only=True):
+class MeasuredRate(msgspec.Struct, frozen=True, kw_only=True):
     """How often messages came, in the form of `ros2 topic hz` for a person."""
 
     rate: float  # [Hz]
@@ -74,7 +74,7 @@ class Delay(msgspec.Struct, frozen=True, kw_only=True):
         )
 
 
-Report = Callable[[], Rate | Bandwidth | Delay | None]
+Report = Callable[[], MeasuredRate | Bandwidth | Delay | None]
 
 
 def rate_options(parser: Parser) -> None:
@@ -117,14 +117,14 @@ class RateWindow:
         self._times.append(time)
         self.total += 1
 
-    def report(self) -> Rate | None:
+    def report(self) -> MeasuredRate | None:
         """None after fewer than two messages."""
         if len(self._times) < 2:
             return None
         times = list(self._times)
         gaps = [after - before for before, after in pairwise(times)]
         mean = sum(gaps) / len(gaps)
-        return Rate(
+        return MeasuredRate(
             rate=1.0 / mean if mean > 0.0 else math.inf,
             gap_min=min(gaps),
             gap_max=max(gaps),
@@ -133,7 +133,7 @@ class RateWindow:
         )
 
 
-class Window:
+class ArrivalWindow:
     """Arrival times [s, monotonic] of the last `size` messages, each with one number."""
 
     def __init__(self, size: int) -> None:
@@ -151,7 +151,7 @@ def deviation_of(values: Sequence[float], mean: float) -> float:
     return math.sqrt(sum((value - mean) ** 2 for value in values) / len(values))
 
 
-def hz(session: Session, topic: Topic[Any], window: int, count: int | None, form: Form = str) -> ExitCode:
+def hz(session: CommandSession, topic: Topic[Any], window: int, count: int | None, form: Form = str) -> ExitCode:
     """Prints the rate of arrival once a second, until Ctrl-C or `count` reports."""
     arrivals = RateWindow(window)
 
@@ -161,9 +161,9 @@ def hz(session: Session, topic: Topic[Any], window: int, count: int | None, form
     return _reported(session, topic, on_message, lambda: arrivals.total, arrivals.report, count, form)
 
 
-def bandwidth(session: Session, topic: Topic[Any], window: int, count: int | None, form: Form = str) -> ExitCode:
+def bandwidth(session: CommandSession, topic: Topic[Any], window: int, count: int | None, form: Form = str) -> ExitCode:
     """Prints the bytes of the messages' payloads once a second."""
-    seen = Window(window)
+    seen = ArrivalWindow(window)
 
     def on_message(message: Message) -> None:
         seen.add(session.node.monotonic(), len(encode(message)))
@@ -184,9 +184,9 @@ def bandwidth(session: Session, topic: Topic[Any], window: int, count: int | Non
     return _reported(session, topic, on_message, lambda: seen.total, report, count, form)
 
 
-def delay(session: Session, topic: Topic[Any], window: int, count: int | None, form: Form = str) -> ExitCode:
+def delay(session: CommandSession, topic: Topic[Any], window: int, count: int | None, form: Form = str) -> ExitCode:
     """Prints the time from the messages' stamps to their arrival once a second; both clocks must agree."""
-    seen = Window(window)
+    seen = ArrivalWindow(window)
 
     def on_message(message: Message) -> None:
         stamp = getattr(message, "stamp", 0)
@@ -210,7 +210,7 @@ def delay(session: Session, topic: Topic[Any], window: int, count: int | None, f
 
 
 def _reported(
-    session: Session,
+    session: CommandSession,
     topic: Topic[Any],
     on_message: Callable[[Message], None],
     total: Callable[[], int],

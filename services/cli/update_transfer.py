@@ -16,7 +16,7 @@ from paho.mqtt import client as paho
 
 from schemas.device_topics import topic
 from services.cli.errors import CommandError, ExitCode
-from services.cli.provision import Line
+from services.cli.provision import BoardLine
 from services.mqtt.access import BrokerAccess
 from services.mqtt.client import MqttClient, is_failure
 from services.mqtt.failures import denial
@@ -42,7 +42,7 @@ class UpdateStatus(msgspec.Struct, frozen=True):
     slot: str = ""
 
 
-class Wire(Protocol):
+class UpdateWire(Protocol):
     """A way to one device."""
 
     def send(self, frame: bytes) -> None:
@@ -58,7 +58,7 @@ class Wire(Protocol):
 class Transfer:
     """Brings one signed image to a device; `show` is told the bytes that have arrived."""
 
-    def __init__(self, wire: Wire, image: bytes, signature: bytes, show: Callable[[int], None]) -> None:
+    def __init__(self, wire: UpdateWire, image: bytes, signature: bytes, show: Callable[[int], None]) -> None:
         self._wire, self._image, self._signature, self._show = wire, image, signature, show
         self._session = secrets.randbelow((1 << 32) - 1) + 1
         self._boot_id = 0
@@ -111,7 +111,7 @@ class Transfer:
         )
 
 
-def await_status(wire: Wire, patience: float, is_wanted: Callable[[UpdateStatus], bool]) -> UpdateStatus | None:
+def await_status(wire: UpdateWire, patience: float, is_wanted: Callable[[UpdateStatus], bool]) -> UpdateStatus | None:
     """The next status that is wanted; None if there is none in `patience` [s]."""
     deadline, next_knock = time.monotonic() + patience, 0.0
     while (now := time.monotonic()) < deadline:
@@ -127,7 +127,7 @@ def await_status(wire: Wire, patience: float, is_wanted: Callable[[UpdateStatus]
 class SerialWire:
     """The device's serial line."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: BoardLine) -> None:
         self._line, self._packets = line, PacketDecoder()
         self._said: list[UpdateAck | UpdateStatus] = []
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from services.arm.model.urdf import Origin
-from services.collision_fitting.fitted_shape import Fitted, Kind
+from services.collision_fitting.fitted_shape import Fitted, FittedKind
 from services.collision_fitting.hull import corners_and_sides
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ def enclosing_hull(points: Array, normals: Array) -> Fitted | None:
     except QhullError:  # thin in a direction that is none of the spans
         return None
     x, y, z = middle.tolist()
-    return Fitted(Kind.HULL, (volume,), Origin((x, y, z)), tuple((a, b, c) for a, b, c in local.tolist()))
+    return Fitted(FittedKind.HULL, (volume,), Origin((x, y, z)), tuple((a, b, c) for a, b, c in local.tolist()))
 
 
 def _corners_around(points: Array, normals: Array) -> Array:

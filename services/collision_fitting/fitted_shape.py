@@ -15,7 +15,7 @@ from services.planner.collision_geometry.link_shapes import hull_mesh
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 
-class Kind(StrEnum):
+class FittedKind(StrEnum):
     """And what `Fitted.size` means for each, in m; along z."""
 
     BOX = "box"  # x, y, z: whole lengths of the edges
@@ -30,7 +30,7 @@ class Kind(StrEnum):
 class Fitted:
     """What holds all its points."""
 
-    kind: Kind
+    kind: FittedKind
     size: tuple[float, ...]
     origin: Origin  # in the link
     corners: tuple[Triple, ...] = ()  # [m] of a hull, from its origin
@@ -39,15 +39,15 @@ class Fitted:
     def volume(self) -> float:
         """[m^3]."""
         match self.kind, self.size:
-            case Kind.BOX, (x, y, z):
+            case FittedKind.BOX, (x, y, z):
                 return x * y * z
-            case Kind.CYLINDER, (radius, length):
+            case FittedKind.CYLINDER, (radius, length):
                 return math.pi * radius**2 * length
-            case Kind.CAPSULE, (radius, length):
+            case FittedKind.CAPSULE, (radius, length):
                 return math.pi * radius**2 * (length + 4.0 / 3.0 * radius)
-            case Kind.PLATE, (radius, length, thickness):
+            case FittedKind.PLATE, (radius, length, thickness):
                 return (math.pi * radius + 2.0 * length) * radius * thickness
-            case Kind.HULL, (volume,):
+            case FittedKind.HULL, (volume,):
                 return volume
         return 4.0 / 3.0 * math.pi * self.size[0] ** 3
 
@@ -59,16 +59,16 @@ class Fitted:
     @cached_property
     def _shapes(self) -> tuple[CollisionShape, ...]:
         match self.kind, self.size:
-            case Kind.CAPSULE, (radius, length):
+            case FittedKind.CAPSULE, (radius, length):
                 balls = (self._shape(ShapeKind.SPHERE, (radius,), (0.0, 0.0, side * length)) for side in (-0.5, 0.5))
                 return self._shape(ShapeKind.CYLINDER, (radius, length)), *balls
-            case Kind.PLATE, (radius, length, thickness):
+            case FittedKind.PLATE, (radius, length, thickness):
                 ends = (
                     self._shape(ShapeKind.CYLINDER, (radius, thickness), (side * length, 0.0, 0.0))
                     for side in (-0.5, 0.5)
                 )
                 return self._shape(ShapeKind.BOX, (length, 2.0 * radius, thickness)), *ends
-            case Kind.HULL, _:
+            case FittedKind.HULL, _:
                 pose = (self.origin.xyz, from_rpy(*self.origin.rpy))
                 return (CollisionShape("hull", ShapeKind.HULL, (), pose, hull_mesh(np.array(self.corners))),)
         return (self._shape(ShapeKind(self.kind), self.size),)

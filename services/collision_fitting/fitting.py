@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from services.arm.frames.transforms import from_rpy
 from services.arm.model.urdf import Origin, Triple
-from services.collision_fitting.fitted_shape import Fitted, Kind
+from services.collision_fitting.fitted_shape import Fitted, FittedKind
 from services.collision_fitting.hull import corners_and_sides, smallest_ball, smallest_rectangle
 from services.planner.collision_geometry.shapes import matrix_of
 
@@ -91,7 +91,7 @@ def _box(points: Array, turn: Array) -> Fitted:
     there = points @ axes.T
     xyz = _place(0.5 * (there.min(axis=0) + there.max(axis=0)) @ axes)
     half = np.abs((points - xyz) @ axes.T).max(axis=0)
-    return Fitted(Kind.BOX, tuple(2.0 * _up(value) for value in half), Origin(xyz, rpy))
+    return Fitted(FittedKind.BOX, tuple(2.0 * _up(value) for value in half), Origin(xyz, rpy))
 
 
 def _plate(points: Array, turn: Array) -> Iterator[Fitted]:
@@ -110,7 +110,7 @@ def _plate(points: Array, turn: Array) -> Iterator[Fitted]:
     radius = _up(float(half[1]))
     straight = float((np.abs(local[:, 0]) - _caps(local[:, 1:2], radius)).max())
     if straight > 0.0:
-        yield Fitted(Kind.PLATE, (radius, 2.0 * _up(straight), 2.0 * _up(float(half[2]))), Origin(xyz, rpy))
+        yield Fitted(FittedKind.PLATE, (radius, 2.0 * _up(straight), 2.0 * _up(float(half[2]))), Origin(xyz, rpy))
 
 
 def _round(points: Array, turn: Array) -> Iterator[Fitted]:
@@ -124,13 +124,13 @@ def _round(points: Array, turn: Array) -> Iterator[Fitted]:
     xyz = _place(np.array([*centre, flat]) @ axes)
     local = (points - xyz) @ axes.T
     wide = _up(float(np.linalg.norm(local[:, :2], axis=1).max()))
-    yield Fitted(Kind.CYLINDER, (wide, 2.0 * _up(float(np.abs(local[:, 2]).max()))), Origin(xyz, rpy))
+    yield Fitted(FittedKind.CYLINDER, (wide, 2.0 * _up(float(np.abs(local[:, 2]).max()))), Origin(xyz, rpy))
     xyz = _place(np.array([*centre, rounded]) @ axes)
     local = (points - xyz) @ axes.T
     wide = _up(float(np.linalg.norm(local[:, :2], axis=1).max()))
     straight = float((np.abs(local[:, 2]) - _caps(local[:, :2], wide)).max())
     if straight > 0.0:
-        yield Fitted(Kind.CAPSULE, (wide, 2.0 * _up(straight)), Origin(xyz, rpy))
+        yield Fitted(FittedKind.CAPSULE, (wide, 2.0 * _up(straight)), Origin(xyz, rpy))
 
 
 def _caps(aside: Array, radius: float) -> Array:
@@ -140,7 +140,7 @@ def _caps(aside: Array, radius: float) -> Array:
 
 def _ball(points: Array) -> Fitted:
     xyz = _place(smallest_ball(points)[0])
-    return Fitted(Kind.SPHERE, (_up(float(np.linalg.norm(points - xyz, axis=1).max())),), Origin(xyz))
+    return Fitted(FittedKind.SPHERE, (_up(float(np.linalg.norm(points - xyz, axis=1).max())),), Origin(xyz))
 
 
 def _up(half: float) -> float:

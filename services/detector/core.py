@@ -17,7 +17,7 @@ from services.arm.cell.cell_file import Cell, Tagged, height_of_frame
 from services.arm.cell.colours import RGB, nearest_colour
 from services.arm.frames.transforms import from_rpy
 from services.detector.regions import (
-    View,
+    DetectorView,
     distances_from,
     in_base,
     is_box,
@@ -76,7 +76,7 @@ class Detector:
             raise ValueError(f'camera "{info.name}": its image is {size}, not {info.width} x {info.height} pixels')
         known = self._cell.measured.get(info.name)
         error = known.mount.held_out if known is not None and known.mount is not None else 0.0
-        view = View(image, model, base_from_camera, error)
+        view = DetectorView(image, model, base_from_camera, error)
         tags = list(self._tags(view))
         items = [item for _, item in tags]
         unclear: list[Unclear] = []
@@ -92,7 +92,7 @@ class Detector:
             stamp=stamp, camera=info.name, items=tuple(items), unclear=tuple(unclear), doubt=self._doubt(tags)
         )
 
-    def _tags(self, view: View) -> Iterator[tuple[Tagged, Detection]]:
+    def _tags(self, view: DetectorView) -> Iterator[tuple[Tagged, Detection]]:
         grey = np.asarray(cv2.cvtColor(view.image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
         for family in sorted({family for family, _ in self._tagged}):
             for tag in find_tags(grey, view.model, family):
@@ -100,7 +100,7 @@ class Detector:
                 if record is not None:
                     yield record, self._tag_item(view, tag, record)
 
-    def _tag_item(self, view: View, tag: Tag, record: Tagged) -> Detection:
+    def _tag_item(self, view: DetectorView, tag: Tag, record: Tagged) -> Detection:
         """By the plane that it lies on where it lies on one, else in space; the table's normal tells the two apart."""
         normal = self._normal(view, record)
         solved = tag_pose(tag, view.model, record.size, normal)
@@ -120,14 +120,14 @@ class Detector:
             flip_ratio=0.0 if normal is not None else solved.flip_ratio,
         )
 
-    def _normal(self, view: View, record: Tagged) -> Array | None:
+    def _normal(self, view: DetectorView, record: Tagged) -> Array | None:
         """The direction (3,) of the camera frame to which the tag's z is nearest; None where nothing is known of it."""
         if view.base_from_camera is None or (isinstance(record, TagRecord) and record.parent):
             return None
         turn = from_transform(Transform(rotation=from_rpy(*record.rpy))) if isinstance(record, TagRecord) else np.eye(4)
         return np.asarray(inverse(view.base_from_camera)[:3, :3] @ turn[:3, 2])
 
-    def _plane_of(self, view: View, record: Tagged) -> Array | None:
+    def _plane_of(self, view: DetectorView, record: Tagged) -> Array | None:
         """camera_from_plane of where it would lie; None for a tag that need not lie."""
         table = self._cell.table
         if isinstance(record, TagRecord):
@@ -152,7 +152,7 @@ class Detector:
             "moved; put it back, or measure anew where the camera stands"
         )
 
-    def _colours(self, view: View) -> Iterator[Detection | Unclear]:
+    def _colours(self, view: DetectorView) -> Iterator[Detection | Unclear]:
         for colour, things in self._coloured.items():
             for window, core in coloured_windows(view.half, view.image.shape[:2], RGB[colour]):
                 part = view.within(window)
@@ -165,7 +165,7 @@ class Detector:
                         else:
                             yield unclear_region(things, region, window)
 
-    def _classes(self, view: View) -> Iterator[Detection]:
+    def _classes(self, view: DetectorView) -> Iterator[Detection]:
         """What the models of users find, as boxes of the things' size on the table."""
         assert self._cell.table is not None
         plane = view.plane(self._cell.table)
@@ -179,7 +179,7 @@ class Detector:
                         if place is not None:
                             yield _class_item(view, thing, each, plane, place)
 
-    def _standing_out(self, view: View, found: Sequence[Detection]) -> Iterator[Detection]:
+    def _standing_out(self, view: DetectorView, found: Sequence[Detection]) -> Iterator[Detection]:
         """Boxes by nothing but that they have another colour than the table."""
         if not self._boxes:
             return
@@ -201,7 +201,7 @@ class Detector:
                     yield self._box_item(part, *best, DetectionKind.BOX, window)
 
     def _best_box(
-        self, view: View, strength: Array, region: Mask, things: Sequence[ColourThing | BoxThing]
+        self, view: DetectorView, strength: Array, region: Mask, things: Sequence[ColourThing | BoxThing]
     ) -> tuple[ColourThing | BoxThing, BoxFit] | None:
         """The thing whose outline is the region's, and where it stands; None where it is that of none of them."""
         assert self._cell.table is not None
@@ -212,7 +212,7 @@ class Detector:
         return min(good, key=lambda each: each[1].error) if good else None
 
     def _box_item(
-        self, view: View, thing: ColourThing | BoxThing, fit: BoxFit, kind: DetectionKind, window: Window
+        self, view: DetectorView, thing: ColourThing | BoxThing, fit: BoxFit, kind: DetectionKind, window: Window
     ) -> Detection:
         """`view` is what the `window` shows."""
         assert self._cell.table is not None
@@ -241,7 +241,7 @@ def _by_model(cell: Cell, models: Mapping[Path, UserModel]) -> dict[Path, list[t
     return found
 
 
-def _class_item(view: View, thing: OnnxThing, found: Found, plane: Array, place: PlacedThing) -> Detection:
+def _class_item(view: DetectorView, thing: OnnxThing, found: Found, plane: Array, place: PlacedThing) -> Detection:
     left, upper, right, lower = found.sides
     pose = plane @ place.plane_from_box
     return Detection(

@@ -67,7 +67,7 @@ def run(node: Node, deployment: Deployment) -> None:
 
         node.subscribe(JOINT_STATES, on_joint_state)
         for camera in cell.cameras:
-            Watch(node, camera.name, Detector(cell, models), places, clocks.camera, lambda: parameters.value.rate)
+            CameraWatch(node, camera.name, Detector(cell, models), places, clocks.camera, lambda: parameters.value.rate)
     node.spin(lambda now: node.set_ready(True), rate=RATE)
 
 
@@ -129,7 +129,7 @@ class Places:
         return from_transform(to_message(carrier)) @ local
 
 
-class Watch:
+class CameraWatch:
     """One camera between the bus and the detector."""
 
     def __init__(

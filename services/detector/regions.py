@@ -23,7 +23,7 @@ LIKE_AREA = (0.75, 1.35)  # of a region to that of the box which was fitted to i
 
 
 @dataclass(frozen=True)
-class View:
+class DetectorView:
     """One image with all that is known of it."""
 
     image: ColourImage  # (h, w, 3) red first
@@ -42,7 +42,7 @@ class View:
         """The image at half its size."""
         return halved(self.image)
 
-    def within(self, window: Window) -> View:
+    def within(self, window: Window) -> DetectorView:
         """What the window shows of it."""
         return replace(self, image=window.of(self.image), model=self.model.within(window))
 
@@ -62,7 +62,7 @@ def unclear_region(things: Sequence[ColourThing], region: Mask, window: Window) 
     )
 
 
-def in_base(view: View, pose: Array) -> Transform:
+def in_base(view: DetectorView, pose: Array) -> Transform:
     """A pose (4, 4) [m] of the camera's frame in the base frame; the identity where the camera's is not known."""
     return Transform() if view.base_from_camera is None else to_transform(view.base_from_camera @ pose)
 

@@ -14,7 +14,7 @@ TASKS, FILES = 256, 4096  # that one process may have, beside its memory: what l
 
 
 @dataclass(frozen=True)
-class Service:
+class ServiceRow:
     """A row of the table of services."""
 
     name: str
@@ -26,18 +26,18 @@ class Service:
 SERVICES = {
     each.name: each
     for each in (
-        Service(ROUTER, "the Zenoh router", "512M"),
-        Service(BROKER, "the MQTT broker", "256M"),
-        Service("virtual_esp32", "the firmware core on real MQTT", "256M"),
-        Service("stepper_gateway", "trajectories to step knots", "512M"),
-        Service("state_publisher", "joint states to frames", "256M"),
-        Service("planner", "goals to verified trajectories", "4G", ("planner",)),
-        Service("logger", "everything to MCAP, every command to CSV", "1G", ("record",)),
-        Service("visualizer", "everything to Rerun", "2G", ("view",)),
-        Service("viewer", "the Rerun viewer", "6G", ("view",)),
-        Service("panel", "the operator's page", "2G", ("panel",)),
-        Service("camera", "the images of all cameras", "1G", ("eyes",)),
-        Service("detector", "what is in the images", "1G", ("eyes",)),
+        ServiceRow(ROUTER, "the Zenoh router", "512M"),
+        ServiceRow(BROKER, "the MQTT broker", "256M"),
+        ServiceRow("virtual_esp32", "the firmware core on real MQTT", "256M"),
+        ServiceRow("stepper_gateway", "trajectories to step knots", "512M"),
+        ServiceRow("state_publisher", "joint states to frames", "256M"),
+        ServiceRow("planner", "goals to verified trajectories", "4G", ("planner",)),
+        ServiceRow("logger", "everything to MCAP, every command to CSV", "1G", ("record",)),
+        ServiceRow("visualizer", "everything to Rerun", "2G", ("view",)),
+        ServiceRow("viewer", "the Rerun viewer", "6G", ("view",)),
+        ServiceRow("panel", "the operator's page", "2G", ("panel",)),
+        ServiceRow("camera", "the images of all cameras", "1G", ("eyes",)),
+        ServiceRow("detector", "what is in the images", "1G", ("eyes",)),
     )
 }
 OF_A_ROBOT = tuple(name for name in SERVICES if name not in (ROUTER, BROKER))
@@ -47,7 +47,7 @@ OF_A_ROBOT = tuple(name for name in SERVICES if name not in (ROUTER, BROKER))
 class Process:
     """One process on one host."""
 
-    service: Service
+    service: ServiceRow
     robot: str = ""  # empty: of the whole site
 
     @property

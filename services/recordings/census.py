@@ -13,7 +13,7 @@ from schemas.system import Empty, Interfaces, NodeInfo, NodeRecord, NodeStatisti
 from schemas.topics import STATISTICS, Request
 from services.runtime.clock_offset import ClockOffset, measured
 from services.runtime.endpoints import info_request, interfaces_request
-from services.runtime.errors import NoAnswer, Refused
+from services.runtime.errors import NoAnswer, RequestRefused
 from services.runtime.node import Node
 from services.runtime.parameters import parameters_request
 from services.runtime.requests.client import PendingCall
@@ -82,7 +82,7 @@ class Census:
         """`took` [s] is the round trip."""
         try:
             answer = pending.response()
-        except (NoAnswer, Refused):
+        except (NoAnswer, RequestRefused):
             return
         asked.answers[type(answer).__name__] = answer
         if isinstance(answer, NodeInfo) and answer.clock:

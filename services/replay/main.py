@@ -27,7 +27,7 @@ from services.replay.recorded import NotReplayable, Recorded
 CANNOT = 2  # the exit code of a recording that cannot be replayed
 
 
-class Service(NamedTuple):
+class ReplayableService(NamedTuple):
     """One service that can be replayed."""
 
     topics: Iterable[Topic[Any]]
@@ -35,9 +35,9 @@ class Service(NamedTuple):
 
 
 SERVICES = {
-    "planner": Service(planner.TOPICS, planner.replay),
-    "stepper_gateway": Service(stepper_gateway.TOPICS_REPLAYED, stepper_gateway.replay),
-    "state_publisher": Service(state_publisher.TOPICS, state_publisher.replay),
+    "planner": ReplayableService(planner.TOPICS, planner.replay),
+    "stepper_gateway": ReplayableService(stepper_gateway.TOPICS_REPLAYED, stepper_gateway.replay),
+    "state_publisher": ReplayableService(state_publisher.TOPICS, state_publisher.replay),
 }
 
 

@@ -65,7 +65,7 @@ class GatewayAgain:
         self._ended = {
             (key, heard.message.goal_id): (topic, heard) for key, topic in ENDED.items() for heard in recorded.of(topic)
         }
-        self._said = {topic.key: Said(topic, recorded.of(topic), comparison) for topic in SAID}
+        self._said = {topic.key: TopicMessages(topic, recorded.of(topic), comparison) for topic in SAID}
 
     def inputs(self) -> Iterator[tuple[float, Given]]:
         """Each input with its time [s] in the recording, from the first beginning of a core on.
@@ -168,7 +168,7 @@ class GatewayAgain:
             ) from error
 
 
-class Said:
+class TopicMessages:
     """The recorded messages of one topic, in order."""
 
     def __init__(self, topic: Topic[Any], heard: list[Heard[Any]], comparison: Comparison) -> None:

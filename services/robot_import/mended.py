@@ -12,14 +12,14 @@ from services.arm.checks.meshes import MeshFacts, check_meshes, facts_of
 from services.arm.checks.urdf import check_urdf, fault_finding
 from services.arm.model.urdf import Geometry, UrdfLink, UrdfModel, model_of
 from services.arm.model.xml_reader import XmlReader
-from services.robot_import.source import Source
+from services.robot_import.source import RobotSource
 
 
 @dataclass
 class Mended:
     """The elements of a source as they are to be written, and what was said of them."""
 
-    source: Source
+    source: RobotSource
     xml: XmlReader
     files: dict[str, Path]  # mesh references as written, and the files that they mean
     notes: list[Finding] = field(default_factory=list)

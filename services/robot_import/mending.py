@@ -13,13 +13,13 @@ from services.arm.model.xml_reader import XmlReader, parse_xml
 from services.robot_import import link_mending
 from services.robot_import.joint_mending import fix_free_base, follow_the_motor
 from services.robot_import.mended import Mended, numbers_in
-from services.robot_import.source import Source
+from services.robot_import.source import RobotSource
 
 FOREIGN = ("gazebo", "transmission", "ros2_control", "sensor")
 MOVES = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
 
 
-def mend(source: Source) -> Mended:
+def mend(source: RobotSource) -> Mended:
     """The source, mended; raises `DescriptionError` where it is no URDF at all."""
     try:
         xml = parse_xml(source.text)
@@ -49,7 +49,7 @@ def mend(source: Source) -> Mended:
     return mended
 
 
-def _require_links(xml: XmlReader, source: Source) -> None:
+def _require_links(xml: XmlReader, source: RobotSource) -> None:
     """Raises `DescriptionError` for a robot without any link, as of a xacro file of macros that others call."""
     if xml.root.find("link") is None:
         remedy = "name the file that calls its macros" if source.is_expanded else "export it again"

@@ -22,7 +22,7 @@ UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 @dataclass(frozen=True)
-class Source:
+class RobotSource:
     """A URDF's text, expanded where it was xacro, and the folder to look for its meshes in."""
 
     urdf: Path
@@ -67,7 +67,7 @@ class Source:
             yield from (folder / reference for folder in above)
 
 
-def find_source(given: Path, arguments: Mapping[str, str] | None = None) -> Source:
+def find_source(given: Path, arguments: Mapping[str, str] | None = None) -> RobotSource:
     """The source at a URDF, a xacro file with `arguments`, or an export's folder; raises `DescriptionError`."""
     if given.is_file():
         return _source(given, _root_of(given), arguments or {})
@@ -104,14 +104,14 @@ def _is_robot(path: Path) -> bool:
     return re.search(r"<robot\b[^>]*\bname\s*=", text) is not None and ("<link" in text or "<xacro:" in text)
 
 
-def _source(urdf: Path, root: Path, arguments: Mapping[str, str]) -> Source:
+def _source(urdf: Path, root: Path, arguments: Mapping[str, str]) -> RobotSource:
     text = _decoded(urdf)
     if urdf.suffix.lower() == SUFFIX or "<xacro:" in text:
         expansion = expanded(urdf, arguments, lambda package: _found_package(package, urdf))
-        return Source(urdf, root, expansion, is_expanded=True)
+        return RobotSource(urdf, root, expansion, is_expanded=True)
     if arguments:
         raise DescriptionError(f"{urdf}: it is no xacro file, and has no argument {', '.join(arguments)}")
-    return Source(urdf, root, text)
+    return RobotSource(urdf, root, text)
 
 
 def _decoded(urdf: Path) -> str:

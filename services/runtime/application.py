@@ -10,14 +10,14 @@ from pathlib import Path
 from schemas.deployment import Deployment
 from schemas.errors import ConfigurationError
 from services.runtime.deployment import load_deployment
-from services.runtime.errors import BusError, Refused
+from services.runtime.errors import BusError, RequestRefused
 from services.runtime.node import Node
 from services.runtime.process.freed_memory import give_back_freed_memory
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.shutdown import ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
 
 Run = Callable[[Node, Deployment], None]
-EXPECTED = (ConfigurationError, BusError, Refused)  # a sentence says all; anything else shows where it happened
+EXPECTED = (ConfigurationError, BusError, RequestRefused)  # a sentence says all; anything else shows where it happened
 
 
 def service(name: str, run: Run, arguments: Sequence[str] | None = None) -> None:

@@ -11,7 +11,7 @@ class NodeNameTaken(BusError):
     """Another living node has this name."""
 
 
-class Refused(Exception):
+class RequestRefused(Exception):
     """A server would not do what was asked; raised by handlers, and again at the client."""
 
     def __init__(self, message: str, kind: str = "refused") -> None:
@@ -19,7 +19,7 @@ class Refused(Exception):
         self.kind = kind  # as in `Failure.kind`
 
 
-class GoalRefused(Refused):
+class GoalRefused(RequestRefused):
     """An action's server did not accept the goal; `code` is the action's own."""
 
     def __init__(self, code: int, reason: str) -> None:

@@ -8,7 +8,7 @@ from collections import deque
 from schemas.system import Empty, NodeInfo
 from services.runtime.clock_offset import ClockOffset, best, measured
 from services.runtime.endpoints import info_request
-from services.runtime.errors import NoAnswer, Refused
+from services.runtime.errors import NoAnswer, RequestRefused
 from services.runtime.node import Node
 from services.runtime.requests.client import PendingCall
 
@@ -65,7 +65,7 @@ class NodeClock:
     def _take(self, pending: PendingCall[Empty, NodeInfo], asked: int, took: float) -> None:
         try:
             self.hear(pending.response(), asked, took)
-        except (NoAnswer, Refused):
+        except (NoAnswer, RequestRefused):
             return
 
     def hear(self, info: NodeInfo, asked: int, took: float) -> None:
@@ -86,7 +86,7 @@ class NodeClock:
 def ask_about(node: Node, other: str, timeout: float) -> tuple[NodeInfo, ClockOffset | None]:
     """What a node says of itself, and its clock against ours; blocks up to `timeout` [s] for each of a few questions.
 
-    Raises `NoAnswer` or `Refused`.
+    Raises `NoAnswer` or `RequestRefused`.
     """
     found = []
     for _ in range(ROUNDS):

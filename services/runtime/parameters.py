@@ -12,7 +12,7 @@ import msgspec
 
 from schemas.system import Empty, Parameter, Parameters, ParameterValue, SetParameter
 from schemas.topics import Request
-from services.runtime.errors import Refused
+from services.runtime.errors import RequestRefused
 from services.runtime.saved_parameters import SavedParameters
 
 P = TypeVar("P", bound=msgspec.Struct)
@@ -37,34 +37,36 @@ class ParameterSet(Generic[P]):
         return tuple(self._with_value(name) for name in self._declared)
 
     def set(self, name: str, value: ParameterValue, strict: bool = True) -> Parameter:
-        """Sets one; raises `Refused` with the nearest name, the type or the range. Text is converted if not strict."""
+        """Sets one; raises `RequestRefused` with the nearest name, type or range. Text is converted if not strict."""
         self._require(name)
         declared = self._declared[name]
         if strict and isinstance(value, bool) != (declared.type == "bool"):
-            raise Refused(f'{self._node}: parameter "{name}" is a {declared.type}: {value!r} is not')
+            raise RequestRefused(f'{self._node}: parameter "{name}" is a {declared.type}: {value!r} is not')
         if isinstance(value, str) and "\0" in value:
-            raise Refused(f'{self._node}: parameter "{name}" cannot be {value!r}: no path and no name has a NUL in it')
+            raise RequestRefused(
+                f'{self._node}: parameter "{name}" cannot be {value!r}: no path and no name has a NUL in it'
+            )
         values = {each: getattr(self.value, each) for each in self._declared} | {name: value}
         try:
             changed = msgspec.convert(values, self._kind, strict=strict)
         except (msgspec.ValidationError, ValueError) as error:
-            raise Refused(f'{self._node}: parameter "{name}" cannot be {value!r}: {_reason(error)}') from error
+            raise RequestRefused(f'{self._node}: parameter "{name}" cannot be {value!r}: {_reason(error)}') from error
         if declared.type == "float" and not math.isfinite(getattr(changed, name)):
-            raise Refused(f'{self._node}: parameter "{name}" cannot be {value!r}: it must be finite')
+            raise RequestRefused(f'{self._node}: parameter "{name}" cannot be {value!r}: it must be finite')
         self.value = changed
         return self._with_value(name)
 
     def set_all(self, values: Mapping[str, ParameterValue], origin: str, strict: bool) -> None:
-        """Sets those named in a file or on a command line; raises `Refused` that says so."""
+        """Sets those named in a file or on a command line; raises `RequestRefused` that says so."""
         for name, value in values.items():
             try:
                 self.set(name, value, strict)
-            except Refused as error:
-                raise Refused(f"{origin}: {error}") from error
+            except RequestRefused as error:
+                raise RequestRefused(f"{origin}: {error}") from error
 
     def _require(self, name: str) -> None:
         if name not in self._declared:
-            raise Refused(f'{self._node} has no parameter "{name}": {nearest(name, self._declared)}')
+            raise RequestRefused(f'{self._node} has no parameter "{name}": {nearest(name, self._declared)}')
 
     def _with_value(self, name: str) -> Parameter:
         return msgspec.structs.replace(self._declared[name], value=getattr(self.value, name))
@@ -139,7 +141,7 @@ class ParameterRegistry:
         self.set_request = Request(key, SetParameter, Parameter, node, about, recorded=False)
 
     def declare(self, kind: type[P]) -> ParameterSet[P]:
-        """Raises `Refused` where a value given cannot be."""
+        """Raises `RequestRefused` where a value given cannot be."""
         declared = ParameterSet(kind, self._node)
         declared.set_all(self._from_file, f"[parameters.{self._node}] of the deployment", strict=True)
         self._take_saved(declared)
@@ -153,7 +155,7 @@ class ParameterRegistry:
         try:
             for name, value in (values := self._saved.read()).items():
                 declared.set(name, value)
-        except Refused as error:
+        except RequestRefused as error:
             declared.value = before
             where = f"{self._saved.path}{self._saved.line(name)}: " if name else ""
             self._log.error(
@@ -169,7 +171,7 @@ class ParameterRegistry:
         return Parameters(parameters=tuple(each for declared in self._sets for each in declared.listed()))
 
     def set(self, wanted: SetParameter) -> Parameter:
-        """Raises `Refused` with the nearest name, the type or the range."""
+        """Raises `RequestRefused` with the nearest name, the type or the range."""
         for declared in self._sets:
             if wanted.name in declared.names:
                 before = declared.value
@@ -177,7 +179,7 @@ class ParameterRegistry:
                 if wanted.save:
                     try:
                         self._saved.keep(self._saved.read() | {parameter.name: parameter.value})
-                    except Refused:
+                    except RequestRefused:
                         declared.value = before  # what was asked for was both
                         raise
                     parameter = msgspec.structs.replace(parameter, saved_in=str(self._saved.path))
@@ -185,4 +187,4 @@ class ParameterRegistry:
                 self._log.info("parameter %s = %r%s", parameter.name, parameter.value, kept)
                 return parameter
         known = [name for declared in self._sets for name in declared.names]
-        raise Refused(f'{self._node} has no parameter "{wanted.name}": {nearest(wanted.name, known)}')
+        raise RequestRefused(f'{self._node} has no parameter "{wanted.name}": {nearest(wanted.name, known)}')

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from schemas.system import ParameterValue
-from services.runtime.errors import Refused
+from services.runtime.errors import RequestRefused
 
 FOLDER = "parameters"
 HEAD = "# As `gemelo param set --save` has left them; without this file the node starts as its deployment says.\n"
@@ -24,22 +24,24 @@ class SavedParameters:
         self.path = run_dir / FOLDER / f"{node}.toml"
 
     def read(self) -> dict[str, ParameterValue]:
-        """The values by name, none where there is no file; raises `Refused` with the line that is wrong."""
+        """The values by name, none where there is no file; raises `RequestRefused` with the line that is wrong."""
         try:
             text = self.path.read_text(encoding="utf-8")
         except FileNotFoundError:
             return {}
         except (OSError, UnicodeDecodeError) as error:
-            raise Refused(f"{self.path} cannot be read: {error}") from error
+            raise RequestRefused(f"{self.path} cannot be read: {error}") from error
         try:
             values = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             found = _LINE.search(str(error))
             where = f", line {found[1]}" if found else ""
-            raise Refused(f"{self.path}{where}: {error}") from error
+            raise RequestRefused(f"{self.path}{where}: {error}") from error
         for name, value in values.items():
             if not isinstance(value, bool | int | float | str):
-                raise Refused(f"{self.path}{self.line(name)}: {name} is {value!r}, not one number, word or truth")
+                raise RequestRefused(
+                    f"{self.path}{self.line(name)}: {name} is {value!r}, not one number, word or truth"
+                )
         return values
 
     def line(self, name: str) -> str:
@@ -52,7 +54,7 @@ class SavedParameters:
         return next((f", line {number}" for number, each in enumerate(lines, 1) if begin.match(each)), "")
 
     def keep(self, values: Mapping[str, ParameterValue]) -> None:
-        """Writes the file anew; raises `Refused` where it cannot."""
+        """Writes the file anew; raises `RequestRefused` where it cannot."""
         beside = self.path.with_suffix(".tmp")
         text = HEAD + "".join(f"{toml(name)} = {toml(value)}\n" for name, value in values.items())
         try:
@@ -60,7 +62,7 @@ class SavedParameters:
             beside.write_text(text, encoding="utf-8")
             os.replace(beside, self.path)
         except OSError as error:
-            raise Refused(f"{self.path} cannot be written: {error.strerror or error}") from error
+            raise RequestRefused(f"{self.path} cannot be written: {error.strerror or error}") from error
 
 
 def toml(value: ParameterValue) -> str:

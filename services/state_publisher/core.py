@@ -43,7 +43,7 @@ class Decimator:
 
 
 @dataclass(frozen=True)
-class Frames:
+class FramesUpdate:
     """The result of one joint state: moving frames, if they are due, and warnings, each once."""
 
     frames: FrameTransforms | None = None
@@ -76,10 +76,10 @@ class StatePublisher:
             )
         )
 
-    def on_joint_state(self, state: JointState) -> Frames:
+    def on_joint_state(self, state: JointState) -> FramesUpdate:
         """The frames of the joints in `state` and of those that mimic them; None where none is due or there is none."""
         if len(state.position) != len(state.name):
-            return Frames(warnings=self._drop("sizes", _sizes(state)))
+            return FramesUpdate(warnings=self._drop("sizes", _sizes(state)))
         warnings: tuple[str, ...] = ()
         positions: dict[str, float] = {}
         for name, position in zip(state.name, state.position, strict=True):
@@ -88,8 +88,8 @@ class StatePublisher:
             else:
                 warnings += self._drop(name, self._unknown(name))
         if not positions or not self.decimator.passes(state.stamp):
-            return Frames(warnings=warnings)
-        return Frames(self._frames(state.stamp, positions), warnings)
+            return FramesUpdate(warnings=warnings)
+        return FramesUpdate(self._frames(state.stamp, positions), warnings)
 
     def _frames(self, stamp: int, positions: dict[str, float]) -> FrameTransforms:
         known = complete(self._arm.model, positions) if self._has_mimics else positions

@@ -40,7 +40,7 @@ def rm1() -> Arm:
 
 
 @dataclass
-class Wire:
+class VirtualWire:
     """The treatment of frames in both directions."""
 
     delay: float = 0.001  # [s]
@@ -52,9 +52,9 @@ class Wire:
     spared: tuple[str, ...] = SPARED  # kinds without jitter, loss and duplicates
 
 
-def tcp_wire() -> Wire:
+def tcp_wire() -> VirtualWire:
     """A network that delays every frame by 1 to 8 ms, in order."""
-    return Wire(delay=0.001, jitter=0.007, is_ordered=True, spared=())
+    return VirtualWire(delay=0.001, jitter=0.007, is_ordered=True, spared=())
 
 
 class VirtualArm(GatewayDriver):
@@ -66,7 +66,7 @@ class VirtualArm(GatewayDriver):
 
     def __init__(
         self,
-        wire: Wire | None = None,
+        wire: VirtualWire | None = None,
         seed: int = 1,
         start: Vector | None = None,
         referenced: bool = True,
@@ -82,7 +82,7 @@ class VirtualArm(GatewayDriver):
     ) -> None:
         super().__init__(on_message)
         self.arm = arm or rm1()
-        self.wire = wire or Wire()
+        self.wire = wire or VirtualWire()
         self.rng = random.Random(seed)
         self.now_us = 0
         steps = reference_steps(self.arm)

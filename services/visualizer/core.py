@@ -24,7 +24,7 @@ from services.visualizer.content.panel import PanelInputs, is_lost, panel, shaft
 from services.visualizer.content.preview import MOVING, PlanPreview
 from services.visualizer.content.scene import MeshLoader, SceneView, load_no_mesh
 from services.visualizer.content.thinning import ThinnedSeries
-from services.visualizer.content.updates import LineStrip, Panel, Scalars, State, Times, Tint, Update
+from services.visualizer.content.updates import LineStrip, Scalars, StateUpdate, TextPanel, Times, Tint, Update
 from services.visualizer.model.rotations import Array
 from services.visualizer.model.visual_model import VisualJoint, VisualModel
 
@@ -195,8 +195,9 @@ class Visualizer:
         mode, text = self._mode(), panel(self._panel_inputs, now)
         shown, self._shown = self._shown, (mode, text)
         updates: list[Update] = []
-        updates += [State(entities.MODE, now, mode), Tint(entities.MEASURED, now, mode)] if mode != shown[0] else []
-        updates += [Panel(entities.PANEL, now, text)] if text != shown[1] else []
+        if mode != shown[0]:
+            updates += [StateUpdate(entities.MODE, now, mode), Tint(entities.MEASURED, now, mode)]
+        updates += [TextPanel(entities.PANEL, now, text)] if text != shown[1] else []
         return updates
 
     def _mode(self) -> str:

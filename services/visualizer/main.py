@@ -22,7 +22,7 @@ from services.runtime.process.priority import step_behind
 from services.visualizer.core import Visualizer
 from services.visualizer.feeds import feeds
 from services.visualizer.model.mesh_files import missing_meshes, scene_mesh
-from services.visualizer.model.triangle_meshes import TriangleMesh
+from services.visualizer.model.triangle_meshes import ShadedMesh
 from services.visualizer.model.urdf import parse_urdf, tool_link
 from services.visualizer.render.arms_layout import SharedView
 from services.visualizer.render.layout import ArmLayout
@@ -84,7 +84,7 @@ def _visualizer(
     """The core for the arm that was described, fed from the bus; the scene's mesh files are in `folders`."""
     model = parse_urdf(message.urdf)
 
-    def load(shape: MeshShape) -> TriangleMesh | None:
+    def load(shape: MeshShape) -> ShadedMesh | None:
         return scene_mesh(shape, folders, node.log.warning)
 
     core = Visualizer(model, message.robot, tool_link(model, message.robot_toml), load)

@@ -34,11 +34,11 @@ from services.runtime.deployment import DeploymentError, load_deployment, projec
 from services.visualizer.core import Visualizer
 from services.visualizer.feeds import feeds
 from services.visualizer.model.mesh_files import scene_mesh
-from services.visualizer.model.triangle_meshes import TriangleMesh
+from services.visualizer.model.triangle_meshes import ShadedMesh
 from services.visualizer.model.urdf import parse_urdf, tool_link
 from services.visualizer.program.rerun_program import rerun_binary, start, stop
 from services.visualizer.program.screenshot import LOOPBACK, free_port, save_screenshot
-from services.visualizer.render.layout import ArmLayout, Moment, blueprint
+from services.visualizer.render.layout import ArmLayout, OpeningMoment, blueprint
 from services.visualizer.render.sink import APPLICATION, Sink
 from services.visualizer.viewer import address, resolved
 
@@ -67,7 +67,7 @@ def write_view(file: Path, rrd: Path, shadow: Path) -> Incident | None:
     stream = rr.RecordingStream(APPLICATION, recording_id=file.stem)
     rrd.parent.mkdir(parents=True, exist_ok=True)
     stream.save(rrd)
-    moment = None if incident is None else Moment(incident.stamp, story_text(incident))
+    moment = None if incident is None else OpeningMoment(incident.stamp, story_text(incident))
     layout = blueprint(ArmLayout(core.model, chosen.window, chosen.trail, cameras), moment)
     sink = Sink(stream, core.model, shadow, layout, story="" if moment is None else moment.story)
     drawn = 0
@@ -108,7 +108,7 @@ def _cameras_in(reader: RecordingReader) -> tuple[str, ...]:
 def _core(description: RobotDescription, folders: tuple[Path, ...]) -> Visualizer:
     model = parse_urdf(description.urdf)
 
-    def load(shape: MeshShape) -> TriangleMesh | None:
+    def load(shape: MeshShape) -> ShadedMesh | None:
         return scene_mesh(shape, folders, lambda text: print(text, file=sys.stderr))
 
     return Visualizer(model, description.robot, tool_link(model, description.robot_toml), load)

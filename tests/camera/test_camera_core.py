@@ -6,7 +6,7 @@ import pytest
 
 from schemas.camera import CameraCondition, CameraImage, CameraStatus
 from services.camera.core import CameraCore
-from services.camera.sources.source import CameraFault, Frame
+from services.camera.sources.source import CameraFault, EncodedImage
 
 SECOND = 1_000_000_000
 STEP = SECOND // 10
@@ -36,7 +36,7 @@ class Watched:
 
     def frame(self, same: bool = False) -> CameraImage | None:
         self._count += 0 if same else 1
-        return self.core.on_frame(Frame(self.now - 5, 640, 480, b"\xff\xd8%d" % self._count), self.now)
+        return self.core.on_frame(EncodedImage(self.now - 5, 640, 480, b"\xff\xd8%d" % self._count), self.now)
 
     def fault(self, condition: CameraCondition, text: str = 'camera "webcam": no') -> None:
         self.core.on_fault(CameraFault(condition, text), self.now)

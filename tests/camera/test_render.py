@@ -9,7 +9,7 @@ import pytest
 from schemas.camera import CameraInfo
 from services.arm.frames.transforms import IDENTITY, Rigid, from_rpy
 from services.camera.virtual.render import Optics, render
-from services.camera.virtual.solids import Face, Solid, box, cylinder, sphere, tag
+from services.camera.virtual.solids import Face, PosedSolid, box, cylinder, sphere, tag
 
 EXACT = Optics(samples=3, blur=0.0, noise=0.0, background=(0, 0, 0))
 BARREL = (-0.28, 0.09, 0.0012, -0.0009, -0.01)
@@ -37,11 +37,11 @@ def projected(points: np.ndarray, info: CameraInfo, pose: Rigid) -> np.ndarray:
     return cv2.projectPoints(points, vector, -turn.T @ np.array(pose[0]), matrix, distortion)[0].reshape(-1, 2)
 
 
-def plate(centre: tuple[float, float, float], side: float, level: int = 255) -> Solid:
+def plate(centre: tuple[float, float, float], side: float, level: int = 255) -> PosedSolid:
     """A flat square that faces upwards."""
     h = side / 2.0
     corners = np.array([[-h, -h, 0.0], [h, -h, 0.0], [h, h, 0.0], [-h, h, 0.0]])
-    return Solid((Face(corners, texture=np.full((1, 1), level, np.uint8)),), (centre, IDENTITY[1]))
+    return PosedSolid((Face(corners, texture=np.full((1, 1), level, np.uint8)),), (centre, IDENTITY[1]))
 
 
 def centroids(image: np.ndarray, near: np.ndarray, reach: int = 8) -> np.ndarray:
@@ -83,7 +83,7 @@ def test_what_is_nearer_hides_what_is_farther_also_where_its_centre_is_farther()
     """Painter's order by the faces' centres draws a large table over a small tag near the far edge of it."""
     pose: Rigid = ((-0.6, 0.0, 0.35), from_rpy(-2.1, 0.0, -np.pi / 2.0))
     corners = np.array([[-0.7, -1.0, 0.0], [3.0, -1.0, 0.0], [3.0, 1.0, 0.0], [-0.7, 1.0, 0.0]])
-    table = Solid((Face(corners, (90, 60, 30)),))
+    table = PosedSolid((Face(corners, (90, 60, 30)),))
     tags = [
         tag("apriltag_36h11", n, 0.06, ((0.16 * (n // 4) - 0.1, 0.1 * (n % 4) - 0.15, 1e-4), DOWN_UP)) for n in range(8)
     ]
@@ -110,8 +110,8 @@ def test_faces_that_pass_through_one_another_meet_where_they_do() -> None:
     pose: Rigid = ((0.0, 0.0, 0.5), DOWN)
     tilt = from_rpy(0.0, 0.5, 0.0)
     back = from_rpy(0.0, -0.5, 0.0)
-    red = Solid(box((0.2, 0.2, 0.001), (255, 0, 0)).faces, ((0.0, 0.0, 0.0), tilt))
-    blue = Solid(box((0.2, 0.2, 0.001), (0, 0, 255)).faces, ((0.0, 0.0, 0.0), back))
+    red = PosedSolid(box((0.2, 0.2, 0.001), (255, 0, 0)).faces, ((0.0, 0.0, 0.0), tilt))
+    blue = PosedSolid(box((0.2, 0.2, 0.001), (0, 0, 255)).faces, ((0.0, 0.0, 0.0), back))
     image = render([red, blue], camera(), pose, EXACT)
     left, right = image[236, 325 - 40], image[236, 325 + 40]
     assert left[0] > 100 > left[2]

@@ -17,8 +17,8 @@ import pytest
 
 from schemas.camera import CameraCondition
 from schemas.cell import CameraRecord, V4l2Source, VirtualSource
-from services.camera.reader import Reader
-from services.camera.sources.source import CameraFault, Frame, encoded
+from services.camera.reader import ImageReader
+from services.camera.sources.source import CameraFault, EncodedImage, encoded
 from services.camera.sources.stored import FolderOfImages, Video
 from services.camera.sources.v4l2 import MJPG, V4l2Camera, capture_stamp, holder_of
 
@@ -232,23 +232,25 @@ def pictures(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def reading(pictures: Path) -> Iterator[tuple[Reader, threading.Semaphore]]:
+def reading(pictures: Path) -> Iterator[tuple[ImageReader, threading.Semaphore]]:
     woken = threading.Semaphore(0)
-    reader = Reader(FolderOfImages(RECORD, pictures, loop=True), woken.release)
+    reader = ImageReader(FolderOfImages(RECORD, pictures, loop=True), woken.release)
     reader.start()
     yield reader, woken
     reader.stop()
 
 
-def test_a_source_that_goes_comes_back_by_itself(pictures: Path, reading: tuple[Reader, threading.Semaphore]) -> None:
+def test_a_source_that_goes_comes_back_by_itself(
+    pictures: Path, reading: tuple[ImageReader, threading.Semaphore]
+) -> None:
     reader, woken = reading
-    assert isinstance(next_of(reader, woken, Frame), Frame)
+    assert isinstance(next_of(reader, woken, EncodedImage), EncodedImage)
     shutil.move(pictures, pictures.with_name("away"))
     fault = next_of(reader, woken, CameraFault)
     assert isinstance(fault, CameraFault)
     assert fault.condition is CameraCondition.MISSING
     shutil.move(pictures.with_name("away"), pictures)
-    assert isinstance(next_of(reader, woken, Frame), Frame)
+    assert isinstance(next_of(reader, woken, EncodedImage), EncodedImage)
 
 
 @pytest.mark.parametrize("error", [PermissionError(13, "Permission denied"), cv2.error("no memory")])
@@ -257,21 +259,21 @@ def test_a_source_that_fails_in_a_way_of_its_own_is_named_and_tried_again(
 ) -> None:
     real, errors = FolderOfImages.read, [error]
 
-    def read(self: FolderOfImages) -> Frame:
+    def read(self: FolderOfImages) -> EncodedImage:
         if errors:
             raise errors.pop()
         return real(self)
 
     monkeypatch.setattr(FolderOfImages, "read", read)
     woken = threading.Semaphore(0)
-    reader = Reader(FolderOfImages(RECORD, pictures, loop=True), woken.release, "webcam")
+    reader = ImageReader(FolderOfImages(RECORD, pictures, loop=True), woken.release, "webcam")
     reader.start()
     try:
         fault = next_of(reader, woken, CameraFault)
         assert isinstance(fault, CameraFault)
         assert str(fault).startswith('camera "webcam": ')
         assert fault.condition is CameraCondition.REFUSED
-        assert isinstance(next_of(reader, woken, Frame), Frame)
+        assert isinstance(next_of(reader, woken, EncodedImage), EncodedImage)
     finally:
         reader.stop()
 
@@ -299,7 +301,7 @@ def test_a_single_picture_that_is_removed_is_missing_and_comes_back(pictures: Pa
 
 
 def test_a_slow_reader_gets_the_newest_image_only_and_is_woken_once(
-    reading: tuple[Reader, threading.Semaphore],
+    reading: tuple[ImageReader, threading.Semaphore],
 ) -> None:
     reader, woken = reading
     assert woken.acquire(timeout=5.0)
@@ -312,10 +314,10 @@ def test_a_slow_reader_gets_the_newest_image_only_and_is_woken_once(
         os.sched_yield()
     assert not woken.acquire(blocking=False)
     events = reader.take()
-    assert [type(each) for each in (*first, *events)] == [Frame, Frame]
+    assert [type(each) for each in (*first, *events)] == [EncodedImage, EncodedImage]
 
 
-def next_of(reader: Reader, woken: threading.Semaphore, kind: type) -> object:
+def next_of(reader: ImageReader, woken: threading.Semaphore, kind: type) -> object:
     """Takes until something of that kind has come."""
     deadline = time.monotonic() + 10.0
     while time.monotonic() < deadline:

@@ -21,7 +21,7 @@ from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_rpy, i
 from services.arm.kinematics.chain import link_transforms
 from services.arm.model.description import Arm, load_arm
 from services.camera.virtual.virtual_camera import VirtualCamera, base_from_camera, outline, projected, true_detections
-from services.camera.virtual.world import World
+from services.camera.virtual.world import CameraWorld
 
 
 @pytest.fixture(params=["rm1", "parol6"])
@@ -35,18 +35,18 @@ def cell(arm: Arm) -> Cell:
 
 
 @pytest.fixture
-def world(arm: Arm, cell: Cell) -> World:
-    return World(arm, cell)
+def world(arm: Arm, cell: Cell) -> CameraWorld:
+    return CameraWorld(arm, cell)
 
 
-def stand(world: World, arm: Arm, name: str, stamp: int = 1) -> dict[str, Rigid]:
+def stand(world: CameraWorld, arm: Arm, name: str, stamp: int = 1) -> dict[str, Rigid]:
     """The arm in a named state; the true pose of every link."""
     values = arm.named_states[name]
     world.on_joint_state(JointState(stamp=stamp, name=arm.joint_names, position=values))
     return link_transforms(arm.model, dict(zip(arm.joint_names, values, strict=True)))
 
 
-def image_of(cell: Cell, world: World, arm: Arm) -> tuple[np.ndarray, CameraInfo]:
+def image_of(cell: Cell, world: CameraWorld, arm: Arm) -> tuple[np.ndarray, CameraInfo]:
     record = cell.camera("overhead")
     assert isinstance(record.source, VirtualSource)
     info = exact_info(record, arm.base_frame)
@@ -62,7 +62,9 @@ def tags_in(image: np.ndarray) -> dict[int, np.ndarray]:
     )
 
 
-def test_the_tags_of_the_sample_cell_are_found_where_the_truth_has_them(arm: Arm, cell: Cell, world: World) -> None:
+def test_the_tags_of_the_sample_cell_are_found_where_the_truth_has_them(
+    arm: Arm, cell: Cell, world: CameraWorld
+) -> None:
     stand(world, arm, "left")
     image, info = image_of(cell, world, arm)
     found = tags_in(image)
@@ -75,7 +77,9 @@ def test_the_tags_of_the_sample_cell_are_found_where_the_truth_has_them(arm: Arm
     assert np.abs(tags_in(image)[1] - np.array(truth["cup"].corners)).max() < 2.0
 
 
-def test_the_jaws_carry_a_thing_and_let_it_fall_upright_onto_the_table(arm: Arm, cell: Cell, world: World) -> None:
+def test_the_jaws_carry_a_thing_and_let_it_fall_upright_onto_the_table(
+    arm: Arm, cell: Cell, world: CameraWorld
+) -> None:
     links = stand(world, arm, "ready")
     tool = links[arm.tool_frame]
     cup = cell.thing("cup")
@@ -101,7 +105,7 @@ def test_the_jaws_carry_a_thing_and_let_it_fall_upright_onto_the_table(arm: Arm,
 
 @pytest.mark.parametrize("offset", [(0.02, 0.0, 0.008), (0.0, 0.03, 0.008), (0.0, 0.0, 0.05)])
 def test_jaws_that_close_beside_a_thing_do_not_hold_it(
-    arm: Arm, cell: Cell, world: World, offset: tuple[float, float, float]
+    arm: Arm, cell: Cell, world: CameraWorld, offset: tuple[float, float, float]
 ) -> None:
     tool = stand(world, arm, "ready")[arm.tool_frame]
     there = compose(tool, (offset, IDENTITY[1]))
@@ -117,7 +121,7 @@ def test_jaws_that_close_beside_a_thing_do_not_hold_it(
 def test_jaws_are_as_far_apart_as_the_side_that_is_between_them(arm: Arm, cell: Cell, turn: float, side: float) -> None:
     """They close along the tool's y, on the longer side too."""
     block = replace(next(each for each in cell.things if each.name == "red_block"), box=(0.034, 0.026, 0.03))
-    world = World(arm, Cell(cell.path, things=(block,), table=cell.table))
+    world = CameraWorld(arm, Cell(cell.path, things=(block,), table=cell.table))
     tool = stand(world, arm, "ready")[arm.tool_frame]
     world.put("red_block", compose(tool, ((0.0, 0.0, 0.008), from_rpy(np.pi, 0.0, turn))))
     assert arm.gripper is not None
@@ -132,7 +136,7 @@ def test_jaws_are_as_far_apart_as_the_side_that_is_between_them(arm: Arm, cell: 
     assert world.snapshot().things["red_block"] == fallen
 
 
-def test_closed_jaws_that_come_upon_a_thing_do_not_hold_it(arm: Arm, cell: Cell, world: World) -> None:
+def test_closed_jaws_that_come_upon_a_thing_do_not_hold_it(arm: Arm, cell: Cell, world: CameraWorld) -> None:
     tool = stand(world, arm, "ready")[arm.tool_frame]
     world.on_gripper_state(GripperState(known=True, position=0.0))
     there = compose(tool, ((0.0, 0.0, 0.008), IDENTITY[1]))
@@ -143,7 +147,7 @@ def test_closed_jaws_that_come_upon_a_thing_do_not_hold_it(arm: Arm, cell: Cell,
 
 
 def test_obstacles_of_the_scene_are_seen_but_never_what_is_believed_of_a_thing(
-    arm: Arm, cell: Cell, world: World
+    arm: Arm, cell: Cell, world: CameraWorld
 ) -> None:
     stand(world, arm, "left")
     before, info = image_of(cell, world, arm)
@@ -166,7 +170,7 @@ def test_obstacles_of_the_scene_are_seen_but_never_what_is_believed_of_a_thing(
 def test_the_arm_hides_a_tag_below_it(rm1_folder: Path) -> None:
     arm = load_arm(rm1_folder)
     cell = load_cell(rm1_folder / "cell.toml", arm)
-    world = World(arm, cell)
+    world = CameraWorld(arm, cell)
     stand(world, arm, "left")
     world.put("cup", ((0.25, 0.0, 0.04), IDENTITY[1]))
     assert 1 in tags_in(image_of(cell, world, arm)[0])
@@ -177,7 +181,7 @@ def test_the_arm_hides_a_tag_below_it(rm1_folder: Path) -> None:
 def test_a_camera_on_a_link_moves_with_it(rm1_folder: Path) -> None:
     arm = load_arm(rm1_folder)
     info = CameraInfo(parent="efector_link", parent_from_camera=Transform(translation=(0.05, 0.0, -0.1)))
-    world = World(arm, Cell(Path()))
+    world = CameraWorld(arm, Cell(Path()))
     for name in ("ready", "left"):
         links = stand(world, arm, name)
         expected = compose(links["efector_link"], ((0.05, 0.0, -0.1), IDENTITY[1]))
@@ -187,7 +191,7 @@ def test_a_camera_on_a_link_moves_with_it(rm1_folder: Path) -> None:
 def test_a_world_that_stands_still_is_drawn_once_and_its_noise_every_time(rm1_folder: Path) -> None:
     arm = load_arm(rm1_folder)
     cell = load_cell(rm1_folder / "cell.toml", arm)
-    world = World(arm, cell)
+    world = CameraWorld(arm, cell)
     record = cell.camera("overhead")
     assert isinstance(record.source, VirtualSource)
     camera = VirtualCamera(record, record.source, exact_info(record, arm.base_frame), world.snapshot)
@@ -208,7 +212,7 @@ def test_the_stamp_of_an_image_is_that_of_the_joints_it_shows(rm1_folder: Path) 
 
     arm = load_arm(rm1_folder)
     cell = load_cell(rm1_folder / "cell.toml", arm)
-    world = World(arm, cell)
+    world = CameraWorld(arm, cell)
     record = cell.camera("overhead")
     assert isinstance(record.source, VirtualSource)
     camera = VirtualCamera(record, record.source, exact_info(record, arm.base_frame), world.snapshot)

@@ -38,7 +38,7 @@ from schemas.topics import (
     STEP_ERRORS,
 )
 from services.arm.model.description import Arm, load_arm
-from services.cli.session import Session
+from services.cli.session import CommandSession
 from services.planner.core import Planner
 from services.runtime.actions import accept, refuse
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
@@ -147,9 +147,9 @@ def planner(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterato
 
 
 @pytest.fixture
-def session(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[Session]:
+def session(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[CommandSession]:
     with Node("cli-1", deployment, robot="rm1", bus=MemoryBus(network)) as node:
-        yield Session(deployment, arm, node)
+        yield CommandSession(deployment, arm, node)
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from services.cli import board_doctor
-from services.cli.board_doctor import Heard, diagnose
+from services.cli.board_doctor import MeasuredArrivals, diagnose
 from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.runtime.serial_frames import JsonFrame, json_frame, packet
@@ -43,14 +43,14 @@ SAID = {
 def test_the_cause_is_told_from_what_is_heard(name):
     data, cause = SAID[name]
     at_wrong_rate = bytes(byte | 128 for byte in data)  # text is not read as text there
-    finding = diagnose([Heard(921_600, at_wrong_rate[:400], False), Heard(115_200, data, False)])
+    finding = diagnose([MeasuredArrivals(921_600, at_wrong_rate[:400], False), MeasuredArrivals(115_200, data, False)])
     assert cause in finding.cause
     assert finding.remedy
     assert not finding.is_well
 
 
 def test_a_board_that_is_well_is_said_to_be():
-    assert diagnose([Heard(921_600, b"", True)]).is_well
+    assert diagnose([MeasuredArrivals(921_600, b"", True)]).is_well
 
 
 @pytest.fixture

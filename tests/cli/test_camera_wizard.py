@@ -24,7 +24,7 @@ from services.arm.model.description import Arm
 from services.bench.vision import images
 from services.bench.vision.images import Surface, render
 from services.camera.virtual.virtual_camera import VirtualCamera
-from services.camera.virtual.world import World
+from services.camera.virtual.world import CameraWorld
 from services.cli import camera_mount
 from services.cli.camera_boards import CHESS_BOARD, TAG_BOARD, tag_board
 from services.cli.camera_calibrate import take
@@ -190,7 +190,7 @@ def touched(
 ) -> ExitCode:
     """`gemelo camera mount` where a person touches nine points of the board, `off` [m] beside them."""
     known = load_cell(cell, arm)
-    record, world = known.camera("overhead"), World(arm, known)
+    record, world = known.camera("overhead"), CameraWorld(arm, known)
     world.on_joint_state(JointState(stamp=1, name=arm.joint_names, position=arm.named_states["folded"]))
     assert isinstance(record.source, VirtualSource)
     exact = exact_info(record, arm.base_frame)

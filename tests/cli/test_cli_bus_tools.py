@@ -58,7 +58,7 @@ from services.cli.errors import CommandError, ExitCode
 from services.cli.field_path import FieldPath, leaves
 from services.cli.forms import csv_lines, json_line, yaml_document
 from services.cli.main import run
-from services.cli.session import Session
+from services.cli.session import CommandSession
 from services.recordings.table import exchanges_of
 from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
@@ -418,7 +418,7 @@ def test_top_has_every_node_with_its_figures(session, stack, capsys):
 
 
 def test_top_says_what_was_lost_what_was_bad_and_how_late_a_loop_is(session, stack, deployment, network):
-    reports: list[top.Report] = []
+    reports: list[top.TopReport] = []
     with (
         Node("sleeper", deployment, robot="rm1", bus=MemoryBus(network), log_level="error") as node,
         closing(MemoryBus(network)) as stranger,
@@ -444,7 +444,7 @@ def test_top_says_what_was_lost_what_was_bad_and_how_late_a_loop_is(session, sta
 
 def test_top_goes_on_where_a_node_hangs(session, stack, deployment, network):
     """One that spoke a moment ago, and now does not say what its process is."""
-    reports: list[top.Report] = []
+    reports: list[top.TopReport] = []
     with (
         Node("hanging", deployment, robot="rm1", bus=MemoryBus(network)),  # and nobody lets it spin
         Node("speaker", deployment, robot="rm1", bus=MemoryBus(network)) as speaker,
@@ -500,7 +500,7 @@ def test_a_part_of_an_action_and_a_field_of_it_are_followed(
         shown = action_watch.ActionView(FOLLOW_JOINT_TRAJECTORY, part, path, form)
         with Node("cli-3", deployment, robot="rm1", bus=MemoryBus(network)) as node:
             connected.start(joints=goal)
-            session = Session(deployment, arm, node)
+            session = CommandSession(deployment, arm, node)
             assert action_watch.echo(session, FOLLOW_JOINT_TRAJECTORY, 1, shown) is ExitCode.OK
         return capsys.readouterr().out.splitlines()
 

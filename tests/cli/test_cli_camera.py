@@ -18,7 +18,7 @@ from schemas.topics import camera_detections, camera_image, camera_info, camera_
 from services.cli import camera
 from services.cli.errors import ExitCode
 from services.cli.main import run
-from services.cli.session import Session
+from services.cli.session import CommandSession
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.deployment import load_deployment
 from services.runtime.node import Node
@@ -53,8 +53,8 @@ def stack(cell: Path, devices: Path, rm1, monkeypatch: pytest.MonkeyPatch) -> It
     ):
 
         @contextmanager
-        def connected(robot: object = None) -> Iterator[Session]:
-            yield Session(deployment, rm1, node)
+        def connected(robot: object = None) -> Iterator[CommandSession]:
+            yield CommandSession(deployment, rm1, node)
 
         monkeypatch.setattr(camera, "connect", connected)
         yield speaker

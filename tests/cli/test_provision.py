@@ -13,7 +13,7 @@ import msgspec
 import pytest
 
 from services.cli import provision as module
-from services.cli.credentials import Credentials, certificate, password, private_key, require_sound
+from services.cli.credentials import CredentialsChange, certificate, password, private_key, require_sound
 from services.cli.errors import CommandError, ExitCode
 from services.cli.main import run
 from services.credentials.authority import Authority
@@ -124,7 +124,7 @@ def test_a_key_that_others_can_read_or_that_is_none_is_not_sent(tmp_path):
 def test_a_board_that_starts_while_it_is_told_is_told_again(line, quick):
     board, port = line
     board.deaf = 2
-    assert module.provision(port, 115_200, Credentials(device="rm1")) is ExitCode.OK
+    assert module.provision(port, 115_200, CredentialsChange(device="rm1")) is ExitCode.OK
     assert board.told == [{"device": "rm1"}]
 
 
@@ -132,14 +132,14 @@ def test_a_refusal_is_in_the_boards_words(line, quick):
     board, port = line
     board.refuses = "the arm moves"
     with pytest.raises(CommandError, match="the device refused: the arm moves"):
-        module.provision(port, 115_200, Credentials(device="rm1"))
+        module.provision(port, 115_200, CredentialsChange(device="rm1"))
 
 
 def test_silence_names_what_to_look_at(line, quick):
     board, port = line
     board.deaf = 100
     with pytest.raises(CommandError, match=r"no answer in 0\.5 s: is it the right --serial port"):
-        module.provision(port, 115_200, Credentials(device="rm1"))
+        module.provision(port, 115_200, CredentialsChange(device="rm1"))
 
 
 def test_a_port_that_is_not_there_is_named(capsys, tmp_path):
@@ -186,12 +186,12 @@ def test_a_password_comes_from_the_environment_a_terminal_or_a_pipe(monkeypatch)
 @pytest.mark.parametrize(
     ("credentials", "reason"),
     [
-        (Credentials(), "nothing to tell"),
-        (Credentials(wifi_ssid="ñ" * 17), "34 bytes"),
-        (Credentials(wifi_ssid="lab", wifi_password="short"), "5 characters, not 8 to 63"),
-        (Credentials(mqtt_uri="10.0.0.2"), "mqtt://host:1883"),
-        (Credentials(mqtt_certificate="PEM"), "belong together"),
-        (Credentials(serial_baud="300"), "300 is not within 9600 to 3000000"),
+        (CredentialsChange(), "nothing to tell"),
+        (CredentialsChange(wifi_ssid="ñ" * 17), "34 bytes"),
+        (CredentialsChange(wifi_ssid="lab", wifi_password="short"), "5 characters, not 8 to 63"),
+        (CredentialsChange(mqtt_uri="10.0.0.2"), "mqtt://host:1883"),
+        (CredentialsChange(mqtt_certificate="PEM"), "belong together"),
+        (CredentialsChange(serial_baud="300"), "300 is not within 9600 to 3000000"),
     ],
 )
 def test_what_no_board_could_use_is_not_sent(credentials, reason):

@@ -19,7 +19,7 @@ from services.arm.cell.colours import RGB, nearest_colour
 from services.arm.frames.transforms import from_rpy
 from services.arm.model.description import Arm, load_arm
 from services.camera.virtual.virtual_camera import VirtualCamera, true_detections
-from services.camera.virtual.world import World
+from services.camera.virtual.world import CameraWorld
 from services.detector.core import Detector
 from services.vision.rigid import Array, from_transform
 
@@ -42,7 +42,7 @@ class Table:
     def __init__(self, arm: Arm, cell: Cell | None = None, believed: Cell | None = None) -> None:
         """`believed`: what the detector is told, where that is not the truth."""
         self.cell = cell or load_cell(arm.folder / "cell.toml", arm)
-        self.world = World(arm, self.cell)
+        self.world = CameraWorld(arm, self.cell)
         values = arm.named_states["ready"]
         self.world.on_joint_state(JointState(stamp=1, name=arm.joint_names, position=values))
         record = self.cell.camera("overhead")

@@ -25,7 +25,7 @@ from services.arm.kinematics.chain import link_transforms
 from services.arm.model.description import Arm, load_arm
 from services.camera.sources.source import encoded
 from services.camera.virtual.virtual_camera import VirtualCamera
-from services.camera.virtual.world import World
+from services.camera.virtual.world import CameraWorld
 from services.detector.images import NoPicture, decoded
 from services.detector.main import Places, run
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
@@ -69,7 +69,7 @@ def running(deployment: Deployment) -> Iterator[Node]:
 
 def picture(arm: Arm, cell: Cell) -> tuple[bytes, CameraInfo]:
     """The sample cell as its camera sees it, with the arm aside."""
-    record, world = cell.camera("overhead"), World(arm, cell)
+    record, world = cell.camera("overhead"), CameraWorld(arm, cell)
     world.on_joint_state(JointState(stamp=1, name=arm.joint_names, position=arm.named_states["folded"]))
     assert isinstance(record.source, VirtualSource)
     info = believed_info(cell, record, arm.base_frame)

@@ -6,11 +6,11 @@ import pytest
 
 from firmware.platform.host.board import DeviceClock
 from schemas.actions import GoalStatusCode
-from services.virtual_arm.virtual_arm import BOOTED, VirtualArm, Wire
+from services.virtual_arm.virtual_arm import BOOTED, VirtualArm, VirtualWire
 from tests.stepper_gateway.harness import move
 
 
-def drifting_arm(ppm: float, wire: Wire) -> tuple[VirtualArm, DeviceClock]:
+def drifting_arm(ppm: float, wire: VirtualWire) -> tuple[VirtualArm, DeviceClock]:
     """An arm whose device counts its own microseconds, and the device's clock."""
     clock = DeviceClock(0.0, BOOTED)
     clock.drift(0.0, ppm)
@@ -25,7 +25,7 @@ def clock_error(rig: VirtualArm, clock: DeviceClock) -> float:
 
 @pytest.mark.parametrize("ppm", [100.0, -100.0])
 def test_a_clock_that_is_100_ppm_off_is_known_to_three_milliseconds_all_the_time(ppm: float):
-    rig, clock = drifting_arm(ppm, Wire(delay=0.001, jitter=0.004))
+    rig, clock = drifting_arm(ppm, VirtualWire(delay=0.001, jitter=0.004))
     rig.ready()
     errors = []
     for number in range(3):

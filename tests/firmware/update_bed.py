@@ -28,7 +28,7 @@ from services.arm.model.description import load_arm
 from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.cli.provision import BAUD, open_line
-from services.cli.update_transfer import SerialWire, UpdateStatus, Wire, await_status
+from services.cli.update_transfer import SerialWire, UpdateStatus, UpdateWire, await_status
 from services.mqtt.access import BrokerAccess
 from services.runtime.firmware_update import UpdateAck
 from services.runtime.process.readiness import Readiness
@@ -133,7 +133,7 @@ class UpdateBed:
 class LossyWire:
     """A wire on which some frames are lost, doubled or damaged: `passes` says what arrives of the n-th."""
 
-    def __init__(self, wire: Wire, passes: Callable[[int, bytes], list[bytes]]) -> None:
+    def __init__(self, wire: UpdateWire, passes: Callable[[int, bytes], list[bytes]]) -> None:
         self._wire, self._passes = wire, passes
         self.sent = 0
 

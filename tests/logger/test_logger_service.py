@@ -60,7 +60,7 @@ from services.planner.scene.scene_store import SceneStore
 from services.runtime.actions import accept
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.deployment import load_deployment
-from services.runtime.errors import Refused
+from services.runtime.errors import RequestRefused
 from services.runtime.node import Node
 from services.visualizer.render.outputs import VisualizerParameters
 
@@ -388,7 +388,7 @@ def test_sigterm_ends_it_with_a_finished_file(environment, tmp_path):
 def test_a_folder_that_no_disk_can_have_is_refused_and_the_logger_goes_on(deployment, tmp_path):
     network = MemoryNetwork()
     with Node("client", deployment, bus=MemoryBus(network)) as client, running(deployment, network) as logger:
-        with pytest.raises(Refused, match="NUL"):
+        with pytest.raises(RequestRefused, match="NUL"):
             client.call(
                 Request("@node/logger/parameters/set", SetParameter, Parameter, "logger", ""),
                 SetParameter(name="log_dir", value="a\0b"),

@@ -17,7 +17,7 @@ from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm, load_arm
 from services.planner.kinematics.closed_form import closed_form, turns_about
 from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.targets import Target
+from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import NEVER
 
 ROOT = Path(__file__).parents[2] / "urdf"
@@ -46,7 +46,7 @@ def test_parol6_has_one_and_rm1_does_not():
 @given(CONFIGURATIONS)
 def test_the_configuration_that_a_pose_was_made_of_is_among_the_solutions(goal: tuple[float, ...]):
     pose = KINEMATICS.tool(goal)
-    solutions = list(IK.solutions(Target(pose.position, pose.rotation), READY, NEVER))
+    solutions = list(IK.solutions(ToolTarget(pose.position, pose.rotation), READY, NEVER))
     assert solutions
     if abs(goal[4]) > 1e-3:  # else the wrist is straight, and joint_4 and joint_6 share one turn
         assert min(np.abs(solution - goal).max() for solution in solutions) < 1e-5
@@ -58,7 +58,7 @@ def test_an_arm_with_a_straight_wrist_that_is_there_already_stays_there(configur
     """joint_4 and joint_6 then turn about one axis, and only their sum is given."""
     here = np.array((*configuration[:4], 0.0, configuration[5]))
     pose = KINEMATICS.tool(here)
-    first = next(IK.solutions(Target(pose.position, pose.rotation), here, NEVER))
+    first = next(IK.solutions(ToolTarget(pose.position, pose.rotation), here, NEVER))
     assert IK.travel(here, first) < 1e-4
 
 
@@ -66,7 +66,7 @@ def test_every_full_turn_within_the_limits_is_a_solution_of_its_own():
     arm = with_limits(PAROL6, "joint_6", -2.0 * math.tau, 2.0 * math.tau)
     inverse = InverseKinematics(arm, KINEMATICS)
     pose = KINEMATICS.tool(READY)
-    solutions = list(inverse.solutions(Target(pose.position, pose.rotation), READY, NEVER))
+    solutions = list(inverse.solutions(ToolTarget(pose.position, pose.rotation), READY, NEVER))
     wrists = sorted(round(float(q[5] - READY[5]) / math.tau, 6) for q in solutions if np.allclose(q[:5], READY[:5]))
     present = READY[5] / math.tau
     assert wrists == [turn for turn in range(-4, 5) if -2.0 <= turn + present <= 2.0]
@@ -76,7 +76,7 @@ def test_a_joint_without_limits_takes_the_turn_nearest_to_where_it_is():
     arm = with_limits(PAROL6, "joint_6", -math.inf, math.inf)
     pose = KINEMATICS.tool(READY)
     near = READY + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 3.0 * math.tau])
-    first = next(InverseKinematics(arm, KINEMATICS).solutions(Target(pose.position, pose.rotation), near, NEVER))
+    first = next(InverseKinematics(arm, KINEMATICS).solutions(ToolTarget(pose.position, pose.rotation), near, NEVER))
     assert np.allclose(first, near)
 
 
@@ -86,14 +86,16 @@ def test_the_order_of_the_joints_in_robot_toml_does_not_matter():
     inverse = InverseKinematics(arm, kinematics)
     assert inverse.is_closed_form
     pose = kinematics.tool(READY[::-1])
-    assert np.allclose(next(inverse.solutions(Target(pose.position, pose.rotation), READY[::-1], NEVER)), READY[::-1])
+    assert np.allclose(
+        next(inverse.solutions(ToolTarget(pose.position, pose.rotation), READY[::-1], NEVER)), READY[::-1]
+    )
 
 
 @settings(max_examples=20)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_searching_finds_no_nearer_configuration_than_the_closed_form(goal: tuple[float, ...], near: tuple[float, ...]):
     pose = KINEMATICS.tool(goal)
-    target, start = Target(pose.position, pose.rotation), np.array(near)
+    target, start = ToolTarget(pose.position, pose.rotation), np.array(near)
     first = next(IK.solutions(target, start, NEVER))
     searched = list(SEARCHED.solutions(target, start, NEVER))
     if abs(goal[4]) > 1e-3 and searched:
@@ -109,7 +111,7 @@ def test_without_eaik_the_arm_is_searched_and_the_log_says_so_once(
     assert not inverse.is_closed_form
     assert [record.getMessage()[:44] for record in caplog.records] == ["no inverse kinematics in closed form, it is "]
     pose = KINEMATICS.tool(READY)
-    found = next(inverse.solutions(Target(pose.position, pose.rotation), READY, NEVER))
+    found = next(inverse.solutions(ToolTarget(pose.position, pose.rotation), READY, NEVER))
     assert np.allclose(KINEMATICS.tool(found).position, pose.position, atol=1e-6)
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import load_arm
 from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.targets import Target
+from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import NEVER, Deadline
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
@@ -25,14 +25,14 @@ CONFIGURATIONS = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in AR
 @settings(max_examples=300)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_fk_of_ik_is_the_goal(goal: tuple[float, ...], near: tuple[float, ...]):
-    target = Target(KINEMATICS.tool(goal).position)
+    target = ToolTarget(KINEMATICS.tool(goal).position)
     solution = next(IK.solutions(target, np.array(near), NEVER))
     assert np.linalg.norm(KINEMATICS.tool(solution).position - target.position) < 1e-6
     assert all(joint.is_within(value) for joint, value in zip(ARM.joints, solution.tolist(), strict=True))
 
 
 def test_both_elbows_are_found_and_the_nearer_one_comes_first():
-    target = Target(np.array([0.25, 0.15, 0.1]))
+    target = ToolTarget(np.array([0.25, 0.15, 0.1]))
     for side in (-1.0, 1.0):
         near = np.array([0.5 - side, 1.8 * side, 0.08])
         first, second = islice(IK.solutions(target, near, NEVER), 2)
@@ -43,14 +43,14 @@ def test_both_elbows_are_found_and_the_nearer_one_comes_first():
 @settings(max_examples=100)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_the_nearest_comes_first_of_all_that_are_found(goal: tuple[float, ...], near: tuple[float, ...]):
-    start, target = np.array(near), Target(KINEMATICS.tool(goal).position)
+    start, target = np.array(near), ToolTarget(KINEMATICS.tool(goal).position)
     if IK.descend(target, start).is_solution:  # else the arm is stuck there, and comes from elsewhere
         travels = [IK.travel(start, solution) for solution in IK.solutions(target, start, NEVER)]
         assert travels[0] <= min(travels) + 0.02  # the stretched arm's two elbows are one
 
 
 def test_it_is_deterministic():
-    target, near = Target(np.array([0.1, -0.25, 0.05])), np.zeros(3)
+    target, near = ToolTarget(np.array([0.1, -0.25, 0.05])), np.zeros(3)
     again = [list(IK.solutions(target, near, NEVER)) for _ in range(2)]
     assert np.array_equal(again[0], again[1])
 
@@ -58,23 +58,23 @@ def test_it_is_deterministic():
 def test_the_way_inwards_from_the_stretched_arm_is_found():
     """Stretched, the Jacobian has no column along the arm: one start would stay there."""
     tool = KINEMATICS.tool((0.0, 0.0, 0.0)).position
-    assert next(IK.solutions(Target(0.7 * tool + [0.0, 0.0, 0.05]), np.zeros(3), NEVER)) is not None
+    assert next(IK.solutions(ToolTarget(0.7 * tool + [0.0, 0.0, 0.05]), np.zeros(3), NEVER)) is not None
 
 
 def test_out_of_reach_gives_no_solution_but_the_nearest_configuration():
-    target = Target(np.array([0.6, 0.0, 0.1]))
+    target = ToolTarget(np.array([0.6, 0.0, 0.1]))
     assert list(IK.solutions(target, np.zeros(3), NEVER)) == []
     best = IK.nearest(target, np.zeros(3), NEVER)[0]
     assert KINEMATICS.tool(best).position == pytest.approx((0.4063, 0.0, 0.1), abs=1e-3)
 
 
 def test_a_search_that_is_late_ends():
-    assert list(IK.solutions(Target(np.array([0.6, 0.0, 0.1])), np.zeros(3), Deadline(allowed=0.0))) == []
+    assert list(IK.solutions(ToolTarget(np.array([0.6, 0.0, 0.1])), np.zeros(3), Deadline(allowed=0.0))) == []
 
 
 @settings(max_examples=50)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_orientations_are_met_where_the_arm_can(goal: tuple[float, ...], near: tuple[float, ...]):
     pose = KINEMATICS.tool(goal)
-    solution = next(IK.solutions(Target(pose.position, pose.rotation), np.array(near), NEVER))
+    solution = next(IK.solutions(ToolTarget(pose.position, pose.rotation), np.array(near), NEVER))
     assert np.allclose(KINEMATICS.tool(solution).rotation, pose.rotation, atol=1e-5)

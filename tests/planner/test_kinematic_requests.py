@@ -28,7 +28,7 @@ from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.world import World
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.kinematic_requests import KinematicRequests
-from services.planner.kinematics.targets import Target
+from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import NEVER
 
 ROOT = Path(__file__).parents[2] / "urdf"
@@ -102,7 +102,7 @@ def test_a_redundant_arm_uses_its_freedom_to_stay_away_from_its_limits():
         goal=PoseGoal(position=tuple(place.tolist())), near=corner, solutions=64, avoid_collisions=False
     )
     most_central = min(eccentricity(np.array(each.position)) for each in ik("parol6", request).solutions)
-    plain = InverseKinematics(PAROL6, kinematics).nearest(Target(place), lower, NEVER)
+    plain = InverseKinematics(PAROL6, kinematics).nearest(ToolTarget(place), lower, NEVER)
     assert most_central <= min(eccentricity(configuration) for configuration in plain)
 
 

@@ -22,7 +22,7 @@ from services.cli.robot_folder import plan_of
 from services.collision_fitting import cuts
 from services.collision_fitting.excess import SHARE, depth_in, depths
 from services.collision_fitting.fit_writing import HULLS, touching_states, write_fits
-from services.collision_fitting.fitted_shape import Fitted, Kind
+from services.collision_fitting.fitted_shape import Fitted, FittedKind
 from services.collision_fitting.fitting import fitted
 from services.collision_fitting.hull import smallest_ball
 from services.collision_fitting.link_meshes import visual_mesh
@@ -73,16 +73,16 @@ def test_the_smallest_ball_holds_all_and_no_other_place_needs_less(seed: int, di
         assert np.linalg.norm(points - moved, axis=1).max() >= radius - 1e-9
 
 
-@given(SEEDS, st.sampled_from([kind for kind in Kind if kind is not Kind.HULL]))
+@given(SEEDS, st.sampled_from([kind for kind in FittedKind if kind is not FittedKind.HULL]))
 @settings(max_examples=40, deadline=None)
-def test_what_has_one_of_the_shapes_is_found_to_have_it(seed: int, kind: Kind):
+def test_what_has_one_of_the_shapes_is_found_to_have_it(seed: int, kind: FittedKind):
     random = np.random.default_rng(seed)
     size, long = random.uniform(0.02, 0.1, 3), random.uniform(0.15, 0.3)
     made = {
-        Kind.BOX: lambda: trimesh.creation.box(extents=size),
-        Kind.CYLINDER: lambda: trimesh.creation.cylinder(radius=size[0], height=long, sections=64),
-        Kind.CAPSULE: lambda: trimesh.creation.capsule(radius=size[0], height=3.0 * size[0], count=(33, 32)),
-        Kind.PLATE: lambda: (
+        FittedKind.BOX: lambda: trimesh.creation.box(extents=size),
+        FittedKind.CYLINDER: lambda: trimesh.creation.cylinder(radius=size[0], height=long, sections=64),
+        FittedKind.CAPSULE: lambda: trimesh.creation.capsule(radius=size[0], height=3.0 * size[0], count=(33, 32)),
+        FittedKind.PLATE: lambda: (
             trimesh.Scene(
                 [
                     trimesh.creation.cylinder(0.03, 0.02, sections=64, transform=np.eye(4) + at * np.eye(4, k=3))
@@ -92,7 +92,7 @@ def test_what_has_one_of_the_shapes_is_found_to_have_it(seed: int, kind: Kind):
             .to_mesh()
             .convex_hull
         ),
-        Kind.SPHERE: lambda: trimesh.creation.icosphere(radius=size[0], subdivisions=4),
+        FittedKind.SPHERE: lambda: trimesh.creation.icosphere(radius=size[0], subdivisions=4),
     }[kind]()
     points = turned(made.vertices, random)
     found = fitted(points)
@@ -149,7 +149,7 @@ def test_an_angle_of_one_piece_is_cut_into_its_legs():
     assert one[0].volume == pytest.approx(made.convex_hull.volume, rel=0.01)
     assert len(two) == 2
     assert sum(each.volume for each in two) < 1.05 * made.volume
-    assert {each.kind for each in two} == {Kind.BOX}
+    assert {each.kind for each in two} == {FittedKind.BOX}
 
 
 def test_the_bound_of_a_large_link_is_a_share_of_its_length_unless_another_is_asked_for(copied: Path):
@@ -240,7 +240,7 @@ def test_a_capsule_is_written_as_what_a_urdf_knows(copied: Path):
     arm = load_arm(copied)
     link = _first_with_mesh(arm)
     (fit,) = fit_links(arm, only=[link])
-    assert [each.kind for each in fit.shapes] == [Kind.CAPSULE]
+    assert [each.kind for each in fit.shapes] == [FittedKind.CAPSULE]
     write_fits(arm, [fit])
     (written,) = [each for each in load_arm(copied).model.links if each.name == link]
     assert [each.shape for each in written.collisions] == ["cylinder", "sphere", "sphere"]
@@ -374,7 +374,7 @@ def test_a_convex_hull_is_written_as_a_file_beside_the_urdf_and_read_as_a_solid(
     arm = _tubes(copied)
     link = _first_with_mesh(arm)
     (fit,) = fit_links(arm, only=[link])
-    assert Kind.HULL in [each.kind for each in fit.shapes]
+    assert FittedKind.HULL in [each.kind for each in fit.shapes]
     changed = write_fits(arm, [fit])
     shapes = link_shapes(changed)[link]
     assert ShapeKind.HULL in [shape.kind for shape in shapes]

@@ -15,7 +15,7 @@ from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm, load_arm
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.parallel_axes import parallel_axes
-from services.planner.kinematics.targets import Target
+from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import NEVER
 
 RM1 = Path(__file__).parents[2] / "urdf" / "rm1"
@@ -71,7 +71,7 @@ def test_every_configuration_is_found_again_and_every_answer_is_right(arm: Arm):
     lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
     for configuration, near in random.uniform(lower, upper, (60, 2, 3)):
         position = kinematics.tool(configuration).position
-        found = list(inverse.solutions(Target(position), near, NEVER))
+        found = list(inverse.solutions(ToolTarget(position), near, NEVER))
         assert min(np.abs(each - configuration).max() for each in found) < 1e-6
         travels = [inverse.travel(near, each) for each in found]
         assert travels == sorted(travels)
@@ -86,7 +86,7 @@ def test_the_order_of_the_joints_in_robot_toml_does_not_matter():
     configuration = np.array((0.5, -1.2, 0.1))
     kinematics = Kinematics(backwards)
     position = kinematics.tool(configuration[::-1]).position
-    found = list(InverseKinematics(backwards, kinematics).solutions(Target(position), configuration[::-1], NEVER))
+    found = list(InverseKinematics(backwards, kinematics).solutions(ToolTarget(position), configuration[::-1], NEVER))
     assert np.allclose(found[0], configuration[::-1])
 
 
@@ -108,7 +108,7 @@ def test_it_finds_what_a_search_finds_and_no_less():
     random = np.random.default_rng(4)
     lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
     for configuration, near in random.uniform(lower, upper, (20, 2, 3)):
-        target = Target(kinematics.tool(configuration).position)
+        target = ToolTarget(kinematics.tool(configuration).position)
         found = list(inverse.solutions(target, near, NEVER))
         for searched in searching.solutions(target, near, NEVER):
             assert min(np.abs(searched - each).max() for each in found) < 1e-4

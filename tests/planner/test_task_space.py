@@ -13,7 +13,7 @@ from schemas.planning import PoseGoal
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm, load_arm
 from services.planner.kinematics.goals import Goals
-from services.planner.kinematics.targets import Pointing, Target
+from services.planner.kinematics.targets import AxisPointing, ToolTarget
 from services.planner.kinematics.task_space import TaskSpace, task_space
 from services.planner.request.deadline import NEVER
 from services.planner.request.refusals import PlanRefused
@@ -97,8 +97,8 @@ def test_how_much_tilt_is_missing_does_not_depend_on_the_yaw():
     able = of(load_arm(ROOT / "rm1"))
     for yaw in (0.0, 1.0, -2.5):
         turn = pin.exp3(np.array([0.0, 0.0, yaw])) @ pin.exp3(np.array([0.3, 0.0, 0.0])) @ able.rotation
-        assert able.missing_tilt(Target(np.zeros(3), turn)) == pytest.approx(0.3)
-    sideways = Pointing(np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
-    assert able.missing_tilt(Target(np.zeros(3), None, sideways)) == pytest.approx(np.pi / 2.0)
-    across = Pointing(np.array([1.0, 0.0, 0.0]), np.array([0.6, 0.8, 0.0]))
-    assert able.allows(Target(np.zeros(3), None, across))
+        assert able.missing_tilt(ToolTarget(np.zeros(3), turn)) == pytest.approx(0.3)
+    sideways = AxisPointing(np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
+    assert able.missing_tilt(ToolTarget(np.zeros(3), None, sideways)) == pytest.approx(np.pi / 2.0)
+    across = AxisPointing(np.array([1.0, 0.0, 0.0]), np.array([0.6, 0.8, 0.0]))
+    assert able.allows(ToolTarget(np.zeros(3), None, across))

@@ -21,7 +21,7 @@ from schemas.motion import (
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
 from services.runtime.actions import ActionServer, GoalDecision, accept, refuse
 from services.runtime.actions import keys as keys
-from services.runtime.errors import GoalRefused, NoAnswer, Refused, ServerLost
+from services.runtime.errors import GoalRefused, NoAnswer, RequestRefused, ServerLost
 from services.runtime.node import Node
 from tests.runtime.support import Buses, hear, spinning, until
 
@@ -256,10 +256,10 @@ def test_goals_that_are_no_goals_are_refused_and_nothing_dies(buses: Buses) -> N
     with moving(buses) as arm:
         node = buses.node("client")
         for goal in (Raw(b"\xc0"), Raw(b"\x93\x01\x02\x03"), Raw(b"\x81\xaatrajectory\x05")):
-            with pytest.raises(Refused, match="FollowJointTrajectoryGoal") as refusal:
+            with pytest.raises(RequestRefused, match="FollowJointTrajectoryGoal") as refusal:
                 node.call(keys.goal_request(FOLLOW), GoalRequest(goal_id="x", goal=goal, epoch=arm.server.epoch))
             assert refusal.value.kind == "bad request"
-        with pytest.raises(Refused, match="needs an id"):
+        with pytest.raises(RequestRefused, match="needs an id"):
             node.call(keys.goal_request(FOLLOW), GoalRequest(epoch=arm.server.epoch))
         assert node.call(keys.cancel_request(FOLLOW), CancelRequest()).reason == "no goal is active"
         assert "no such goal" in node.call(keys.cancel_request(FOLLOW), CancelRequest(goal_id="x")).reason

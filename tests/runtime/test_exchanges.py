@@ -21,7 +21,7 @@ from services.runtime.actions import accept, keys
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.bus.wire import MAX_PAYLOAD, MAX_PAYLOAD_OF
 from services.runtime.endpoints import info_request
-from services.runtime.errors import Refused
+from services.runtime.errors import RequestRefused
 from services.runtime.node import Node
 from services.runtime.requests.exchanges import exchange_topic
 from tests.runtime.support import spinning, until
@@ -72,11 +72,11 @@ def test_a_refusal_is_published_with_its_sentence(nodes, network):
     said = heard(network, exchange_topic(DEVICE_COMMAND))
 
     def refuse(question):
-        raise Refused("the arm moves")
+        raise RequestRefused("the arm moves")
 
     server.serve(DEVICE_COMMAND, refuse)
     with spinning(server):
-        with pytest.raises(Refused, match="the arm moves"):
+        with pytest.raises(RequestRefused, match="the arm moves"):
             client.call(DEVICE_COMMAND, DeviceCommandRequest())
         assert until(lambda: said)
     assert said[0].failure.message == "the arm moves"
@@ -137,7 +137,7 @@ def test_a_parameter_that_is_set_is_told_with_its_new_value(nodes, network):
     changes = heard(network, PARAMETER_CHANGES)
     server.parameters(Parameters)
     server.set_parameter("speed", 2.5)
-    with pytest.raises(Refused):
+    with pytest.raises(RequestRefused):
         server.set_parameter("speed", "fast")
     (change,) = changes
     assert type(change) is ParameterChange

@@ -17,7 +17,7 @@ from schemas.topics import FOLLOW_JOINT_TRAJECTORY, PLAN, TOPICS
 from services.runtime.actions import accept
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.errors import NoAnswer, Refused
+from services.runtime.errors import NoAnswer, RequestRefused
 from services.runtime.node import Node
 from services.runtime.requests.client import response_in
 from tests.runtime.support import hear
@@ -89,7 +89,7 @@ def test_a_request_is_always_answered(
 
 @given(st.binary(max_size=64), SCHEMAS, st.booleans())
 def test_an_answer_is_a_response_a_refusal_or_no_answer(payload: bytes, schema: str, ok: bool) -> None:
-    with contextlib.suppress(NoAnswer, Refused):
+    with contextlib.suppress(NoAnswer, RequestRefused):
         assert isinstance(response_in(PLAN, BusReply(ok, schema, payload)), PLAN.response)
         assert schema == PLAN.response.__name__
 

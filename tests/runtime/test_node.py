@@ -20,7 +20,7 @@ from schemas.topics import COMMAND_ACKS, DESCRIPTION, JOINT_STATES, LOG, PLAN, S
 from services.runtime import topics
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.errors import NoAnswer, NodeNameTaken, Refused
+from services.runtime.errors import NoAnswer, NodeNameTaken, RequestRefused
 from services.runtime.node import Node
 from services.runtime.requests.client import call
 from services.runtime.requests.server import Pending
@@ -240,7 +240,7 @@ def test_a_request_is_answered_refused_or_fails_with_a_reason(buses: Buses) -> N
 
     def plan(request: PlanRequest) -> PlanResponse:
         if request.velocity_scaling == 0.0:
-            raise Refused("velocity_scaling is 0: it must be in (0, 1]")
+            raise RequestRefused("velocity_scaling is 0: it must be in (0, 1]")
         if request.velocity_scaling < 0.0:
             raise ZeroDivisionError("oh")
         return PlanResponse(code=PlanCode.SUCCESS, duration=request.allowed_time)
@@ -248,9 +248,9 @@ def test_a_request_is_answered_refused_or_fails_with_a_reason(buses: Buses) -> N
     server.serve(PLAN, plan)
     with spinning(server):
         assert client.call(PLAN, PlanRequest(allowed_time=0.25)).duration == 0.25
-        with pytest.raises(Refused, match="velocity_scaling is 0"):
+        with pytest.raises(RequestRefused, match="velocity_scaling is 0"):
             client.call(PLAN, PlanRequest(velocity_scaling=0.0))
-        with pytest.raises(Refused, match="planner failed: ZeroDivisionError: oh"):
+        with pytest.raises(RequestRefused, match="planner failed: ZeroDivisionError: oh"):
             client.call(PLAN, PlanRequest(velocity_scaling=-1.0))
         assert client.call(PLAN, PlanRequest()).code is PlanCode.SUCCESS
 
@@ -259,7 +259,7 @@ def test_a_bad_request_is_refused_with_its_reason(buses: Buses) -> None:
     server, client = buses.node("planner"), buses.node("client")
     server.serve(PLAN, lambda request: PlanResponse())
     wrong = Request(PLAN.key, JointState, PlanResponse, "planner", "another schema under the planner's key")
-    with spinning(server), pytest.raises(Refused, match="JointState") as refusal:
+    with spinning(server), pytest.raises(RequestRefused, match="JointState") as refusal:
         client.call(wrong, JointState())
     assert refusal.value.kind == "bad request"
 
@@ -364,7 +364,7 @@ def test_parameters_are_listed_set_and_checked_at_run_time(buses: Buses) -> None
             ("lead", 1.5, "<= 1"), ("lead", "fast", "float"), ("leed", 0.5, 'did you mean "lead"'),
             ("chunk", 1.5, "int"), ("chunk", True, "is a int"), ("is_strict", 1, "is a bool"), ("lead", True, "float"),
         ):  # fmt: skip
-            with pytest.raises(Refused, match=reason):
+            with pytest.raises(RequestRefused, match=reason):
                 client.call(set_one, SetParameter(name=name, value=value))
     assert parameters.value == GatewayParameters(lead=1.0, chunk=12)
 
@@ -375,7 +375,7 @@ def test_a_parameter_takes_no_nul(buses: Buses) -> None:
 
     node = buses.node("logger")
     folders = node.parameters(Folders)
-    with pytest.raises(Refused, match=r'logger: parameter "log_dir" cannot be .*NUL'):
+    with pytest.raises(RequestRefused, match=r'logger: parameter "log_dir" cannot be .*NUL'):
         node.set_parameter("log_dir", "a\0b")
     assert folders.value.log_dir == "here"
 
@@ -385,12 +385,12 @@ def test_parameters_from_the_deployment_and_the_command_line_are_checked(buses: 
     buses.deployment = replace(buses.deployment, parameters={"gateway": {"lead": 0.7}})
     assert buses.node("gateway").parameters(GatewayParameters).value.lead == 0.7
     buses.deployment = replace(buses.deployment, parameters={"second": {"leda": 0.7}})
-    with pytest.raises(Refused, match=r'parameters.second.*did you mean "lead"'):
+    with pytest.raises(RequestRefused, match=r'parameters.second.*did you mean "lead"'):
         buses.node("second").parameters(GatewayParameters)
-    with pytest.raises(Refused, match="--set: third"):
+    with pytest.raises(RequestRefused, match="--set: third"):
         buses.node("third", overrides={"chunk": "0"}).parameters(GatewayParameters)
     for name, number in (("fourth", "inf"), ("fifth", "-inf"), ("sixth", "nan")):
-        with pytest.raises(Refused, match=r'"rate" cannot be .* must be finite'):
+        with pytest.raises(RequestRefused, match=r'"rate" cannot be .* must be finite'):
             buses.node(name, overrides={"rate": number}).parameters(GatewayParameters)
 
 

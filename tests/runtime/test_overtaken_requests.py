@@ -21,7 +21,7 @@ from services.runtime.actions.server import accept
 from services.runtime.bus.interface import Bus, BusReply
 from services.runtime.bus.pace import Rate
 from services.runtime.bus.zenoh_declarations import MAX_CLIENT_NAME, asked_by, asker
-from services.runtime.errors import NoAnswer, Refused
+from services.runtime.errors import NoAnswer, RequestRefused
 from services.runtime.node import Node
 from services.runtime.requests.limits import OF_A_CLIENT, RequestRates
 from services.runtime.requests.overtaken import MOST_CLIENTS, OvertakenRequests
@@ -133,7 +133,7 @@ def test_a_goal_that_is_tried_again_does_not_pass_a_stop_in_between(buses: Buses
     def send_goal() -> None:
         try:
             client.action(FOLLOW).send(FollowJointTrajectoryGoal(), timeout=20.0)
-        except (Refused, NoAnswer) as error:
+        except (RequestRefused, NoAnswer) as error:
             heard.append(error)
 
     sending = threading.Thread(target=send_goal)
@@ -149,6 +149,6 @@ def test_a_goal_that_is_tried_again_does_not_pass_a_stop_in_between(buses: Buses
         sending.join(timeout=20.0)
     assert not sending.is_alive()
     (error,) = heard
-    assert isinstance(error, Refused)
+    assert isinstance(error, RequestRefused)
     assert "the stop request" in str(error)
     assert not started

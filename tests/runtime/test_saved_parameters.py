@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from services.cli.errors import ExitCode
 from services.cli.main import run
-from services.runtime.errors import Refused
+from services.runtime.errors import RequestRefused
 from services.runtime.saved_parameters import SavedParameters, toml
 from tests.runtime.support import RouterProcess, programs
 
@@ -121,7 +121,7 @@ def test_a_file_that_was_damaged_while_the_process_runs_is_not_written_over(star
 def test_where_nothing_can_be_written_nothing_is_saved(tmp_path):
     (tmp_path / "parameters").write_text("a file where the folder should be")
     saved = SavedParameters(tmp_path, "own")
-    with pytest.raises(Refused, match=re.escape(f"{saved.path} cannot be")):
+    with pytest.raises(RequestRefused, match=re.escape(f"{saved.path} cannot be")):
         saved.keep({"lead": 0.5})
 
 

@@ -20,7 +20,7 @@ from schemas.topics import (
 )
 from services.arm.model.description import load_arm
 from services.runtime.deployment import load_deployment, project_root
-from services.runtime.errors import GoalRefused, NoAnswer, Refused
+from services.runtime.errors import GoalRefused, NoAnswer, RequestRefused
 from services.runtime.node import Node
 from services.runtime.process.shutdown import ShutdownRequest
 
@@ -104,7 +104,7 @@ class Operator:
             try:
                 done += self._free()
                 return self.move(), done
-            except (AssertionError, GoalRefused, NoAnswer, Refused):
+            except (AssertionError, GoalRefused, NoAnswer, RequestRefused):
                 if time.monotonic() > deadline:
                     raise
                 self.node.wait(0.1)

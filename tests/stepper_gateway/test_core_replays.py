@@ -38,7 +38,7 @@ from services.stepper_gateway.inputs import (
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.parameters import GatewayParameters
 from services.virtual_arm.gateway_driver import Caller
-from services.virtual_arm.virtual_arm import VirtualArm, Wire, rm1
+from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.stepper_gateway.harness import move
 
 WAYS: dict[str, Any] = {  # of the core's methods: the input that stands for a call
@@ -81,7 +81,7 @@ class Watched(VirtualArm):
 def lived(seed: int) -> Watched:
     """Half a minute of a life that the seed decides."""
     chance = random.Random(seed)
-    arm = Watched(Wire(delay=0.002, jitter=0.006, loss=0.01, duplicates=0.02), seed=seed)
+    arm = Watched(VirtualWire(delay=0.002, jitter=0.006, loss=0.01, duplicates=0.02), seed=seed)
     arm.ready()
     for number in range(8):
         match chance.randrange(7):

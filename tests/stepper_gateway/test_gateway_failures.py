@@ -12,7 +12,7 @@ from schemas.motion import FollowErrorCode
 from schemas.topics import DEVICE_STATUS, JOINT_STATES
 from services.stepper_gateway.links.frames import Ack, CommandReply, State, SyncReply, encode
 from services.stepper_gateway.links.link import Kind
-from services.virtual_arm.virtual_arm import VirtualArm, Wire
+from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)
@@ -20,7 +20,7 @@ READY = (0.6, -1.2, 0.08)
 
 
 def moving_rig(**wire: float) -> VirtualArm:
-    rig = VirtualArm(Wire(**wire)).ready()  # type: ignore[arg-type]
+    rig = VirtualArm(VirtualWire(**wire)).ready()  # type: ignore[arg-type]
     assert rig.goal(move(HOME, READY)).accepted
     rig.run(1.2)
     assert rig.device.moving
@@ -230,7 +230,7 @@ def test_reference_declares_where_the_joints_stand() -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_cancel_works_over_a_wire_that_loses_and_reorders(seed: int) -> None:
-    rig = VirtualArm(Wire(delay=0.004, jitter=0.01, loss=0.15, duplicates=0.2), seed=seed).ready()
+    rig = VirtualArm(VirtualWire(delay=0.004, jitter=0.01, loss=0.15, duplicates=0.2), seed=seed).ready()
     rig.goal(move(HOME, READY))
     rig.run(0.05 + 0.4 * seed)
     assert rig.cancel() == ""

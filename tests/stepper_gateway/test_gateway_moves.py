@@ -13,7 +13,7 @@ from services.stepper_gateway.goals.goal_validator import GoalValidator
 from services.stepper_gateway.links.frames import State
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.parameters import GatewayParameters
-from services.virtual_arm.virtual_arm import VirtualArm, Wire, rm1
+from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)
@@ -90,7 +90,7 @@ def test_the_first_chunk_leaves_with_the_acceptance() -> None:
 
 
 def test_a_lossy_wire_loses_nothing() -> None:
-    rig = VirtualArm(Wire(delay=0.003, jitter=0.008, loss=0.1, duplicates=0.2), seed=5).ready()
+    rig = VirtualArm(VirtualWire(delay=0.003, jitter=0.008, loss=0.1, duplicates=0.2), seed=5).ready()
     places = [READY, (-0.5, 0.8, 0.02), (1.0, 0.0, 0.15), HOME]
     here = HOME
     for index, place in enumerate(places):

@@ -15,7 +15,7 @@ from schemas.message import Vector
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from schemas.topics import JOINT_STATES
 from services.virtual_arm.gateway_driver import asked
-from services.virtual_arm.virtual_arm import VirtualArm, Wire, rm1
+from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 JOINTS = rm1().joints
@@ -26,7 +26,7 @@ PATIENCE = 30.0  # [s] in which a goal must end: its path, its tolerance, the st
 class Play:
     """A rig, what was done to it, and what must hold meanwhile."""
 
-    def __init__(self, wire: Wire, seed: int) -> None:
+    def __init__(self, wire: VirtualWire, seed: int) -> None:
         self.rig = VirtualArm(wire, seed=seed).ready()
         self.accepted: dict[str, float] = {}  # [s] when
         self.ends: dict[str, Vector] = {}  # of the goals that were accepted
@@ -251,7 +251,7 @@ EXPLORED = st.one_of(
     st.builds(lambda referenced: lambda play: play.reboot(referenced), st.booleans()),
 )  # fmt: skip
 wires = st.builds(
-    Wire,
+    VirtualWire,
     delay=st.sampled_from([0.001, 0.02]),
     jitter=st.sampled_from([0.0, 0.01, 0.06]),
     loss=st.sampled_from([0.0, 0.1]),
@@ -298,7 +298,7 @@ def assert_next_goal_succeeds(play: Play) -> None:
 @settings(max_examples=30)
 @given(wires, st.integers(0, 99), st.lists(st.tuples(EXPLORED, waits), min_size=3, max_size=10))
 def test_whatever_the_sequence_the_arm_stays_safe_and_every_goal_ends(
-    wire: Wire, seed: int, sequence: list[tuple[Action, float]]
+    wire: VirtualWire, seed: int, sequence: list[tuple[Action, float]]
 ) -> None:
     play = Play(wire, seed)
     for act, wait in sequence:
@@ -309,7 +309,7 @@ def test_whatever_the_sequence_the_arm_stays_safe_and_every_goal_ends(
 
 
 def test_a_path_that_is_judged_from_within_a_motion_is_judged_as_it_was() -> None:
-    play = Play(Wire(), seed=0)
+    play = Play(VirtualWire(), seed=0)
     for act, wait in ((stream((0.0, 0.0, 0.0), 0.1, 7, 0.02), 0.03), (planned((0.0, 0.0, 0.0), 0.0, 0.0, 0.0), 0.05)):
         act(play)
         play.wait(wait)

@@ -13,8 +13,8 @@ from schemas.joints import JointState, JointTargets
 from schemas.topics import DEVICE_ECHO, JOINT_STATES, JOINT_TARGETS
 from services.cli.errors import CommandError, ExitCode
 from services.cli.link_bench import SWING, measure, swinging
-from services.cli.session import Session
-from services.virtual_arm.virtual_arm import VirtualArm, Wire, rm1
+from services.cli.session import CommandSession
+from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.stepper_gateway.harness import assert_within_limits
 
 DELAY = 0.004  # [s] of the wire, each way
@@ -64,8 +64,8 @@ class VirtualNode:
         return SimpleNamespace(put=put)
 
 
-def session_of(rig: VirtualArm) -> Session:
-    return cast(Session, SimpleNamespace(node=VirtualNode(rig), arm=rm1()))
+def session_of(rig: VirtualArm) -> CommandSession:
+    return cast(CommandSession, SimpleNamespace(node=VirtualNode(rig), arm=rm1()))
 
 
 def bench(rig: VirtualArm, swing: Callable[[float], None], seconds: float) -> list[float | None]:
@@ -75,7 +75,7 @@ def bench(rig: VirtualArm, swing: Callable[[float], None], seconds: float) -> li
 
 
 def test_the_joint_swings_about_where_it_was_and_the_wire_is_as_quick_as_before() -> None:
-    rig = VirtualArm(Wire(delay=DELAY)).ready()
+    rig = VirtualArm(VirtualWire(delay=DELAY)).ready()
     index = rm1().joint_names.index(SWUNG)
     still = bench(rig, lambda _elapsed: None, 1.0)
     begun = len(rig.messages(JOINT_STATES))
@@ -95,7 +95,7 @@ def test_the_joint_swings_about_where_it_was_and_the_wire_is_as_quick_as_before(
 
 
 def test_when_the_measurement_ends_the_arm_comes_to_rest_without_losing_a_step() -> None:
-    rig = VirtualArm(Wire(delay=DELAY)).ready()
+    rig = VirtualArm(VirtualWire(delay=DELAY)).ready()
     bench(rig, swinging(session_of(rig), MOVE), 1.6)
     assert rig.device.mode is DeviceMode.RUN
     rig.run(3.0)

@@ -12,7 +12,7 @@ from schemas.device import EchoResponse
 from services.cli.link_bench import plot, result_of, text_of, write_csv
 from services.virtual_arm.gateway_driver import GatewayDriver
 from services.virtual_arm.sketch_arm import SketchArm
-from services.virtual_arm.virtual_arm import VirtualArm, Wire
+from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 
 
 def echo(arm: GatewayDriver, ticket: int = 1) -> EchoResponse:
@@ -22,7 +22,7 @@ def echo(arm: GatewayDriver, ticket: int = 1) -> EchoResponse:
 
 
 def test_a_round_trip_is_what_the_wire_takes_both_ways() -> None:
-    answer = echo(VirtualArm(Wire(delay=0.007)).ready())
+    answer = echo(VirtualArm(VirtualWire(delay=0.007)).ready())
     assert answer.answered
     assert answer.round_trip == pytest.approx(0.014, abs=0.0021)
 

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware.platform.host.sketch import AustinStepper, HostSketch
-from schemas.robot import HostSketch as SketchTable
+from schemas.robot import Sketch as SketchTable
 from services.arm.errors import DescriptionError
 from services.arm.model.description import load_arm
 from services.arm.motors.relative_moves import Ramp, ramp_of

@@ -16,7 +16,7 @@ from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGo
 from services.arm.model.description import Joint, load_arm
 from services.planner.core import Planner
 from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.targets import Target
+from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import NEVER
 from services.planner.timing.profile import joint_limits
 from services.planner.verification.verify import require_within_limits, sample
@@ -83,7 +83,7 @@ def test_full_poses_all_over_the_limits_are_found_from_anywhere():
     missed = 0
     for goal, near in np.random.default_rng(3).uniform(lower, upper, (200, 2, 6)):
         pose = PLANNER.kinematics.tool(goal)
-        solution = next(inverse.solutions(Target(pose.position, pose.rotation), near, NEVER), None)
+        solution = next(inverse.solutions(ToolTarget(pose.position, pose.rotation), near, NEVER), None)
         if solution is None:
             missed += 1
             continue

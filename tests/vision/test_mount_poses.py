@@ -28,7 +28,7 @@ from services.vision.boards import Sighting, TagBoard
 from services.vision.calibration.link_pose import LinkAt, link_pose
 from services.vision.calibration.mount import fit_mount
 from services.vision.calibration.poses import Belief, Chosen, choose_poses
-from services.vision.calibration.reprojection import Carrier, View
+from services.vision.calibration.reprojection import BoardView, Carrier
 from services.vision.calibration.shots import one_of, without_hidden
 from services.vision.camera_model import of_field_of_view
 from services.vision.rigid import Array, from_transform, inverse, rigid, turn
@@ -265,5 +265,7 @@ def test_a_tag_with_a_covered_margin_is_not_measured() -> None:
 def test_views_of_another_carrier_do_not_fit() -> None:
     """The board on the tool taken for a board on the table: refused, whatever is found."""
     sight, found = taken("board on parol6's tool")
-    fit = fit_mount([View(view.base_from_link, view.sighting) for view in found.views], sight.model, Carrier.CAMERA)
+    fit = fit_mount(
+        [BoardView(view.base_from_link, view.sighting) for view in found.views], sight.model, Carrier.CAMERA
+    )
     assert fit.faults or fit.held_out > 0.002

@@ -16,7 +16,7 @@ from schemas.detections import Detection, Detections
 from schemas.frames import Transform
 from services.visualizer.content import entities
 from services.visualizer.content.cameras import CameraView
-from services.visualizer.content.updates import Frustum, Labels, Outlines, Picture
+from services.visualizer.content.updates import Frustum, Labels, Outlines, PictureUpdate
 from services.visualizer.core import Visualizer
 from services.visualizer.program.rerun_program import rerun_binary
 from services.visualizer.render.layout import ArmLayout, blueprint
@@ -56,7 +56,7 @@ def test_of_many_images_the_newest_is_shown_five_times_a_second(view: CameraView
             view.on_image(CameraImage(camera="above", data=jpeg(level)))
         shown += [(step, update) for update in view.take(NOW + step * TENTH)]
     assert [step for step, _ in shown] == [0, 2, 4, 6, 8]
-    assert all(isinstance(update, Picture) and update.jpeg == jpeg(step + 100) for step, update in shown)
+    assert all(isinstance(update, PictureUpdate) and update.jpeg == jpeg(step + 100) for step, update in shown)
 
 
 def test_a_camera_in_the_hand_has_its_frustum_on_the_link(view: CameraView, model) -> None:

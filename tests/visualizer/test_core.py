@@ -21,7 +21,7 @@ from schemas.planning import PlannedPath
 from schemas.system import LogLevel, LogRecord
 from services.visualizer.content import entities
 from services.visualizer.content.thinning import KEEP_ALIVE, ThinnedSeries
-from services.visualizer.content.updates import LineStrip, LogLines, Panel, Poses, Scalars, State, Tint
+from services.visualizer.content.updates import LineStrip, LogLines, Poses, Scalars, StateUpdate, TextPanel, Tint
 from services.visualizer.core import AHEAD
 
 START = 1_795_000_000_000_000_000
@@ -130,8 +130,8 @@ def test_logs_and_events_are_lines_with_a_level(core):
 
 def device_panel(core, now=START):
     updates = core.step(now)
-    text = next(update.markdown for update in updates if isinstance(update, Panel))
-    mode = next(update.state for update in updates if isinstance(update, State))
+    text = next(update.markdown for update in updates if isinstance(update, TextPanel))
+    mode = next(update.state for update in updates if isinstance(update, StateUpdate))
     return mode, text
 
 

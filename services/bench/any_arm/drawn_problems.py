@@ -19,7 +19,7 @@ from services.bench.any_arm.families import FAMILIES, Setting, ToolPose, setting
 from services.bench.problems.problem_sets import ALLOWED, tool_pose
 from services.planner.collision.world import World
 from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.targets import Target
+from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import NEVER
 
 Array = NDArray[np.float64]
@@ -126,7 +126,7 @@ class ProblemDrawer:
         return None
 
     def _solutions(self, pose: ToolPose, near: Array) -> list[Array]:
-        found = self._ik.solutions(Target(pose.position, pose.rotation), near, NEVER)
+        found = self._ik.solutions(ToolTarget(pose.position, pose.rotation), near, NEVER)
         return [np.round(row, 6) for row in islice(found, SOLUTIONS)]
 
     def _is_usable(self, row: Array) -> bool:

@@ -16,7 +16,7 @@ from services.arm.model.description import Arm
 from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
 from services.bench.scenes import parol6, random_configurations, rm1
 from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.targets import Target
+from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import NEVER
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ TURNED_ENOUGH = 1e-3  # [rad]
 class ToolProblem:
     """A target for the tool."""
 
-    target: Target
+    target: ToolTarget
     near: Array  # (n,) the seed: the nearest solution is wanted
     solution: Array  # (n,) one configuration that meets the target
 
@@ -90,7 +90,7 @@ def random_problems(arm: Arm, kinematics: Kinematics, count: int, is_full: bool)
     made = []
     for solution, near in zip(rows[:count], rows[count:], strict=True):
         pose = kinematics.tool(solution)
-        made.append(ToolProblem(Target(pose.position, pose.rotation if is_full else None), near, solution))
+        made.append(ToolProblem(ToolTarget(pose.position, pose.rotation if is_full else None), near, solution))
     return made
 
 

@@ -19,7 +19,7 @@ from services.planner.collision.world import World
 from services.planner.core import Planner
 from services.planner.jog.jog import PERIOD, Jog
 from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.targets import Target
+from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import NEVER
 from services.planner.timing.profile import joint_limits
 
@@ -123,7 +123,7 @@ class PlainLines:
         pose = self._kinematics.tool(rows[0])
         line = np.array(request.goal.position) - pose.position
         for share in np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(line) / STEP))[1:].tolist():
-            target = Target(pose.position + share * line, pose.rotation if self._is_full else None)
+            target = ToolTarget(pose.position + share * line, pose.rotation if self._is_full else None)
             found = next(self._solver.solutions(target, rows[-1], NEVER), None)
             if found is None or np.abs(found - rows[-1]).max() > JUMP or self._world.distance(found) <= 0.0:
                 break

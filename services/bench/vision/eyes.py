@@ -28,7 +28,7 @@ from services.bench.figures import Figure, NotMeasured, of_samples, quantile
 from services.bench.scenes import rm1
 from services.bench.stack import Stacks, cpu_seconds, families
 from services.camera.virtual.virtual_camera import VirtualCamera
-from services.camera.virtual.world import World
+from services.camera.virtual.world import CameraWorld
 from services.runtime.deployment import load_deployment
 from services.runtime.node import Node
 from services.stack.stack import Stack
@@ -154,11 +154,11 @@ def render_ms() -> Figure:
     return of_samples(samples, None, reference, note)
 
 
-def virtual_camera() -> tuple[VirtualCamera, World]:
+def virtual_camera() -> tuple[VirtualCamera, CameraWorld]:
     """The camera of rm1's sample cell, and what it looks at."""
     arm = rm1()
     cell = load_cell(arm.folder / "cell.toml", arm)
-    world, record = World(arm, cell), cell.camera(CAMERA)
+    world, record = CameraWorld(arm, cell), cell.camera(CAMERA)
     assert isinstance(record.source, VirtualSource)
     return VirtualCamera(record, record.source, exact_info(record, arm.base_frame), world.snapshot), world
 

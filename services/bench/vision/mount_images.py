@@ -20,11 +20,11 @@ from services.arm.frames.transforms import from_rpy, to_message
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.camera.virtual.virtual_camera import VirtualCamera
-from services.camera.virtual.world import World
+from services.camera.virtual.world import CameraWorld
 from services.vision.boards import Sighting, TagBoard
 from services.vision.calibration.link_pose import link_pose
 from services.vision.calibration.poses import Belief, Chosen, choose_poses
-from services.vision.calibration.reprojection import Carrier, View
+from services.vision.calibration.reprojection import BoardView, Carrier
 from services.vision.calibration.shots import one_of, without_hidden
 from services.vision.camera_model import CameraModel, model_of
 from services.vision.rigid import Array, from_transform, step
@@ -108,7 +108,7 @@ class Sight:
 
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
-        self._world = World(setup.arm, Cell(Path(), cameras=(setup.camera,), tags=setup.tags))
+        self._world = CameraWorld(setup.arm, Cell(Path(), cameras=(setup.camera,), tags=setup.tags))
         self.info = exact_info(setup.camera, setup.arm.base_frame)
         self.model: CameraModel = model_of(self.info)
         assert isinstance(setup.camera.source, VirtualSource)
@@ -141,7 +141,7 @@ class Taken:
 
     belief: Belief
     chosen: Chosen
-    views: tuple[View, ...]
+    views: tuple[BoardView, ...]
     unseen: tuple[int, ...]  # of the chosen poses, counted from 0
 
 
@@ -150,7 +150,7 @@ def take(sight: Sight, height: float | None = None, count: int = POSES, seed: in
     setup = sight.setup
     at = link_pose(setup.arm, setup.link)
     start = np.array(setup.start)
-    first = View(at(start), sight.sighting(start))
+    first = BoardView(at(start), sight.sighting(start))
     camera = sight.truth @ step(OFF)
     belief = Belief(sight.model, setup.carrier, camera, np.eye(4), setup.board.points(), height)
     belief = belief.seeing(first.base_from_link, first.sighting)
@@ -158,7 +158,7 @@ def take(sight: Sight, height: float | None = None, count: int = POSES, seed: in
     views, unseen = [first], []
     for index, joints in enumerate(chosen.joints):
         try:
-            views.append(View(at(joints), sight.sighting(joints)))
+            views.append(BoardView(at(joints), sight.sighting(joints)))
         except ValueError:
             unseen.append(index)
     return Taken(belief, chosen, tuple(views), tuple(unseen))

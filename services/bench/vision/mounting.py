@@ -10,7 +10,7 @@ import numpy as np
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.vision.boards import Sighting, TagBoard
-from services.vision.calibration.reprojection import Carrier, View
+from services.vision.calibration.reprojection import BoardView, Carrier
 from services.vision.camera_model import CameraModel
 from services.vision.rigid import Array, apply, inverse, rigid, step, turn
 
@@ -19,7 +19,7 @@ from services.vision.rigid import Array, apply, inverse, rigid, step, turn
 class MountingTrial:
     """Views of a board, and the truth."""
 
-    views: list[View]
+    views: list[BoardView]
     parent_from_camera: Array
     carrier_from_board: Array
 
@@ -44,7 +44,7 @@ def six_joint_trial(
     else:
         camera = looking(np.array([0.7, -0.25, 0.45]), np.array([0.3, 0.0, 0.25]))
         carried = rigid(np.array([0.05, -0.04, 0.3]), np.array([0.01, 0.005, 0.03]))
-    views: list[View] = []
+    views: list[BoardView] = []
     while len(views) < count:
         pose = _drawn(carrier, camera, carried, tilt, random)
         seen = inverse(camera) @ (pose @ carried if carrier is Carrier.BOARD else inverse(pose) @ carried)
@@ -63,7 +63,7 @@ def _drawn(carrier: Carrier, camera: Array, board: Array, tilt: float, random: n
 
 
 def _add(
-    views: list[View], model: CameraModel, points: Array, seen: Array, pose: Array, noise: float, arm_error: float,
+    views: list[BoardView], model: CameraModel, points: Array, seen: Array, pose: Array, noise: float, arm_error: float,
     random: np.random.Generator,
 ) -> None:  # fmt: skip
     placed = apply(seen, points)
@@ -74,7 +74,7 @@ def _add(
         return
     pixels = pixels + random.normal(0.0, noise, pixels.shape)
     error = step(np.concatenate((random.normal(0.0, 0.002, 3), random.normal(0.0, 0.0005, 3))) * arm_error)
-    views.append(View(pose @ error, Sighting(points, pixels, max(noise, 0.02))))
+    views.append(BoardView(pose @ error, Sighting(points, pixels, max(noise, 0.02))))
 
 
 def level_trial(
@@ -89,7 +89,7 @@ def level_trial(
     points = board.points()
     camera = looking(np.array([0.62, -0.3, 0.62]), np.array([0.25, 0.0, 0.1]))
     carried = rigid(np.array([np.pi, 0.0, 0.0]), np.array([0.012, -0.008, -0.04]))
-    views: list[View] = []
+    views: list[BoardView] = []
     lower, upper = (np.array([getattr(joint, side) for joint in arm.joints]) for side in ("lower", "upper"))
     while len(views) < count:
         joints = random.uniform(np.maximum(lower, -1.6), np.minimum(upper, 1.6))

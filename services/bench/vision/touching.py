@@ -20,7 +20,7 @@ from services.bench.figures import Figure, of_samples, quantile
 from services.bench.scenes import rm1
 from services.bench.vision.mounting import tool_error
 from services.camera.virtual.virtual_camera import VirtualCamera
-from services.camera.virtual.world import World
+from services.camera.virtual.world import CameraWorld
 from services.cli.camera_mount import ENOUGH_TAGS, IMAGES, TOUCHES
 from services.vision.boards import Sighting, TagBoard
 from services.vision.calibration.reprojection import Carrier
@@ -80,7 +80,7 @@ def scene_of(arm: Arm, random: np.random.Generator) -> BoardScene:
         TagRecord(id=number, size=BOARD.tag, position=_triple(apply(board, centre[None])[0]), rpy=(0.0, 0.0, yaw))
         for number, centre in BOARD.centres().items()
     )
-    world, info = World(arm, Cell(Path(), cameras=(CAMERA,), tags=tags)), exact_info(CAMERA, arm.base_frame)
+    world, info = CameraWorld(arm, Cell(Path(), cameras=(CAMERA,), tags=tags)), exact_info(CAMERA, arm.base_frame)
     world.on_joint_state(JointState(stamp=1, name=arm.joint_names, position=arm.named_states["folded"]))
     assert isinstance(CAMERA.source, VirtualSource)
     camera, model = VirtualCamera(CAMERA, CAMERA.source, info, world.snapshot), model_of(info)

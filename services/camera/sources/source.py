@@ -15,7 +15,7 @@ JPEG_QUALITY = 90
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class EncodedImage:
     """One image, encoded; `stamp` [ns] UNIX time of capture."""
 
     stamp: int
@@ -33,7 +33,7 @@ class CameraFault(Exception):
         self.condition = condition
 
 
-class Source(Protocol):
+class CameraSource(Protocol):
     """One camera, or what stands for it. All of it is called from one thread, which may be another than logic's."""
 
     @property
@@ -50,7 +50,7 @@ class Source(Protocol):
         """Raises `CameraFault`; may be called again after `close`."""
         ...
 
-    def read(self) -> Frame:
+    def read(self) -> EncodedImage:
         """The next image; raises `CameraFault`."""
         ...
 

@@ -10,7 +10,7 @@ import cv2
 
 from schemas.camera import CameraCondition
 from schemas.cell import CameraRecord
-from services.camera.sources.source import CameraFault, Frame, encoded
+from services.camera.sources.source import CameraFault, EncodedImage, encoded
 
 PICTURES = {".jpg", ".jpeg", ".png"}
 
@@ -32,7 +32,7 @@ class FolderOfImages:
             self._waiting = self._pictures()
             self._has_begun = True
 
-    def read(self) -> Frame:
+    def read(self) -> EncodedImage:
         """Raises `CameraFault` at the end, for a picture that cannot be read, and for one of another size."""
         if not self._waiting:
             if not self._loop:
@@ -72,7 +72,7 @@ class Video:
         if not self._capture.isOpened():
             raise _fault(self._record, CameraCondition.REFUSED, f"{self._path} is no video that OpenCV can read")
 
-    def read(self) -> Frame:
+    def read(self) -> EncodedImage:
         """Raises `CameraFault` at the end, and for another size than the cell file's."""
         if self._capture is None:
             return picture(self._record, self._path)
@@ -90,7 +90,7 @@ class Video:
             self._capture = None
 
 
-def picture(record: CameraRecord, path: Path) -> Frame:
+def picture(record: CameraRecord, path: Path) -> EncodedImage:
     """A picture as a frame, a JPEG as it is; raises `CameraFault`."""
     try:
         content = path.read_bytes()
@@ -102,13 +102,13 @@ def picture(record: CameraRecord, path: Path) -> Frame:
     return _frame(record, path, image, content if path.suffix.lower() != ".png" else encoded(image))
 
 
-def _frame(record: CameraRecord, path: Path, image: Any, content: bytes) -> Frame:
+def _frame(record: CameraRecord, path: Path, image: Any, content: bytes) -> EncodedImage:
     height, width = image.shape[:2]
     if (width, height) != record.size:
         wish = f"{record.size[0]} x {record.size[1]}"
         said = f"{path} is {width} x {height}, not {wish}: write size = [{width}, {height}]"
         raise _fault(record, CameraCondition.REFUSED, said)
-    return Frame(time.time_ns(), width, height, content)
+    return EncodedImage(time.time_ns(), width, height, content)
 
 
 def _fault(record: CameraRecord, condition: CameraCondition, text: str) -> CameraFault:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from schemas.camera import CameraCondition
 from schemas.cell import CameraRecord, V4l2Source
-from services.camera.sources.source import CameraFault, Frame, encoded
+from services.camera.sources.source import CameraFault, EncodedImage, encoded
 
 MANUAL_EXPOSURE = 1.0  # V4L2_EXPOSURE_MANUAL
 MJPG = cv2.VideoWriter.fourcc(*"MJPG")
@@ -82,7 +82,7 @@ class V4l2Camera:
             raise self._why_closed(path)
         self._configure(self._capture)
 
-    def read(self) -> Frame:
+    def read(self) -> EncodedImage:
         """Waits for the next image (h, w, 3); raises `CameraFault` where none comes."""
         assert self._capture is not None, "open it first"
         is_there, data = self._capture.read()
@@ -93,7 +93,7 @@ class V4l2Camera:
         if not content.startswith(START_OF_JPEG):
             raise self._fault(CameraCondition.REFUSED, "what it sends as MJPEG is none: try another size")
         width, height = self._record.size
-        return Frame(stamp, width, height, content)
+        return EncodedImage(stamp, width, height, content)
 
     def close(self) -> None:
         if self._capture is not None:

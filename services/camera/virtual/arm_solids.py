@@ -13,13 +13,13 @@ from services.arm.errors import DescriptionError
 from services.arm.frames.transforms import IDENTITY, Rigid, from_rpy
 from services.arm.model.description import Arm
 from services.arm.stl import BadStl, read_stl
-from services.camera.virtual.solids import Array, Colour, Solid, box, cylinder, sphere, triangles
+from services.camera.virtual.solids import Array, Colour, PosedSolid, box, cylinder, sphere, triangles
 
 LINKS: tuple[Colour, ...] = ((196, 198, 202), (70, 72, 78), (150, 154, 160))  # one after the other
 MOST_TRIANGLES = 2000  # of a mesh; of a larger one its bounding box is drawn
 
 
-def arm_solids(arm: Arm) -> dict[str, tuple[Solid, ...]]:
+def arm_solids(arm: Arm) -> dict[str, tuple[PosedSolid, ...]]:
     """Solids in the frame of each link; meshes that are not STL are left out. Raises `DescriptionError`."""
     try:
         root = ET.parse(arm.urdf_path).getroot()
@@ -50,7 +50,7 @@ def shape_of(collision: ET.Element) -> Shape | None:
     return None
 
 
-def solid_of(shape: Shape, colour: Colour, pose: Rigid, *folders: Path) -> Solid | None:
+def solid_of(shape: Shape, colour: Colour, pose: Rigid, *folders: Path) -> PosedSolid | None:
     """A shape of the planning scene or of a link; a mesh's path is relative to one of `folders`."""
     match shape:
         case BoxShape(size=(x, y, z)):
@@ -65,7 +65,7 @@ def solid_of(shape: Shape, colour: Colour, pose: Rigid, *folders: Path) -> Solid
             return None
 
 
-def _mesh(shape: MeshShape, colour: Colour, pose: Rigid, folders: Sequence[Path]) -> Solid | None:
+def _mesh(shape: MeshShape, colour: Colour, pose: Rigid, folders: Sequence[Path]) -> PosedSolid | None:
     found = next((folder / shape.path for folder in folders if shape.path and (folder / shape.path).is_file()), None)
     try:
         mesh = read_stl(found.read_bytes() if found is not None else shape.data)
@@ -78,7 +78,7 @@ def _mesh(shape: MeshShape, colour: Colour, pose: Rigid, folders: Sequence[Path]
     x, y, z = ((low + high) / 2.0).tolist()
     a, b, c = (high - low).tolist()
     inner = box((a, b, c), colour)
-    return Solid(tuple(face.moved((x, y, z)) for face in inner.faces), pose)
+    return PosedSolid(tuple(face.moved((x, y, z)) for face in inner.faces), pose)
 
 
 def _origin(element: ET.Element) -> Rigid:

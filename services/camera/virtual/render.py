@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from schemas.camera import CameraInfo
 from services.arm.frames.transforms import Rigid, compose, inverse
 from services.camera.virtual.lens import Array, Lens, Samples, lens_of
-from services.camera.virtual.solids import Colour, Face, Solid
+from services.camera.virtual.solids import Colour, Face, PosedSolid
 
 Image = NDArray[np.uint8]
 
@@ -55,7 +55,7 @@ class _Target:
 
 
 def render(
-    solids: Sequence[Solid], camera: CameraInfo, base_from_camera: Rigid, optics: Optics = Optics(), seed: int = 0
+    solids: Sequence[PosedSolid], camera: CameraInfo, base_from_camera: Rigid, optics: Optics = Optics(), seed: int = 0
 ) -> Image:
     """The image (height, width, 3) in red, green, blue; the same `seed` gives the same noise."""
     lens = lens_of(camera, optics.samples)
@@ -95,7 +95,7 @@ def _averaged(target: _Target, camera: CameraInfo) -> Image:
     return np.ascontiguousarray(averaged)
 
 
-def _draw(target: _Target, solid: Solid, camera_from_base: Rigid) -> None:
+def _draw(target: _Target, solid: PosedSolid, camera_from_base: Rigid) -> None:
     turn, shift = _matrix(compose(camera_from_base, solid.pose))
     first, normals = _planes(solid.faces)
     turned = normals @ turn.T

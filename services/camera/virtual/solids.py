@@ -38,30 +38,30 @@ class Face:
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class PosedSolid:
     """Faces in a frame of their own, and the pose of that frame in the base ([m], quaternion)."""
 
     faces: tuple[Face, ...]
     pose: Rigid = IDENTITY
 
 
-def box(size: tuple[float, float, float], colour: Colour, pose: Rigid = IDENTITY) -> Solid:
+def box(size: tuple[float, float, float], colour: Colour, pose: Rigid = IDENTITY) -> PosedSolid:
     """A box around its origin; `size` (3,) [m] are whole edges."""
     x, y, z = (edge / 2.0 for edge in size)
     corners = np.array([[i, j, k] for i in (-x, x) for j in (-y, y) for k in (-z, z)])
     rings = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-    return Solid(tuple(Face(corners[list(ring)], colour) for ring in rings), pose)
+    return PosedSolid(tuple(Face(corners[list(ring)], colour) for ring in rings), pose)
 
 
-def cylinder(radius: float, length: float, colour: Colour, pose: Rigid = IDENTITY) -> Solid:
+def cylinder(radius: float, length: float, colour: Colour, pose: Rigid = IDENTITY) -> PosedSolid:
     """A prism of `SIDES` sides around the axis z; `radius` and `length` in [m]."""
     top = _ring(radius, length / 2.0)
     bottom = _ring(radius, -length / 2.0)
     sides = [Face(np.array([bottom[i], bottom[j], top[j], top[i]]), colour) for i, j in pairwise([*range(SIDES), 0])]
-    return Solid((Face(top, colour), Face(bottom[::-1], colour), *sides), pose)
+    return PosedSolid((Face(top, colour), Face(bottom[::-1], colour), *sides), pose)
 
 
-def sphere(radius: float, colour: Colour, pose: Rigid = IDENTITY) -> Solid:
+def sphere(radius: float, colour: Colour, pose: Rigid = IDENTITY) -> PosedSolid:
     """A ball of `STACKS` rings of faces; `radius` in [m]."""
     angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, STACKS + 1)
     rings = [_ring(radius * np.cos(angle), radius * np.sin(angle)) for angle in angles]
@@ -71,22 +71,22 @@ def sphere(radius: float, colour: Colour, pose: Rigid = IDENTITY) -> Solid:
             quad = np.array([low[i], low[j], high[j], high[i]])
             kept = quad[[0, 2, 3]] if depth == 0 else quad[[0, 1, 3]] if depth == STACKS - 1 else quad
             faces.append(Face(kept, colour))
-    return Solid(tuple(faces), pose)
+    return PosedSolid(tuple(faces), pose)
 
 
-def triangles(vertices: Array, numbers: NDArray[np.int32], colour: Colour, pose: Rigid = IDENTITY) -> Solid:
+def triangles(vertices: Array, numbers: NDArray[np.int32], colour: Colour, pose: Rigid = IDENTITY) -> PosedSolid:
     """A mesh: `vertices` (v, 3) [m] and the `numbers` (f, 3) of each triangle's corners."""
-    return Solid(tuple(Face(vertices[row], colour) for row in numbers), pose)
+    return PosedSolid(tuple(Face(vertices[row], colour) for row in numbers), pose)
 
 
-def printed(texture: Texture, width: float, height: float, pose: Rigid = IDENTITY) -> Solid:
+def printed(texture: Texture, width: float, height: float, pose: Rigid = IDENTITY) -> PosedSolid:
     """A grey picture on paper of `width` x `height` [m]: in the plane z = 0, seen from z > 0, x to its right, y up."""
     x, y = width / 2.0, height / 2.0
     corners = np.array([[-x, y, 0.0], [-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0]])
-    return Solid((Face(corners, texture=texture),), pose)
+    return PosedSolid((Face(corners, texture=texture),), pose)
 
 
-def tag(family: str, number: int, size: float, pose: Rigid = IDENTITY) -> Solid:
+def tag(family: str, number: int, size: float, pose: Rigid = IDENTITY) -> PosedSolid:
     """A printed tag with a margin of one cell; `size` [m] is the edge of its black square.
 
     `family` is the name of one of OpenCV's dictionaries, for example "apriltag_36h11" or "aruco_4x4_50". The frame has

@@ -13,9 +13,9 @@ from schemas.camera import CameraInfo
 from schemas.cell import CameraRecord, TagThing, Thing, VirtualSource
 from schemas.detections import Detection, DetectionKind, Detections
 from services.arm.frames.transforms import Rigid, compose, from_message, inverse, rotate, to_message
-from services.camera.sources.source import Frame, encoded
+from services.camera.sources.source import EncodedImage, encoded
 from services.camera.virtual.render import Image, Optics, expose, render
-from services.camera.virtual.world import Snapshot
+from services.camera.virtual.world import WorldSnapshot
 
 FRESH = 500_000_000  # [ns] a joint state that is older says nothing of the time of an image
 
@@ -26,7 +26,7 @@ class VirtualCamera:
     is_live = False
 
     def __init__(
-        self, record: CameraRecord, source: VirtualSource, info: CameraInfo, look: Callable[[], Snapshot]
+        self, record: CameraRecord, source: VirtualSource, info: CameraInfo, look: Callable[[], WorldSnapshot]
     ) -> None:
         """`info` is exact, whatever is believed of the camera."""
         self.period = 1.0 / record.fps
@@ -38,18 +38,18 @@ class VirtualCamera:
     def open(self) -> None:
         pass
 
-    def read(self) -> Frame:
+    def read(self) -> EncodedImage:
         """The image of this moment; it has the joint state's stamp, since that is the instant that it shows."""
         snapshot = self._look()
         now = time.time_ns()
         image = self.image(snapshot)
         stamp = snapshot.stamp if 0 <= now - snapshot.stamp <= FRESH else now
-        return Frame(stamp, self._info.width, self._info.height, encoded(cv2.cvtColor(image, cv2.COLOR_RGB2BGR)))
+        return EncodedImage(stamp, self._info.width, self._info.height, encoded(cv2.cvtColor(image, cv2.COLOR_RGB2BGR)))
 
     def close(self) -> None:
         pass
 
-    def image(self, snapshot: Snapshot) -> Image:
+    def image(self, snapshot: WorldSnapshot) -> Image:
         """(h, w, 3) in red, green, blue."""
         pose = base_from_camera(self._info, snapshot.links)
         key = (snapshot.key, pose)
@@ -65,7 +65,7 @@ def base_from_camera(info: CameraInfo, links: Mapping[str, Rigid]) -> Rigid:
     return compose(links[info.parent], from_message(info.parent_from_camera))
 
 
-def true_detections(snapshot: Snapshot, info: CameraInfo, things: Mapping[str, Thing]) -> Detections:
+def true_detections(snapshot: WorldSnapshot, info: CameraInfo, things: Mapping[str, Thing]) -> Detections:
     """Every thing that stands somewhere, seen or not, exactly where it is: what a detector is judged by."""
     pose = base_from_camera(info, snapshot.links)
     items = []

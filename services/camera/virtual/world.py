@@ -34,7 +34,7 @@ from services.arm.kinematics.chain import link_transforms
 from services.arm.model.description import Arm
 from services.arm.model.gripper import JAWS, jaw_edges, jaw_objects
 from services.camera.virtual.arm_solids import arm_solids, solid_of
-from services.camera.virtual.solids import Face, Solid, box, tag
+from services.camera.virtual.solids import Face, PosedSolid, box, tag
 
 TABLE, WOOD, CARDBOARD, OBSTACLE, JAW = (158, 150, 138), (120, 86, 52), (186, 160, 120), (128, 134, 142), (40, 42, 46)
 TABLE_HALF = 1.5  # [m]
@@ -44,7 +44,7 @@ ALONG_JAW = 0.004  # [m] beyond the jaws within which they still catch a thing
 
 
 @dataclass(frozen=True)
-class Held:
+class GrippedThing:
     """A thing between the jaws: its pose in the tool frame ([m], quaternion)."""
 
     name: str
@@ -53,17 +53,17 @@ class Held:
 
 
 @dataclass(frozen=True, eq=False)
-class Snapshot:
+class WorldSnapshot:
     """Everything at one instant, poses in the base frame; two with equal `key` look the same."""
 
-    solids: tuple[Solid, ...]
+    solids: tuple[PosedSolid, ...]
     links: Mapping[str, Rigid]
     things: Mapping[str, Rigid]
     stamp: int  # [ns] UNIX time of the joint state by this host's clock; 0 where that is not known
     key: tuple[object, ...] = field(default=())
 
 
-class World:
+class CameraWorld:
     """Takes what the bus says of the arm and the scene; `snapshot` may be called from another thread."""
 
     def __init__(self, arm: Arm, cell: Cell, to_own: Callable[[int], int | None] = lambda stamp: stamp) -> None:
@@ -79,7 +79,7 @@ class World:
         self._joints = JointState(name=arm.joint_names, position=(0.0,) * len(arm.joints))
         self._opening = arm.gripper.open if arm.gripper is not None else 0.0
         self._scene = PlanningScene()
-        self._held: Held | None = None
+        self._held: GrippedThing | None = None
         self._things: dict[str, Rigid] = {
             thing.name: (thing.position, from_rpy(0.0, 0.0, thing.yaw))
             for thing in cell.things
@@ -114,7 +114,7 @@ class World:
             self._held = None
         self._things = {**self._things, name: pose}
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> WorldSnapshot:
         """What there is now."""
         joints, scene, held, things, opening = self._joints, self._scene, self._held, self._things, self._opening
         links = self._link_poses(joints)
@@ -122,12 +122,12 @@ class World:
             things = {**things, held.name: compose(links[self._arm.tool_frame], held.tool_from_thing)}
         solids = [*self._fixed]
         solids += [_at(solid, links[name]) for name, parts in self._links.items() for solid in parts if name in links]
-        solids += [Solid(faces, tag_pose(record, links)) for record, faces in self._tags]
-        solids += [Solid(self._parts[name], pose) for name, pose in things.items()]
+        solids += [PosedSolid(faces, tag_pose(record, links)) for record, faces in self._tags]
+        solids += [PosedSolid(self._parts[name], pose) for name, pose in things.items()]
         solids += self._jaws(links, opening)
         solids += self._obstacles(links, scene)
         key = (joints.position, scene.version, scene.epoch, opening, tuple(things.items()))
-        return Snapshot(tuple(solids), links, things, self._to_own(joints.stamp) or 0, key)
+        return WorldSnapshot(tuple(solids), links, things, self._to_own(joints.stamp) or 0, key)
 
     def _link_poses(self, joints: JointState | None = None) -> dict[str, Rigid]:
         """In the base frame."""
@@ -138,7 +138,7 @@ class World:
             return poses
         return {name: compose(inverse(base), pose) for name, pose in poses.items()}
 
-    def _jaws(self, links: Mapping[str, Rigid], opening: float) -> list[Solid]:
+    def _jaws(self, links: Mapping[str, Rigid], opening: float) -> list[PosedSolid]:
         found = []
         for each in jaw_objects(self._arm, opening):
             pose = compose(links[each.frame], from_message(each.pose))
@@ -146,7 +146,7 @@ class World:
             found += [solid] if solid is not None else []
         return found
 
-    def _obstacles(self, links: Mapping[str, Rigid], scene: PlanningScene) -> list[Solid]:
+    def _obstacles(self, links: Mapping[str, Rigid], scene: PlanningScene) -> list[PosedSolid]:
         """The scene's objects, without what is drawn by itself: things, the jaws, and tags on the arm."""
         own = {*self._parts, *JAWS, MOUNT_BOARD}
         found = []
@@ -157,7 +157,7 @@ class World:
                 found += [solid] if solid is not None else []
         return found
 
-    def _caught(self, tool: Rigid, before: float) -> Held | None:
+    def _caught(self, tool: Rigid, before: float) -> GrippedThing | None:
         """The thing on which the jaws, `before` [m] apart, have just closed: they centre it."""
         assert self._arm.gripper is not None
         along, _, beyond = jaw_edges(self._arm.gripper)
@@ -170,7 +170,7 @@ class World:
             width = width_across(thing, local)
             if is_between and is_reached and self._opening <= width + CAUGHT < before:
                 (px, py, pz), turn = local
-                return Held(name, ((px, py - y, pz), turn), width)
+                return GrippedThing(name, ((px, py - y, pz), turn), width)
         return None
 
     def _fallen(self, name: str, pose: Rigid) -> Rigid:
@@ -208,13 +208,13 @@ def thing_faces(thing: Thing) -> tuple[Face, ...]:
     return box(thing.box, RGB[thing.colour] if isinstance(thing, ColourThing) else WOOD).faces
 
 
-def fixed_solids(cell: Cell) -> tuple[Solid, ...]:
+def fixed_solids(cell: Cell) -> tuple[PosedSolid, ...]:
     """The table, a little below its height so that what is printed lies on it, and the tags of places."""
     found = []
     if cell.table is not None:
         h, z = TABLE_HALF, cell.table - SHEET
         corners = np.array([[-h, -h, z], [h, -h, z], [h, h, z], [-h, h, z]])
-        found.append(Solid((Face(corners, TABLE),)))
+        found.append(PosedSolid((Face(corners, TABLE),)))
     places = [each for each in cell.places if isinstance(each, TagPlace)]
     found += [
         tag(each.family, each.id, each.size, (each.position, from_rpy(0.0, 0.0, each.yaw)))
@@ -224,5 +224,5 @@ def fixed_solids(cell: Cell) -> tuple[Solid, ...]:
     return tuple(found)
 
 
-def _at(solid: Solid, pose: Rigid) -> Solid:
-    return Solid(solid.faces, compose(pose, solid.pose))
+def _at(solid: PosedSolid, pose: Rigid) -> PosedSolid:
+    return PosedSolid(solid.faces, compose(pose, solid.pose))

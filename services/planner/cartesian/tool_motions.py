@@ -27,7 +27,7 @@ from services.planner.cartesian.tool_path import ToolPath, polyline
 from services.planner.collision.clearance import PathChecker
 from services.planner.kinematics.goals import Goals
 from services.planner.kinematics.pose_goals import target_of
-from services.planner.kinematics.targets import ROTATION_TOLERANCE, Target, turn_between
+from services.planner.kinematics.targets import ROTATION_TOLERANCE, ToolTarget, turn_between
 from services.planner.kinematics.task_space import TaskSpace
 from services.planner.path.path import Start
 from services.planner.request.deadline import NEVER, Deadline
@@ -111,7 +111,7 @@ class ToolMotions:
         turn = turn_between(before.rotation @ target.pointing.axis, target.pointing.direction)
         return Pose(target.position, pin.exp3(turn) @ before.rotation)
 
-    def _target(self, goal: PoseGoal, start: Start) -> Target:
+    def _target(self, goal: PoseGoal, start: Start) -> ToolTarget:
         return target_of(goal, self._goals.frame(goal, start))
 
     def _require_reachable(self, goal: Goal, start: Start, fraction: float, deadline: Deadline) -> None:

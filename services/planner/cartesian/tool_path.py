@@ -92,7 +92,7 @@ class Corner:
 
 
 @dataclass(frozen=True)
-class Arc:
+class ArcPiece:
     """About `centre` (3,) and the unit `normal` (3,) by `angle` [rad], the tool itself turning by `turn` (3,) [rad]."""
 
     start: Pose

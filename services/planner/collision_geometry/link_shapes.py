@@ -15,7 +15,7 @@ from services.arm.kinematics.self_collisions import load_collision_geometry
 from services.arm.model.description import Arm
 from services.planner.collision_geometry.coal_shapes import mesh_of
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
-from services.planner.collision_geometry.solids import Box, Capsule, Cylinder, Polytope, Solid, polytope_around
+from services.planner.collision_geometry.solids import Box, Capsule, ConvexSolid, Cylinder, Polytope, polytope_around
 
 Array = NDArray[np.float64]
 Form = tuple[ShapeKind, tuple[float, ...], TriangleMesh | None]
@@ -81,7 +81,7 @@ def _polytope_of(mesh: TriangleMesh) -> Polytope:
     return polytope_around(mesh.vertices)
 
 
-def solid_of(shape: CollisionShape) -> Solid:
+def solid_of(shape: CollisionShape) -> ConvexSolid:
     """Its solid about its own origin; raises ValueError for a mesh and for what has no end."""
     size = shape.size
     match shape.kind:

@@ -17,7 +17,7 @@ PROJECTIONS = 40  # onto one side of a polytope after the other; some ten are en
 PLANE_DIGITS = 9  # to which the sides' planes are rounded: two triangles of one side are one plane
 
 
-class Solid(Hashable, Protocol):
+class ConvexSolid(Hashable, Protocol):
     """A convex solid about its own origin; points are (..., 3) [m]."""
 
     @property

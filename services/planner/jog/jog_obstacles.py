@@ -21,7 +21,7 @@ LEVEL = 1e-7  # [m] that a depth may seem to grow between two looks where the mo
 CONTACT_SPEED = 0.02  # [m/s] of what is nearer than the clearance already, on its way out
 
 
-class Obstacles:
+class JogObstacles:
     """Of one world."""
 
     def __init__(self, world: World, braking: Braking) -> None:

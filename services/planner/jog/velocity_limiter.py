@@ -13,7 +13,7 @@ from services.arm.model.description import Arm
 from services.planner.collision.world import World
 from services.planner.jog.braking import Braking
 from services.planner.jog.jog_limits import joint_limit
-from services.planner.jog.jog_obstacles import Obstacles
+from services.planner.jog.jog_obstacles import JogObstacles
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class VelocityLimiter:
 
     def __init__(self, arm: Arm, world: World, braking: Braking) -> None:
         self._joints, self._braking = arm.joints, braking
-        self._obstacles = Obstacles(world, braking)
+        self._obstacles = JogObstacles(world, braking)
         self._share = 1.0  # of the wanted velocity that was free the last time something was in the way
 
     def allowed(self, positions: Array, velocity: Array, wanted: Array, singular: Singular | None = None) -> Allowed:

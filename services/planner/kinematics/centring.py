@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.planner.kinematics.descent import Descent
-from services.planner.kinematics.targets import Target
+from services.planner.kinematics.targets import ToolTarget
 
 Array = NDArray[np.float64]
 
@@ -32,18 +32,18 @@ class Centring:
         )
         self._weight = np.array([2.0 / (upper - lower) for lower, upper in spans])  # 0 without limits
 
-    def is_redundant(self, target: Target, solution: Array) -> bool:
+    def is_redundant(self, target: ToolTarget, solution: Array) -> bool:
         """True if the joints can move at `solution` (n,) [rad] or [m] without the tool leaving its target."""
         return len(self._free_motions(target, solution)) > 0
 
-    def centred(self, target: Target, solution: Array) -> Array | None:
+    def centred(self, target: ToolTarget, solution: Array) -> Array | None:
         """Joint values (n,) [rad] or [m] nearer to the middles of their ranges, reached from `solution` (n,) by
         self-motion; `solution` itself where no self-motion brings them nearer, None where there is none."""
         if self._descent.knows_centring(target):
             return self._descent.centred(target, solution, self._middle, self._weight)
         return self.centred_in_python(target, solution)
 
-    def centred_in_python(self, target: Target, solution: Array) -> Array | None:
+    def centred_in_python(self, target: ToolTarget, solution: Array) -> Array | None:
         """`centred` of `solution` (n,) [rad] or [m] where the core is not built or does not know the target."""
         for step_number in range(STEPS):
             motions = self._free_motions(target, solution)
@@ -60,7 +60,7 @@ class Centring:
             solution = attempt.positions
         return solution
 
-    def drawn(self, target: Target, solution: Array, near: Array) -> Array:
+    def drawn(self, target: ToolTarget, solution: Array, near: Array) -> Array:
         """Joint values (n,) [rad] or [m]: `solution` (n,), moved towards `near` (n,) along its self-motion, which is
         taken as straight."""
         motions = self._free_motions(target, solution)
@@ -72,7 +72,7 @@ class Centring:
         squares, to which a joint at a limit adds 1 and a joint without limits 0."""
         return float(np.sum(((positions - self._middle) * self._weight) ** 2))
 
-    def _free_motions(self, target: Target, positions: Array) -> Array:
+    def _free_motions(self, target: ToolTarget, positions: Array) -> Array:
         """(k, n) orthonormal motions of the joints that leave the tool as it is to be."""
         _, jacobian = target.error_and_jacobian(self._kinematics, positions)
         _, values, rows = np.linalg.svd(jacobian)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.planner.kinematics.joint_ranges import FullTurns
-from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, Target, any_normal
+from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, ToolTarget, any_normal
 
 if TYPE_CHECKING:
     from eaik.pybindings.EAIK import Robot
@@ -125,7 +125,7 @@ def _agrees(arm: Arm, kinematics: Kinematics, robot: Robot, order: list[int]) ->
     return True
 
 
-def completed(target: Target, kinematics: Kinematics, guess: Array) -> list[Array]:
+def completed(target: ToolTarget, kinematics: Kinematics, guess: Array) -> list[Array]:
     """Joint values (n,) [rad] or [m]: `guess` (n,) with the missing turn of the tool made by one joint; empty if more
     is missing.
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
-from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, Target
+from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, ToolTarget
 from services.planner.native import compiled
 from services.planner.native.compiled import where_built
 
@@ -60,7 +60,7 @@ class Descent:
         clipped: Array = np.minimum(np.maximum(positions, self._lower), self._upper)
         return clipped
 
-    def descend(self, target: Target, start: Array) -> Attempt:
+    def descend(self, target: ToolTarget, start: Array) -> Attempt:
         """The nearest local optimum from `start` (n,) [rad] or [m]: exact where it can be, else at the edge of the
         tolerances."""
         attempt = self._exact(target, start)
@@ -70,27 +70,27 @@ class Descent:
         error, _ = target.error_and_jacobian(self._kinematics, edge.positions)
         return Attempt(edge.positions, math.sqrt(float(error @ error)), target.is_met(error))
 
-    def _exact(self, target: Target, start: Array) -> Attempt:
+    def _exact(self, target: ToolTarget, start: Array) -> Attempt:
         if self._native is None or target.pointing is not None:
             return self._descend(
                 target, start, lambda q: target.error_and_jacobian(self._kinematics, q), target.is_exact
             )
         return Attempt(*self._native.descend(start, *_exact_target(target)))
 
-    def knows_centring(self, target: Target) -> bool:
+    def knows_centring(self, target: ToolTarget) -> bool:
         """True if `centred` answers for this target: built, and the target is an exact one."""
         return self._native is not None and target.pointing is None and not target.is_tolerant
 
-    def centred(self, target: Target, solution: Array, middle: Array, weight: Array) -> Array | None:
+    def centred(self, target: ToolTarget, solution: Array, middle: Array, weight: Array) -> Array | None:
         """As `Centring.centred`, compiled; joint values (n,) [rad] or [m], `weight` (n,) by the distance from
         `middle` (n,)."""
         assert self._native is not None
         return self._native.centred(solution, middle, weight, *_exact_target(target))
 
-    def _tolerant(self, target: Target, positions: Array) -> tuple[Array, Array]:
+    def _tolerant(self, target: ToolTarget, positions: Array) -> tuple[Array, Array]:
         return target.beyond_tolerances(*target.error_and_jacobian(self._kinematics, positions))
 
-    def _descend(self, target: Target, start: Array, residual: Residual, is_there: Test) -> Attempt:
+    def _descend(self, target: ToolTarget, start: Array, residual: Residual, is_there: Test) -> Attempt:
         positions = self.clip(start)
         error, jacobian = residual(positions)
         cost, damping = float(error @ error), 1e-6
@@ -131,7 +131,7 @@ class Descent:
         return self.clip(positions + step)
 
 
-def _exact_target(target: Target) -> tuple[Array, Array, float, float, float]:
+def _exact_target(target: ToolTarget) -> tuple[Array, Array, float, float, float]:
     """As the compiled descents take it."""
     rotation = NOTHING if target.rotation is None else target.rotation.reshape(9)
     return target.position, rotation, target.metres_per_radian, POSITION_TOLERANCE, ROTATION_TOLERANCE

@@ -15,7 +15,7 @@ from services.planner.kinematics.closed_form import ClosedForm, chain_order, clo
 from services.planner.kinematics.descent import Attempt, Descent
 from services.planner.kinematics.joint_ranges import one_turn, spread
 from services.planner.kinematics.parallel_axes import ParallelAxes, parallel_axes
-from services.planner.kinematics.targets import Target
+from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ class InverseKinematics:
         """True if full poses are solved in closed form."""
         return self._closed is not None
 
-    def solutions(self, target: Target, near: Array, deadline: Deadline) -> Iterator[Array]:
+    def solutions(self, target: ToolTarget, near: Array, deadline: Deadline) -> Iterator[Array]:
         """Distinct joint values (n,) [rad] or [m] that meet the target: all of the closed form, the nearest to `near`
         (n,) first; where that gives none, what `near` leads to and its mirror images, then batches, each nearest
         first."""
@@ -68,7 +68,7 @@ class InverseKinematics:
             starts = FEW if is_known and not target.is_tolerant else len(self._starts)
             yield from self._searched(target, near, deadline, starts)
 
-    def nearest(self, target: Target, near: Array, deadline: Deadline) -> list[Array]:
+    def nearest(self, target: ToolTarget, near: Array, deadline: Deadline) -> list[Array]:
         """Joint values (n,) [rad] or [m] that bring the tool as near to the target as their start allows, the best
         first; the starts are `near` (n,) and points spread over the limits."""
         attempts = [self.descend(target, near), *self._attempts(target, near, deadline)]
@@ -78,11 +78,11 @@ class InverseKinematics:
         """[s] that the slowest joint takes from `first` to `second` (n,) at full speed: the distance that counts."""
         return float(np.max(np.abs(first - second) / self._speed))
 
-    def descend(self, target: Target, start: Array) -> Attempt:
+    def descend(self, target: ToolTarget, start: Array) -> Attempt:
         """The nearest local optimum from `start` (n,) [rad] or [m]."""
         return self._descent.descend(target, start)
 
-    def _closed_form_solutions(self, target: Target, near: Array) -> Iterator[Array]:
+    def _closed_form_solutions(self, target: ToolTarget, near: Array) -> Iterator[Array]:
         """The closed form's configurations, each refined until it meets the target; lazily, the nearest first."""
         configurations = self._closed_form_configurations(target, near)
         if not configurations:
@@ -94,7 +94,7 @@ class InverseKinematics:
             if attempt.is_solution:
                 yield attempt.positions
 
-    def _closed_form_configurations(self, target: Target, near: Array) -> list[Array]:
+    def _closed_form_configurations(self, target: ToolTarget, near: Array) -> list[Array]:
         if self._parallel is not None:
             return self._parallel.configurations(target.position, near)
         if self._closed is None:
@@ -110,7 +110,7 @@ class InverseKinematics:
             ]
         return configurations
 
-    def _at_limits(self, target: Target, near: Array, found: list[Array]) -> Iterator[Array]:
+    def _at_limits(self, target: ToolTarget, near: Array, found: list[Array]) -> Iterator[Array]:
         """Where nothing was found, for the free turn leaves hardly any configuration within the limits: what those of a
         fine turn lead to that miss the limits least."""
         if found or self._closed is None or target.pointing is None:
@@ -125,7 +125,7 @@ class InverseKinematics:
             if attempt.is_solution:
                 yield attempt.positions
 
-    def _rotations(self, target: Target, near: Array) -> list[Array]:
+    def _rotations(self, target: ToolTarget, near: Array) -> list[Array]:
         """The tool's rotations that the target asks for, or some of them where it leaves one turn free."""
         if target.rotation is not None:
             return [target.rotation]
@@ -134,7 +134,7 @@ class InverseKinematics:
         present = self._kinematics.tool(near).rotation
         return turns_about(target.pointing.direction, target.pointing.axis, present, TURNS)
 
-    def _from_guess(self, closed: ClosedForm, target: Target, guess: Array, near: Array) -> Iterator[Array]:
+    def _from_guess(self, closed: ClosedForm, target: ToolTarget, guess: Array, near: Array) -> Iterator[Array]:
         """Where axes coincide, how two joints share one turn is free: as nearly as they can to how they stand now."""
         alike = completed(target, self._kinematics, guess)
         for turned in closed.turns.within_limits(np.array(alike), near) if alike else []:
@@ -145,7 +145,7 @@ class InverseKinematics:
     def _start_count(self, arm: Arm) -> int:
         return MORE_STARTS if len(arm.joints) >= FULL_POSE_JOINTS and self._closed is None else STARTS
 
-    def _searched(self, target: Target, near: Array, deadline: Deadline, starts: int) -> Iterator[Array]:
+    def _searched(self, target: ToolTarget, near: Array, deadline: Deadline, starts: int) -> Iterator[Array]:
         found = self._first(target, near)
         yield from list(found)
         attempts = islice(self._attempts(target, near, deadline), starts)
@@ -156,7 +156,7 @@ class InverseKinematics:
                     self._collect(target, attempt.positions, found, new)
             yield from sorted(new, key=lambda positions: self.travel(near, positions))
 
-    def _first(self, target: Target, near: Array) -> list[Array]:
+    def _first(self, target: ToolTarget, near: Array) -> list[Array]:
         """What `near` leads to and, for an arm of few joints, its mirror image in each elbow; nearest first."""
         first = self.descend(target, near)
         if not first.is_solution:
@@ -171,7 +171,7 @@ class InverseKinematics:
                     found.append(attempt.positions)
         return sorted(found, key=lambda positions: self.travel(near, positions))
 
-    def _collect(self, target: Target, positions: Array, found: list[Array], new: list[Array]) -> None:
+    def _collect(self, target: ToolTarget, positions: Array, found: list[Array], new: list[Array]) -> None:
         """Puts a solution that is none of those found into both lists; far from `near`, freedom goes to the middles."""
         centred = self._centring.centred(target, positions)
         is_redundant = centred is not None
@@ -185,7 +185,7 @@ class InverseKinematics:
             return True
         return bool((np.abs(np.array(found) - positions) / self._speed).max(axis=1).min() > same)
 
-    def _attempts(self, target: Target, near: Array, deadline: Deadline) -> Iterator[Attempt]:
+    def _attempts(self, target: ToolTarget, near: Array, deadline: Deadline) -> Iterator[Attempt]:
         """Descents from starts spread over the limits; the first few lie around `near`."""
         for index, point in enumerate(self._starts):
             if deadline.has_passed():

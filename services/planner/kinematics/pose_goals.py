@@ -12,7 +12,7 @@ from schemas.message import Vector
 from schemas.planning import PlanCode, PoseGoal
 from services.arm.frames.transforms import IDENTITY, Point, Quaternion, Rigid, compose, inverse, rotate
 from services.arm.kinematics.kinematics import Pose
-from services.planner.kinematics.targets import Pointing, Target, turn_between
+from services.planner.kinematics.targets import AxisPointing, ToolTarget, turn_between
 from services.planner.request.refusals import malformed
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ LEAST_AXIS = 1e-9  # length below which an axis has no direction; chosen: its sq
 FARTHEST = 1e6  # [m] beyond which a position is a mistake, and squares lose their digits
 
 
-def target_of(goal: PoseGoal, frame: Rigid) -> Target:
+def target_of(goal: PoseGoal, frame: Rigid) -> ToolTarget:
     """The target of `goal`, given in `frame` (its pose in the base); raises `PlanRefused`."""
     _require_form(goal)
     x, y, z = goal.position
@@ -32,14 +32,14 @@ def target_of(goal: PoseGoal, frame: Rigid) -> Target:
     tolerances = (goal.position_tolerance, goal.orientation_tolerance)
     if goal.tool_axis:
         axis, direction = _unit(goal.tool_axis), rotate(frame[1], _unit(goal.direction))
-        return Target(position, None, Pointing(np.array(axis), np.array(direction)), *tolerances)
+        return ToolTarget(position, None, AxisPointing(np.array(axis), np.array(direction)), *tolerances)
     if not goal.orientation:
-        return Target(position, None, None, *tolerances)
+        return ToolTarget(position, None, None, *tolerances)
     rotation = _matrix(compose(frame, (IDENTITY[0], _quaternion(goal.orientation)))[1])
     if goal.free_axis:
         axis_ = np.array(_unit(goal.free_axis))
-        return Target(position, None, Pointing(axis_, rotation @ axis_), *tolerances)
-    return Target(position, rotation, None, *tolerances)
+        return ToolTarget(position, None, AxisPointing(axis_, rotation @ axis_), *tolerances)
+    return ToolTarget(position, rotation, None, *tolerances)
 
 
 def as_goal(goal: PoseGoal, pose: Pose, frame: Rigid) -> Vector:

@@ -21,7 +21,7 @@ METRES_PER_RADIAN = 0.2  # how much a turn of the tool counts against its positi
 
 
 @dataclass(frozen=True)
-class Pointing:
+class AxisPointing:
     """An axis (3,) of the tool, in the tool's frame, that is to point along `direction` (3,) in the base frame."""
 
     axis: Array
@@ -29,12 +29,12 @@ class Pointing:
 
 
 @dataclass(frozen=True)
-class Target:
+class ToolTarget:
     """A tool position (3,) [m] in the base frame and, where it matters, its rotation (3, 3) or where it points."""
 
     position: Array
     rotation: Array | None = None
-    pointing: Pointing | None = None
+    pointing: AxisPointing | None = None
     position_tolerance: float = 0.0  # [m] that will do as well
     rotation_tolerance: float = 0.0  # [rad]
     metres_per_radian: float = METRES_PER_RADIAN

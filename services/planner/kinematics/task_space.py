@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
-from services.planner.kinematics.targets import ROTATION_TOLERANCE, Target
+from services.planner.kinematics.targets import ROTATION_TOLERANCE, ToolTarget
 
 Array = NDArray[np.float64]
 
@@ -75,11 +75,11 @@ class TaskSpace:
         """The name of what the arm lacks."""
         return "tilt" if self._is_upright else "orientation"
 
-    def allows(self, target: Target) -> bool:
+    def allows(self, target: ToolTarget) -> bool:
         """True if any configuration at all, wherever the tool then is, turns it like that."""
         return self.missing_tilt(target) <= max(ROTATION_TOLERANCE, target.rotation_tolerance)
 
-    def missing_tilt(self, target: Target) -> float:
+    def missing_tilt(self, target: ToolTarget) -> float:
         """[rad] at least between the target and the nearest orientation of any configuration; 0 where that is not
         known."""
         if not target.has_turn or len(self.axes) > 1:

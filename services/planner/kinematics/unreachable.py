@@ -17,7 +17,7 @@ from services.arm.model.description import Arm
 from services.planner.collision.clearance import DistanceChecker, last_free
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.pose_goals import as_goal
-from services.planner.kinematics.targets import POSITION_TOLERANCE, Target
+from services.planner.kinematics.targets import POSITION_TOLERANCE, ToolTarget
 from services.planner.kinematics.task_space import TaskSpace
 from services.planner.request.deadline import Deadline
 from services.planner.request.refusals import PlanRefused, out_of_reach
@@ -40,10 +40,10 @@ class UnreachableRefusals:
         self._arm, self._kinematics, self._ik = arm, kinematics, ik
         self._task_space, self._collisions = able, collisions
 
-    def refusal(self, goal: PoseGoal, target: Target, frame: Rigid, near: Array, deadline: Deadline) -> PlanRefused:
+    def refusal(self, goal: PoseGoal, target: ToolTarget, frame: Rigid, near: Array, deadline: Deadline) -> PlanRefused:
         """The refusal for a position out of reach, or for an orientation that the arm cannot have there, with the
         nearest pose; `near` (n,) [rad] or [m] is the start, `frame` the goal's frame in the base."""
-        place = Target(target.position, position_tolerance=target.position_tolerance)
+        place = ToolTarget(target.position, position_tolerance=target.position_tolerance)
         best = self._nearest_free(place, near, deadline)
         pose = self._kinematics.tool(best)
         if not self._task_space.allows(target):
@@ -62,7 +62,7 @@ class UnreachableRefusals:
             return as_goal(goal, pose, frame)
         return self._printable(pose.position, configuration, frame, deadline)
 
-    def _nearest_free(self, target: Target, near: Array, deadline: Deadline) -> Array:
+    def _nearest_free(self, target: ToolTarget, near: Array, deadline: Deadline) -> Array:
         """The best configuration; one that touches is drawn back towards the start until it does not."""
         free: list[Array] = []
         for configuration in self._ik.nearest(target, near, deadline)[:NEAREST_TRIED]:
@@ -76,7 +76,9 @@ class UnreachableRefusals:
             return configuration
         return last_free(self._collisions, near, configuration)
 
-    def _nearest_turned(self, target: Target, place: Target, fallback: Array, near: Array, deadline: Deadline) -> Array:
+    def _nearest_turned(
+        self, target: ToolTarget, place: ToolTarget, fallback: Array, near: Array, deadline: Deadline
+    ) -> Array:
         """At the place, the configuration that turns the tool as nearly as it can be, and touches nothing."""
         light = replace(target, metres_per_radian=LIGHT, rotation_tolerance=0.0)
         turned: list[Array] = []
@@ -86,7 +88,7 @@ class UnreachableRefusals:
                 turned.append(attempt.positions)
         return min(turned, key=lambda q: target.misses(self._kinematics.tool(q))[1], default=fallback)
 
-    def _tilt_refused(self, goal: PoseGoal, target: Target, frame: Rigid, best: Array) -> PlanRefused:
+    def _tilt_refused(self, goal: PoseGoal, target: ToolTarget, frame: Rigid, best: Array) -> PlanRefused:
         missing = self._task_space.missing_tilt(target)
         return PlanRefused(
             PlanCode.INVALID_GOAL_CONSTRAINTS,
@@ -102,7 +104,7 @@ class UnreachableRefusals:
             ),
         )
 
-    def _turn_refused(self, goal: PoseGoal, target: Target, frame: Rigid, best: Array) -> PlanRefused:
+    def _turn_refused(self, goal: PoseGoal, target: ToolTarget, frame: Rigid, best: Array) -> PlanRefused:
         pose = self._kinematics.tool(best)
         missing = target.misses(pose)[1]
         nearest = as_goal(goal, pose, frame)
@@ -141,7 +143,7 @@ class UnreachableRefusals:
         for corner in sorted(corners, key=lambda corner: float(np.linalg.norm(corner * PRINTED - local))):
             x, y, z = (round(value, 4) for value in (corner * PRINTED).tolist())
             back = np.array(compose(frame, ((x, y, z), IDENTITY[1]))[0])
-            attempt = self._ik.descend(Target(back), configuration)
+            attempt = self._ik.descend(ToolTarget(back), configuration)
             if deadline.has_passed() or (
                 attempt.is_solution and self._collisions.distance(attempt.positions) > self._collisions.clearance
             ):

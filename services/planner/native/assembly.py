@@ -35,7 +35,7 @@ ROUNDING = 2e-5  # [m] for every metre of reach: a float has 24 bits; measured: 
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldPart:
     """An attachment and its compiled part, and what is surely in it."""
 
     attachment: Attachment
@@ -44,7 +44,7 @@ class Held:
     core: motion.Part | None
 
 
-class Named(NamedTuple):
+class NamedPart(NamedTuple):
     """A part of the world: a link, or what is attached to one."""
 
     name: str
@@ -59,7 +59,7 @@ class CompiledScene:
     world: motion.World
     names: tuple[str, ...]  # of the parts: links, then what is attached
     shapes: tuple[CollisionShape, ...]
-    held: Mapping[str, Held]
+    held: Mapping[str, HeldPart]
     cores: motion.World | None  # of the spheres less what they bulge: what touches these surely touches
 
     def name_of(self, number: int) -> str:
@@ -81,22 +81,22 @@ class Assembly:
         for link, cover in self.covers.items():
             self._links[link], self._cores[link] = self._part_and_core(link, shapes[link], cover)
 
-    def hold(self, attachment: Attachment) -> Held:
+    def hold(self, attachment: Attachment) -> HeldPart:
         """The attachment with its spheres; raises ValueError for an unknown link or a shape without an end."""
         if attachment.link not in self._frames.places:
             raise ValueError(f'"{attachment.name}": {self.arm.name} has no link "{attachment.link}"')
         if attachment.name in self._links:
             raise ValueError(f'"{attachment.name}" is the name of a link; give what is attached another one')
         cover = cover_shapes(attachment.shapes, _bulge(attachment.shapes))
-        return Held(attachment, cover, *self._part_and_core(attachment.link, attachment.shapes, cover))
+        return HeldPart(attachment, cover, *self._part_and_core(attachment.link, attachment.shapes, cover))
 
-    def compiled_scene(self, shapes: Sequence[CollisionShape], held: Mapping[str, Held]) -> CompiledScene:
+    def compiled_scene(self, shapes: Sequence[CollisionShape], held: Mapping[str, HeldPart]) -> CompiledScene:
         """Links, then what is attached; raises ValueError for two obstacles of one name or an unknown name."""
         _require_distinct(shapes)
-        parts = [Named(link, link, part) for link, part in self._links.items()]
-        parts += [Named(name, one.attachment.link, one.part) for name, one in held.items()]
-        cores = [Named(link, link, core) for link, core in self._cores.items() if core is not None]
-        cores += [Named(name, one.attachment.link, one.core) for name, one in held.items() if one.core is not None]
+        parts = [NamedPart(link, link, part) for link, part in self._links.items()]
+        parts += [NamedPart(name, one.attachment.link, one.part) for name, one in held.items()]
+        cores = [NamedPart(link, link, core) for link, core in self._cores.items() if core is not None]
+        cores += [NamedPart(name, one.attachment.link, one.core) for name, one in held.items() if one.core is not None]
         names = tuple(part.name for part in parts)
         _require_known(shapes, names)
         world = self._world(parts, shapes, held)
@@ -104,7 +104,7 @@ class Assembly:
         return CompiledScene(world, names, tuple(shapes), dict(held), sure)
 
     def _world(
-        self, parts: Sequence[Named], shapes: Sequence[CollisionShape], held: Mapping[str, Held]
+        self, parts: Sequence[NamedPart], shapes: Sequence[CollisionShape], held: Mapping[str, HeldPart]
     ) -> motion.World:
         names = [part.name for part in parts]
         pairs = [
@@ -142,7 +142,7 @@ class Assembly:
         steps = np.linalg.norm(self._frames.numbers[:, 9:12], axis=1)
         return ROUNDING * max(1.0, float(steps.sum() + self._frames.numbers[:, 14].sum()))
 
-    def _is_checked(self, one: Named, other: Named, held: Mapping[str, Held]) -> bool:
+    def _is_checked(self, one: NamedPart, other: NamedPart, held: Mapping[str, HeldPart]) -> bool:
         """True for two parts that a joint can move apart; an attachment says itself what it touches."""
         (name, link, _), (second_name, second_link, _) = one, other
         if self._frames.places[link][0] == self._frames.places[second_link][0]:

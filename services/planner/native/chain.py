@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Frames:
+class ChainFrames:
     """Rows for `_motion.chain`, and every link's frame with the link's pose (4, 4) in it; frame 0 is the base."""
 
     links: NDArray[np.int32]  # (f, 3): parent, drive, slides
@@ -25,7 +25,7 @@ class Frames:
     places: dict[str, tuple[int, Array]]
 
 
-def frames_of(arm: Arm) -> Frames:
+def frames_of(arm: Arm) -> ChainFrames:
     """The arm's tree, without its fixed joints."""
     root = _root(arm)
     links, numbers = [(0, 0, 0)], [_row(np.eye(4), 1.0, 0.0, 0.0)]
@@ -41,7 +41,7 @@ def frames_of(arm: Arm) -> Frames:
         links.append((frame, drive, int(joint.kind is JointKind.PRISMATIC)))
         numbers.append(_row(here @ turn, multiplier, offset, _travel(arm, joint, drive, multiplier, offset)))
         places[joint.child] = (len(links) - 1, turn.T)
-    return Frames(np.array(links, dtype=np.int32), np.array(numbers), places)
+    return ChainFrames(np.array(links, dtype=np.int32), np.array(numbers), places)
 
 
 def inverse_of(matrix: Array) -> Array:

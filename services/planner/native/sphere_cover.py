@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from services.planner.collision_geometry.link_shapes import solid_of
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
-from services.planner.collision_geometry.solids import Capsule, Solid
+from services.planner.collision_geometry.solids import Capsule, ConvexSolid
 from services.planner.native.binding import motion
 from services.planner.native.model_cache import cached_rows
 
@@ -98,7 +98,7 @@ def kept_cover(shape: CollisionShape, bulge: float) -> SphereCover:
 
 
 @lru_cache(maxsize=256)
-def _kept_solid(solid: Solid, bulge: float) -> SphereCover:
+def _kept_solid(solid: ConvexSolid, bulge: float) -> SphereCover:
     rows = cached_rows(f"{solid} {bulge}".encode(), lambda: _as_rows(cover_of(solid, bulge)))
     return SphereCover(rows[:-1], float(rows[-1, 0]))
 
@@ -108,7 +108,7 @@ def _as_rows(cover: SphereCover) -> Array:
     return np.vstack((cover.spheres, (cover.bulge, 0.0, 0.0, 0.0)))
 
 
-def cover_of(solid: Solid, bulge: float = BULGE) -> SphereCover:
+def cover_of(solid: ConvexSolid, bulge: float = BULGE) -> SphereCover:
     """The spheres [m] of a convex solid in its own frame, which reach at most `bulge` [m] beyond it."""
     if isinstance(solid, Capsule) and solid.half_length == 0.0:
         return SphereCover(np.array([[0.0, 0.0, 0.0, solid.radius]]), 0.0)
@@ -166,7 +166,7 @@ def _chosen(cells: Array, candidates: Array, least: float) -> Array:
     return motion.cover(cells, candidates, least)
 
 
-def cells_of(solid: Solid, pitch: float) -> Array:
+def cells_of(solid: ConvexSolid, pitch: float) -> Array:
     """(m, 4) balls that together hold the solid: cells of at most `pitch` [m] at the surface, larger ones deep inside.
 
     A cell whose centre lies outside is held by the ball around the solid's nearest point: projection on a convex
@@ -188,7 +188,7 @@ def cells_of(solid: Solid, pitch: float) -> Array:
     return with_radii(np.vstack(points), np.concatenate(radii))
 
 
-def medial(solid: Solid, pitch: float) -> Array:
+def medial(solid: ConvexSolid, pitch: float) -> Array:
     """Points (k, 3) [m] of a lattice, at most `pitch` [m] apart along each axis, at the solid's medial axis.
 
     Any sphere of the same bulge is in one around them: away from the nearest point of the surface the depth grows by as

@@ -179,13 +179,13 @@ def _motions(information: Any, validity: ValidityChecker, scale: Array) -> Any:
 def _motions_class() -> type[Any]:
     from ompl import base  # slow to load
 
-    class Motions(base.MotionValidator):  # type: ignore[misc]
+    class OmplMotionValidator(base.MotionValidator):  # type: ignore[misc]
         is_line_free: Callable[[Any, Any], bool]
 
         def checkMotion(self, first: Any, second: Any, *_last_valid: Any) -> bool:  # noqa: N802
             return self.is_line_free(first, second)
 
-    return Motions
+    return OmplMotionValidator
 
 
 def _after(count: int, is_over: Callable[[], bool]) -> Callable[[], bool]:

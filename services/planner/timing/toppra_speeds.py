@@ -119,7 +119,7 @@ def _classes() -> _Classes:
     from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
     from toppra.interpolator import AbstractGeometricPath
 
-    class Path(AbstractGeometricPath):  # type: ignore[misc]
+    class UnitPath(AbstractGeometricPath):  # type: ignore[misc]
         """Of length 1, known at the grid alone."""
 
         def __init__(self, grid: Array, first: Array, second: Array) -> None:
@@ -166,4 +166,4 @@ def _classes() -> _Classes:
             *linear, x, u = canlinear_colloc_to_interpolate(a, b, 0.0 * a, sides, most, x, None, grid, identical=True)
             return (*linear, u, x)
 
-    return _Classes(Path, Tool)
+    return _Classes(UnitPath, Tool)

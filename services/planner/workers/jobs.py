@@ -29,7 +29,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     age: float = 0.0  # [s] of `present`
 
 
-class Cancel(msgspec.Struct, frozen=True, tag=True):
+class CancelPlan(msgspec.Struct, frozen=True, tag=True):
     """The plan at hand is wanted no more; whatever answer it has by now will do."""
 
 
@@ -57,7 +57,7 @@ class Planned(msgspec.Struct, frozen=True, tag=True):
     response: PlanResponse
 
 
-Order = Show | Job | Cancel | Ask
+Order = Show | Job | CancelPlan | Ask
 Report = Ready | Shown | At | Planned
 
 ORDERS: msgspec.msgpack.Decoder[Order] = msgspec.msgpack.Decoder(Order)

@@ -18,7 +18,7 @@ from services.planner.workers.jobs import (
     REPORTS,
     Ask,
     At,
-    Cancel,
+    CancelPlan,
     Job,
     Order,
     Planned,
@@ -84,7 +84,7 @@ class PlannerProcess:
     def settle(self, seconds: float) -> None:
         """After `Late`: lets the process end its job within `seconds` [s], or replaces it."""
         with suppress(TimeoutError, WorkerDied), self._replaced_where_it_fails():
-            self._send(Cancel())
+            self._send(CancelPlan())
             self._hear(Planned, seconds)
 
     def plan(self, pending_plan: PendingPlan, job: Job, seconds: float) -> PlanResponse:
@@ -99,7 +99,7 @@ class PlannerProcess:
                     Planned, seconds + importing, lambda: self._look_after(pending_plan), pending_plan.at
                 )
             except Cancelled:
-                self._send(Cancel())
+                self._send(CancelPlan())
                 self._hear(Planned, STOPS_WITHIN)
                 raise
             except TimeoutError as error:

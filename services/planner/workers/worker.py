@@ -27,7 +27,7 @@ from services.planner.workers.jobs import (
     ORDERS,
     Ask,
     At,
-    Cancel,
+    CancelPlan,
     Job,
     Planned,
     Ready,
@@ -115,7 +115,7 @@ def _read(pipe: IO[bytes], jobs: SimpleQueue[AtHand | Show], answers: Answers) -
                 case Job() as job:
                     at_hand = AtHand(job)
                     jobs.put(at_hand)
-                case Cancel() if at_hand is not None:
+                case CancelPlan() if at_hand is not None:
                     at_hand.cancel.set()
                 case Ask() if at_hand is not None:
                     answers.put(At(at_hand.phase))

@@ -24,7 +24,7 @@ from schemas.topics import Action
 from services.runtime.actions import keys as keys
 from services.runtime.actions.goal_registry import GoalRecord, GoalRegistry
 from services.runtime.client_watch import ClientWatch
-from services.runtime.errors import Refused
+from services.runtime.errors import RequestRefused
 from services.runtime.requests.server import Pending, RequestServer
 from services.runtime.topics import Publisher, Warn
 
@@ -149,11 +149,11 @@ class ActionServer(Generic[G, F, R]):
 
     def _decide(self, request: GoalRequest, session: str) -> GoalResponse:
         if not request.goal_id:
-            raise Refused(f"{self.action.key}: a goal needs an id", "bad request")
+            raise RequestRefused(f"{self.action.key}: a goal needs an id", "bad request")
         try:
             wanted = decode(self.action.goal, bytes(request.goal))
         except BadMessage as error:
-            raise Refused(f"{self.action.key}: {error}", "bad request") from error
+            raise RequestRefused(f"{self.action.key}: {error}", "bad request") from error
         if self._cancelled_early.pop(request.goal_id, None) is not None:
             reason = "it was cancelled before it was looked at"
             return self._goals.refuse(request.goal_id, GoalResponse(reason=reason, stamp=time.time_ns()))

@@ -10,7 +10,7 @@ from schemas.system import Failure
 from schemas.topics import Request
 from services.runtime.bus.interface import UNREAD, Arrival, Bus, BusReply
 from services.runtime.bus.wire import from_arrival, schema_of, to_payload
-from services.runtime.errors import NoAnswer, Refused
+from services.runtime.errors import NoAnswer, RequestRefused
 from services.runtime.loop.task_queue import Task
 from services.runtime.requests.limits import DEBT, OF_A_CLIENT
 
@@ -44,7 +44,7 @@ class PendingCall(Generic[Q, R]):
         return not self._answers.empty()
 
     def response(self) -> R:
-        """Blocks up to the time-out; raises `Refused` or `NoAnswer`."""
+        """Blocks up to the time-out; raises `RequestRefused` or `NoAnswer`."""
         try:
             answer = self._answers.get(timeout=self._timeout + 1.0)
         except Empty:
@@ -61,12 +61,12 @@ class PendingCall(Generic[Q, R]):
 
 
 def call(bus: Bus, request: Request[Q, R], question: Q, timeout: float, number: int = 0) -> R:
-    """The answer; blocks up to `timeout` [s]. Raises `Refused` or `NoAnswer`; `number` as that of `Bus.ask`."""
+    """The answer; blocks up to `timeout` [s]. Raises `RequestRefused` or `NoAnswer`; `number` as that of `Bus.ask`."""
     return PendingCall(bus, request, question, timeout, lambda: None, number).response()
 
 
 def response_in(request: Request[Q, R], answer: BusReply) -> R:
-    """The response in `answer`; raises `Refused` for a failure, `NoAnswer` where it cannot be read."""
+    """The response in `answer`; raises `RequestRefused` for a failure, `NoAnswer` where it cannot be read."""
     try:
         arrival = Arrival(request.key, answer.schema, answer.payload)
         if answer.ok:
@@ -74,7 +74,7 @@ def response_in(request: Request[Q, R], answer: BusReply) -> R:
         failure = from_arrival(Failure, arrival)
     except BadMessage as error:
         raise NoAnswer(f"the answer of {request.server} to {request.key} cannot be read: {error}") from error
-    raise Refused(failure.message, failure.kind)
+    raise RequestRefused(failure.message, failure.kind)
 
 
 def _silent(bus: Bus, request: Request[Q, R], timeout: float) -> str:

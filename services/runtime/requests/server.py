@@ -17,7 +17,7 @@ from schemas.system import Exchange, Failure, TopicStatistics
 from schemas.topics import Request
 from services.runtime.bus.interface import Arrival, Bus, Query
 from services.runtime.bus.wire import from_arrival, schema_of, to_payload
-from services.runtime.errors import Refused
+from services.runtime.errors import RequestRefused
 from services.runtime.loop.task_queue import Task
 from services.runtime.requests.limits import OF_A_CLIENT, RequestRates, WaitingRequests
 from services.runtime.requests.overtaken import OvertakenRequests
@@ -247,7 +247,7 @@ class RequestServer(Generic[Q, R]):
     def _handle(self, question: Q, pending: Pending[R]) -> None:
         try:
             self._handler(question, pending)
-        except Refused as error:
+        except RequestRefused as error:
             pending.refuse(error.kind, str(error))
         except Exception as error:
             self._warn(f"{self.request.key}: {traceback.format_exc()}")

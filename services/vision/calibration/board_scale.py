@@ -8,8 +8,8 @@ import numpy as np
 
 from services.vision.calibration.reprojection import (
     ARM_SIGMA,
-    Problem,
-    State,
+    CalibrationState,
+    Reprojection,
     point_slopes,
     prior_slopes,
     residuals,
@@ -23,7 +23,7 @@ LEAST_OFF = 0.01  # a share that a board may be larger or smaller than said
 SURE = 4.0  # standard deviations
 
 
-def wrong_scale(problem: Problem, state: State) -> str:
+def wrong_scale(problem: Reprojection, state: CalibrationState) -> str:
     """A sentence where the board is surely larger or smaller than is said; empty where it is not."""
     scale, sigma = fitted_scale(problem, state)
     if abs(scale - 1.0) < max(LEAST_OFF, SURE * sigma):
@@ -36,7 +36,7 @@ def wrong_scale(problem: Problem, state: State) -> str:
     )
 
 
-def fitted_scale(problem: Problem, state: State) -> tuple[float, float]:
+def fitted_scale(problem: Reprojection, state: CalibrationState) -> tuple[float, float]:
     """The board's size as a share of what its points say, and the standard deviation of that; by Gauss and Newton, all
     else left free."""
     scale, sigma = 1.0, np.inf
@@ -54,7 +54,7 @@ def fitted_scale(problem: Problem, state: State) -> tuple[float, float]:
     return scale, sigma
 
 
-def _left_by_scale(problem: Problem, state: State) -> Array:
+def _left_by_scale(problem: Reprojection, state: CalibrationState) -> Array:
     """Of the residuals by the scale's logarithm, without what a change of the other unknowns explains: the normal
     equations of camera and board, with the arm's error of each view eliminated."""
     count = len(problem.views)

@@ -7,9 +7,9 @@ import numpy as np
 from services.vision.calibration.reprojection import (
     ARM_SIGMA,
     KNOWN,
+    CalibrationState,
     Carrier,
-    Problem,
-    State,
+    Reprojection,
     prior_slopes,
     view_slopes,
 )
@@ -21,7 +21,7 @@ LARGEST_SIGMA = 0.01  # [m] of a direction that counts as determined
 LEAST_SHARE = 0.25  # of a direction that cannot be determined, for a name to be part of it
 
 
-def information(problem: Problem, state: State, index: int) -> Array:
+def information(problem: Reprojection, state: CalibrationState, index: int) -> Array:
     """(12, 12) [1/m^2] what one view tells of camera and board, turns at `LENGTH`, whatever the arm's error in it is
     (the Schur complement of that error)."""
     known, arm = view_slopes(problem, state, index)
@@ -31,13 +31,13 @@ def information(problem: Problem, state: State, index: int) -> Array:
     return np.asarray(known.T @ known - between @ np.linalg.solve(own, between.T))
 
 
-def prior_information(problem: Problem) -> Array:
+def prior_information(problem: Reprojection) -> Array:
     """(12, 12) [1/m^2] the same of what is known without any image."""
     slopes = prior_slopes(problem) * SCALE
     return np.asarray(slopes.T @ slopes)
 
 
-def determined(problem: Problem, state: State) -> tuple[float, tuple[str, ...]]:
+def determined(problem: Reprojection, state: CalibrationState) -> tuple[float, tuple[str, ...]]:
     """[m] of the least determined direction of camera and board, and a sentence for each that is not determined."""
     views = [information(problem, state, index) for index in range(len(problem.views))]
     strengths, directions = np.linalg.eigh(np.sum(views, axis=0) + prior_information(problem))

@@ -15,10 +15,10 @@ import numpy as np
 from services.vision.calibration.board_scale import wrong_scale
 from services.vision.calibration.determined import determined
 from services.vision.calibration.reprojection import (
+    BoardView,
+    CalibrationState,
     Carrier,
-    Problem,
-    State,
-    View,
+    Reprojection,
     cost_of,
     errors_of,
     exact_arm,
@@ -59,7 +59,9 @@ class MountFit:
         return not self.faults
 
 
-def fit_mount(views: Sequence[View], model: CameraModel, carrier: Carrier, height: float | None = None) -> MountFit:
+def fit_mount(
+    views: Sequence[BoardView], model: CameraModel, carrier: Carrier, height: float | None = None
+) -> MountFit:
     """The camera's place from `views`; ValueError where they are too few to try. `height` [m] is the board's along z of
     what carries it, which an arm that cannot tilt needs."""
     if len(views) < FEWEST_POSES:
@@ -76,13 +78,13 @@ def fit_mount(views: Sequence[View], model: CameraModel, carrier: Carrier, heigh
     )  # fmt: skip
 
 
-def _best(problem: Problem) -> State:
+def _best(problem: Reprojection) -> CalibrationState:
     """The solution of least cost from the starts that come to anything."""
     states = [solve(problem, start, 25) for start in _starts(problem)]
     return solve(problem, min(states, key=lambda state: cost_of(problem, state)))
 
 
-def _starts(problem: Problem) -> list[State]:
+def _starts(problem: Reprojection) -> list[CalibrationState]:
     """Starts for X and Y: closed forms, those that are rigid transforms, and the registration of the board's places."""
     boards = [_board_in_camera(problem, index) for index in range(len(problem.views))]
     motions = [problem.motion(index) for index in range(len(problem.views))]
@@ -94,7 +96,7 @@ def _starts(problem: Problem) -> list[State]:
     return [exact_arm(camera, board, len(boards)) for camera, board in found]
 
 
-def _board_in_camera(problem: Problem, index: int) -> Array:
+def _board_in_camera(problem: Reprojection, index: int) -> Array:
     """camera_from_board of one view alone."""
     points, ideal = problem.views[index].sighting.points, problem.ideal[index]
     solved = cv2.solvePnPGeneric(points, ideal, problem.model.matrix, None, flags=cv2.SOLVEPNP_IPPE)
@@ -129,7 +131,7 @@ def _registered(boards: Sequence[Array], motions: Sequence[Array], height: float
     return camera, inverse(motions[0]) @ camera @ boards[0]
 
 
-def _agreeing(problem: Problem, state: State) -> tuple[State, list[int], Array]:
+def _agreeing(problem: Reprojection, state: CalibrationState) -> tuple[CalibrationState, list[int], Array]:
     """The solution of the views that agree, which they are, and the errors [m] of all views by it: the worst view is
     left out as long as the others put the board far from where it sees it."""
     count = len(problem.views)
@@ -147,7 +149,7 @@ def _agreeing(problem: Problem, state: State) -> tuple[State, list[int], Array]:
     return state, chosen, errors
 
 
-def _held_out(problem: Problem, state: State) -> float:
+def _held_out(problem: Reprojection, state: CalibrationState) -> float:
     """[m] median over the views of the error at the board with what the other views give."""
     found: list[float] = []
     count = len(problem.views)

@@ -16,7 +16,7 @@ import numpy as np
 from services.vision.boards import Sighting
 from services.vision.calibration.determined import determined, information, prior_information
 from services.vision.calibration.link_pose import LinkAt
-from services.vision.calibration.reprojection import Carrier, Problem, View, exact_arm, problem_of
+from services.vision.calibration.reprojection import BoardView, Carrier, Reprojection, exact_arm, problem_of
 from services.vision.calibration.touches import board_in_camera
 from services.vision.camera_model import CameraModel
 from services.vision.rigid import Array, apply, inverse, rigid, turn, turn_vector
@@ -81,14 +81,14 @@ class Belief:
         return float(np.linalg.norm(self.points[1] - self.points[0]))
 
     @property
-    def problem(self) -> Problem:
+    def problem(self) -> Reprojection:
         """What `fit_mount` would have, before any view."""
-        return Problem((), self.model, self.carrier, self.height)
+        return Reprojection((), self.model, self.carrier, self.height)
 
-    def view(self, base_from_link: Array) -> View:
+    def view(self, base_from_link: Array) -> BoardView:
         """What the camera would see from base_from_link (4, 4)."""
         pixels = self.model.project(apply(self.camera_from_board(base_from_link), self.points))
-        return View(base_from_link, Sighting(self.points, pixels, SIGMA))
+        return BoardView(base_from_link, Sighting(self.points, pixels, SIGMA))
 
 
 @dataclass(frozen=True)
@@ -149,9 +149,9 @@ def _result(belief: Belief, link_at: LinkAt, start: Array, joints: Sequence[Arra
     return Chosen(tuple(joints), tuple(belief.camera_from_board(link) for link in links[1:]), undetermined)
 
 
-def _told(belief: Belief, view: View) -> Array:
+def _told(belief: Belief, view: BoardView) -> Array:
     """(12, 12) what one view would tell."""
-    problem = Problem((view,), belief.model, belief.carrier)
+    problem = Reprojection((view,), belief.model, belief.carrier)
     return information(problem, exact_arm(belief.camera, belief.board, 1), 0)
 
 

@@ -34,7 +34,7 @@ class Carrier(Enum):
 
 
 @dataclass(frozen=True)
-class View:
+class BoardView:
     """A board in an image while the arm stands in one pose."""
 
     base_from_link: Array  # (4, 4) of the link that carries the board or the camera
@@ -42,10 +42,10 @@ class View:
 
 
 @dataclass(frozen=True)
-class Problem:
+class Reprojection:
     """All that is measured."""
 
-    views: tuple[View, ...]
+    views: tuple[BoardView, ...]
     model: CameraModel
     carrier: Carrier
     height: float | None = None  # [m] of the board along z of what carries it, where that was measured
@@ -56,49 +56,51 @@ class Problem:
         pose = self.views[index].base_from_link
         return pose if self.carrier is Carrier.BOARD else inverse(pose)
 
-    def part(self, chosen: Sequence[int]) -> Problem:
+    def part(self, chosen: Sequence[int]) -> Reprojection:
         """Of some of the views."""
         views = tuple(self.views[index] for index in chosen)
         return replace(self, views=views, ideal=tuple(self.ideal[index] for index in chosen))
 
 
 @dataclass(frozen=True)
-class State:
+class CalibrationState:
     """What is looked for: X, Y and the arm's error in each view."""
 
     camera: Array  # (4, 4) X
     board: Array  # (4, 4) Y
     arm: tuple[Array, ...]  # (4, 4) N of each view
 
-    def part(self, chosen: Sequence[int]) -> State:
+    def part(self, chosen: Sequence[int]) -> CalibrationState:
         """Of some of the views."""
-        return State(self.camera, self.board, tuple(self.arm[index] for index in chosen))
+        return CalibrationState(self.camera, self.board, tuple(self.arm[index] for index in chosen))
 
 
-def problem_of(views: Sequence[View], model: CameraModel, carrier: Carrier, height: float | None = None) -> Problem:
+def problem_of(
+    views: Sequence[BoardView], model: CameraModel, carrier: Carrier, height: float | None = None
+) -> Reprojection:
     """The problem of these views, with the `height` [m] of the board where it is known."""
     ideal = tuple(model.ideal(view.sighting.pixels) for view in views)
-    return Problem(tuple(views), model, carrier, height, ideal)
+    return Reprojection(tuple(views), model, carrier, height, ideal)
 
 
-def exact_arm(camera: Array, board: Array, count: int) -> State:
+def exact_arm(camera: Array, board: Array, count: int) -> CalibrationState:
     """Of an arm that is where its joints say, in `count` views; camera and board (4, 4)."""
-    return State(camera, board, (np.eye(4),) * count)
+    return CalibrationState(camera, board, (np.eye(4),) * count)
 
 
-def placed(problem: Problem, state: State, index: int) -> Array:
+def placed(problem: Reprojection, state: CalibrationState, index: int) -> Array:
     """The board's points (n, 3) of a view in the camera's frame."""
     chain = inverse(state.camera) @ problem.motion(index) @ state.arm[index] @ state.board
     return apply(chain, problem.views[index].sighting.points)
 
 
-def reprojected(problem: Problem, state: State, index: int) -> tuple[Array, Array]:
+def reprojected(problem: Reprojection, state: CalibrationState, index: int) -> tuple[Array, Array]:
     """Where (n, 2) [px] the points of a view lie without distortion, and how far away (n,) [m] they are."""
     found = placed(problem, state, index)
     return found[:, :2] / found[:, 2:] * problem.model.focal + problem.model.centre, found[:, 2]
 
 
-def residuals(problem: Problem, state: State) -> Array:
+def residuals(problem: Reprojection, state: CalibrationState) -> Array:
     """(2 n views + 6 views + 3 or 4,) all that is off, each in its own standard deviations, so dimensionless: pixels,
     the arm's errors, the board's place."""
     parts = []
@@ -119,7 +121,7 @@ def _small(pose: Array) -> Array:
     return np.concatenate((cross / 2.0, pose[:3, 3]))
 
 
-def cost_of(problem: Problem, state: State) -> float:
+def cost_of(problem: Reprojection, state: CalibrationState) -> float:
     """Half the sum of the squared `residuals`, dimensionless, large ones counted less (Huber)."""
     off = np.abs(residuals(problem, state))
     cost = float(np.sum(np.where(off < TOGETHER, off**2 / 2.0, TOGETHER * (off - TOGETHER / 2.0))))
@@ -127,7 +129,7 @@ def cost_of(problem: Problem, state: State) -> float:
     return cost if in_front else cost + 1e12
 
 
-def point_slopes(problem: Problem, state: State, index: int) -> tuple[Array, Array]:
+def point_slopes(problem: Reprojection, state: CalibrationState, index: int) -> tuple[Array, Array]:
     """Of the residuals (2 n,) of one view, by how its points (n, 2, 3) move in the camera's frame, and that frame's
     turn (3, 3) from the frame in which the arm is off."""
     found = placed(problem, state, index)
@@ -139,7 +141,7 @@ def point_slopes(problem: Problem, state: State, index: int) -> tuple[Array, Arr
     return by_point, state.camera[:3, :3].T @ problem.motion(index)[:3, :3]
 
 
-def view_slopes(problem: Problem, state: State, index: int) -> tuple[Array, Array]:
+def view_slopes(problem: Reprojection, state: CalibrationState, index: int) -> tuple[Array, Array]:
     """Of the residuals (2 n,) of one view, by the unknowns: (2 n, 12) the camera's turn and step in its parent and the
     board's in its carrier, (2 n, 6) the arm's in this view."""
     by_point, through = point_slopes(problem, state, index)
@@ -154,7 +156,7 @@ def view_slopes(problem: Problem, state: State, index: int) -> tuple[Array, Arra
     return known.reshape(-1, KNOWN), by_error.reshape(-1, 6)
 
 
-def jacobian(problem: Problem, state: State) -> Array:
+def jacobian(problem: Reprojection, state: CalibrationState) -> Array:
     """(residuals, 12 + 6 views) of `residuals` by the unknowns of `view_slopes`, the arm's errors view by view."""
     count = len(problem.views)
     rows = []
@@ -170,7 +172,7 @@ def jacobian(problem: Problem, state: State) -> Array:
     return np.vstack((*rows, prior, np.hstack((priors, np.zeros((len(priors), 6 * count))))))
 
 
-def prior_slopes(problem: Problem) -> Array:
+def prior_slopes(problem: Reprojection) -> Array:
     """(k, 12), k = 3 or 4, of what is known of the board's place without any image, by the unknowns."""
     rows = np.zeros((3 if problem.height is None else 4, KNOWN))
     rows[:3, 9:12] = np.eye(3) / FAR
@@ -190,7 +192,7 @@ def _by_motion(points: Array) -> Array:
     return found
 
 
-def solve(problem: Problem, state: State, rounds: int = ROUNDS) -> State:
+def solve(problem: Reprojection, state: CalibrationState, rounds: int = ROUNDS) -> CalibrationState:
     """Levenberg and Marquardt with Huber's weights from `state`."""
     damping, cost = 1e-4, cost_of(problem, state)
     for _ in range(rounds):
@@ -213,12 +215,12 @@ def solve(problem: Problem, state: State, rounds: int = ROUNDS) -> State:
     return state
 
 
-def _stepped(state: State, change: Array) -> State:
+def _stepped(state: CalibrationState, change: Array) -> CalibrationState:
     arm = tuple(moved(pose, change[KNOWN + 6 * i : KNOWN + 6 + 6 * i]) for i, pose in enumerate(state.arm))
-    return State(moved(state.camera, change[:6]), moved(state.board, change[6:KNOWN]), arm)
+    return CalibrationState(moved(state.camera, change[:6]), moved(state.board, change[6:KNOWN]), arm)
 
 
-def errors_of(problem: Problem, camera: Array, board: Array) -> Array:
+def errors_of(problem: Reprojection, camera: Array, board: Array) -> Array:
     """(views,) [m] at the board, each view as the arm's joints say: the median of its points across the line of sight;
     `camera` and `board` (4, 4)."""
     exact = exact_arm(camera, board, len(problem.views))

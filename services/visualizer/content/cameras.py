@@ -11,7 +11,7 @@ from schemas.camera import CameraImage, CameraInfo
 from schemas.detections import Detection, Detections
 from services.visualizer.content import entities
 from services.visualizer.content.event_log import clamp_stamp
-from services.visualizer.content.updates import Frustum, Labels, Outlines, Picture, Update
+from services.visualizer.content.updates import Frustum, Labels, Outlines, PictureUpdate, Update
 from services.visualizer.model.visual_model import VisualModel
 
 PICTURE_PERIOD = 200_000_000  # [ns] between two images of a camera in the view
@@ -19,7 +19,7 @@ FARTHEST = 1e6  # [m] or [px]: no thing is there, and beyond float32 the view's 
 
 
 @dataclass
-class _Camera:
+class _ShownCamera:
     """What is known of one camera, and what of it has not been shown yet."""
 
     info: CameraInfo | None = None
@@ -34,7 +34,7 @@ class CameraView:
 
     def __init__(self, model: VisualModel) -> None:
         self._model = model
-        self._cameras: dict[str, _Camera] = {}
+        self._cameras: dict[str, _ShownCamera] = {}
 
     def on_info(self, message: CameraInfo) -> None:
         """The lens and the pose of a camera."""
@@ -73,14 +73,14 @@ class CameraView:
                     camera.is_new &= {"image", "found"}
                     continue
                 camera.shown_at = now
-                updates.append(Picture(entities.camera_picture(name), now, camera.image.data))
+                updates.append(PictureUpdate(entities.camera_picture(name), now, camera.image.data))
             if camera.found is not None and "found" in camera.is_new:
                 updates += self._found(name, camera.found, now)
             camera.is_new = set()
         return updates
 
-    def _camera(self, name: str) -> _Camera:
-        return self._cameras.setdefault(name, _Camera())
+    def _camera(self, name: str) -> _ShownCamera:
+        return self._cameras.setdefault(name, _ShownCamera())
 
     def _has_place(self, info: CameraInfo) -> bool:
         pose = info.parent_from_camera

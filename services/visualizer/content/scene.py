@@ -22,11 +22,11 @@ from services.visualizer.content import entities, palette
 from services.visualizer.content.arm_poses import arm_pose_at
 from services.visualizer.content.event_log import clamp_stamp
 from services.visualizer.content.updates import ClearEntity, Labels, SolidMesh, TranslucentArm, Update
-from services.visualizer.model.triangle_meshes import TriangleMesh, primitive_mesh
+from services.visualizer.model.triangle_meshes import ShadedMesh, primitive_mesh
 from services.visualizer.model.visual_model import VisualModel, VisualShape
 
 PLANE = VisualShape("box", (2.0, 2.0, 0.004))  # [m] as much of a plane as is drawn
-MeshLoader = Callable[[MeshShape], TriangleMesh | None]
+MeshLoader = Callable[[MeshShape], ShadedMesh | None]
 
 
 def load_no_mesh(shape: MeshShape) -> None:
@@ -50,7 +50,7 @@ class SceneView:
         self._scene, self._contacts = PlanningScene(), Contacts()
         self._jaws: tuple[SceneObject, ...] = ()
         self._drawn: dict[str, DrawnObject] = {}
-        self._meshes: dict[MeshShape, TriangleMesh | None] = {}
+        self._meshes: dict[MeshShape, ShadedMesh | None] = {}
         self._is_new = False
 
     def on_scene(self, message: PlanningScene) -> None:
@@ -150,7 +150,7 @@ class SceneView:
         points = np.array([contact.point for contact in placed], dtype=float)
         return [Labels(entities.CONTACTS, now, points, ("\n".join(lines), *("" for _ in lines[1:])))]
 
-    def _mesh(self, item: SceneObject) -> TriangleMesh | None:
+    def _mesh(self, item: SceneObject) -> ShadedMesh | None:
         match item.shape:
             case BoxShape(size=size) if len(size) == 3:
                 return primitive_mesh(VisualShape("box", size), item.padding)
@@ -164,7 +164,7 @@ class SceneView:
                 return self._loaded(item.shape)
         return None
 
-    def _loaded(self, shape: MeshShape) -> TriangleMesh | None:
+    def _loaded(self, shape: MeshShape) -> ShadedMesh | None:
         """Each file is read once."""
         if shape not in self._meshes:
             self._meshes[shape] = self._load(shape)
@@ -176,7 +176,7 @@ def _gap(distance: float) -> str:
     return f"{1000.0 * distance:.1f} mm apart" if distance > 0.0 else f"{-1000.0 * distance:z.1f} mm inside one another"
 
 
-def _below(mesh: TriangleMesh, padding: float) -> TriangleMesh:
+def _below(mesh: ShadedMesh, padding: float) -> ShadedMesh:
     """Its upper face at z = `padding` [m]."""
     down: Vector = (0.0, 0.0, padding - float(mesh.vertices[:, 2].max()))
-    return TriangleMesh(mesh.vertices + down, mesh.normals, mesh.triangles)
+    return ShadedMesh(mesh.vertices + down, mesh.normals, mesh.triangles)

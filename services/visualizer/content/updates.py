@@ -11,7 +11,7 @@ import numpy.typing as npt
 from schemas.message import Vector
 from services.visualizer.content.palette import Rgba
 from services.visualizer.model.rotations import Array
-from services.visualizer.model.triangle_meshes import TriangleMesh
+from services.visualizer.model.triangle_meshes import ShadedMesh
 
 Times = npt.NDArray[np.int64]
 
@@ -45,7 +45,7 @@ class LineStrip:
 
 
 @dataclass(frozen=True)
-class Panel:
+class TextPanel:
     """A text in Markdown that replaces the previous one."""
 
     entity: str
@@ -64,7 +64,7 @@ class LogLines:
 
 
 @dataclass(frozen=True)
-class State:
+class StateUpdate:
     """A named state that lasts until the next."""
 
     entity: str
@@ -87,7 +87,7 @@ class SolidMesh:
 
     entity: str
     time: int
-    mesh: TriangleMesh
+    mesh: ShadedMesh
     translation: Vector
     rotation: Vector
     color: Rgba
@@ -122,7 +122,7 @@ class TranslucentArm:
 
 
 @dataclass(frozen=True)
-class Picture:
+class PictureUpdate:
     """A JPEG that replaces the previous one."""
 
     entity: str
@@ -159,15 +159,15 @@ Update: TypeAlias = (
     Scalars
     | Poses
     | LineStrip
-    | Panel
+    | TextPanel
     | LogLines
-    | State
+    | StateUpdate
     | Tint
     | SolidMesh
     | ClearEntity
     | Labels
     | TranslucentArm
-    | Picture
+    | PictureUpdate
     | Frustum
     | Outlines
 )

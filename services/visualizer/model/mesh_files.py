@@ -9,7 +9,7 @@ import numpy as np
 
 from schemas.scene import MeshShape
 from services.arm.stl import BadStl, read_stl
-from services.visualizer.model.triangle_meshes import TriangleMesh
+from services.visualizer.model.triangle_meshes import ShadedMesh
 from services.visualizer.model.visual_model import VisualModel
 
 
@@ -26,7 +26,7 @@ def missing_meshes(model: VisualModel, folder: Path) -> list[str]:
     return sorted(name for name in names if not mesh_path(folder, name).is_file())
 
 
-def scene_mesh(shape: MeshShape, folders: Sequence[Path], warn: Callable[[str], object]) -> TriangleMesh | None:
+def scene_mesh(shape: MeshShape, folders: Sequence[Path], warn: Callable[[str], object]) -> ShadedMesh | None:
     """The object's triangles in m; None, and a word to `warn`, where they cannot be had."""
     try:
         triangles = read_stl(_content(shape, folders))
@@ -37,7 +37,7 @@ def scene_mesh(shape: MeshShape, folders: Sequence[Path], warn: Callable[[str], 
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     faces = np.arange(3 * len(corners), dtype=np.uint32).reshape(-1, 3)
-    return TriangleMesh(corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), faces)
+    return ShadedMesh(corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), faces)
 
 
 def _content(shape: MeshShape, folders: Sequence[Path]) -> bytes:

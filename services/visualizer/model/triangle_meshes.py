@@ -14,7 +14,7 @@ SEGMENTS = 40  # of a circle
 
 
 @dataclass(frozen=True)
-class TriangleMesh:
+class ShadedMesh:
     """Vertices (n, 3) in m, unit normals (n, 3), triangles (m, 3) counter-clockwise from outside."""
 
     vertices: Array
@@ -22,7 +22,7 @@ class TriangleMesh:
     triangles: npt.NDArray[np.uint32]
 
 
-def primitive_mesh(shape: VisualShape, margin: float = 0.0) -> TriangleMesh:
+def primitive_mesh(shape: VisualShape, margin: float = 0.0) -> ShadedMesh:
     """The mesh of a primitive, every surface moved out by `margin` [m]."""
     match shape.kind:
         case "box":
@@ -36,7 +36,7 @@ def primitive_mesh(shape: VisualShape, margin: float = 0.0) -> TriangleMesh:
             raise ValueError(f"a {shape.kind} is not a primitive")
 
 
-def _box(half: Array) -> TriangleMesh:
+def _box(half: Array) -> ShadedMesh:
     vertices: list[Array] = []
     normals: list[Array] = []
     triangles: list[tuple[int, int, int]] = []
@@ -49,7 +49,7 @@ def _box(half: Array) -> TriangleMesh:
             vertices += [(normal + a * u + b * v) * half for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
             normals += [normal] * 4
             triangles += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
-    return TriangleMesh(np.array(vertices), np.array(normals), np.array(triangles, dtype=np.uint32))
+    return ShadedMesh(np.array(vertices), np.array(normals), np.array(triangles, dtype=np.uint32))
 
 
 def _cylinder_profile(radius: float, half: float) -> Array:
@@ -69,7 +69,7 @@ def _sphere_profile(radius: float) -> Array:
     return np.stack([radius * across, radius * up, across, up], axis=1)
 
 
-def _revolved(profile: Array) -> TriangleMesh:
+def _revolved(profile: Array) -> ShadedMesh:
     """The profile turned about z."""
     angles = np.linspace(0.0, 2.0 * np.pi, SEGMENTS + 1)
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -81,4 +81,4 @@ def _revolved(profile: Array) -> TriangleMesh:
     ring = len(circle)
     corners = [(row * ring + k, row * ring + k + 1) for row in range(len(profile) - 1) for k in range(SEGMENTS)]
     triangles = [triangle for a, b in corners for triangle in ((a, b, b + ring), (a, b + ring, a + ring))]
-    return TriangleMesh(vertices, normals, np.array(triangles, dtype=np.uint32))
+    return ShadedMesh(vertices, normals, np.array(triangles, dtype=np.uint32))

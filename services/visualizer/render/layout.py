@@ -21,7 +21,7 @@ LEAD, FOLLOW = 5.0, 2.0  # [s] before and after a moment that are played again a
 
 
 @dataclass(frozen=True)
-class Moment:
+class OpeningMoment:
     """A time that the view of a recording opens at, and what is told of it."""
 
     stamp: int  # [ns] UNIX
@@ -41,7 +41,7 @@ class ArmLayout:
     cameras: tuple[str, ...] = ()
     robot: str = ""
 
-    def whole(self, moment: Moment | None = None) -> rrb.Container:
+    def whole(self, moment: OpeningMoment | None = None) -> rrb.Container:
         """Everything of the arm, live or around a moment."""
         scene = rrb.Vertical(
             self._scene_and_cameras(),
@@ -87,7 +87,7 @@ class ArmLayout:
         """The entity where this arm has it."""
         return entities.under(self.robot, entity)
 
-    def _beside(self, moment: Moment | None) -> rrb.Container:
+    def _beside(self, moment: OpeningMoment | None) -> rrb.Container:
         """The joints; above them what happened, where that is told."""
         if moment is None:
             return self._joints()
@@ -136,7 +136,7 @@ class ArmLayout:
         return rrb.TextDocumentView(origin=self.at(entities.PANEL), name="Device")
 
 
-def blueprint(arm: ArmLayout, moment: Moment | None = None) -> rrb.Blueprint:
+def blueprint(arm: ArmLayout, moment: OpeningMoment | None = None) -> rrb.Blueprint:
     """The layout of a view with one arm, live or around a moment."""
     return on_one_screen(arm.whole(moment), time_panel(moment))
 
@@ -149,7 +149,7 @@ def on_one_screen(content: rrb.Container, time: rrb.TimePanel) -> rrb.Blueprint:
     )  # fmt: skip
 
 
-def time_panel(moment: Moment | None = None) -> rrb.TimePanel:
+def time_panel(moment: OpeningMoment | None = None) -> rrb.TimePanel:
     """At the newest data, or around a moment."""
     if moment is None:
         return rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following")

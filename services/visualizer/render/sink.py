@@ -17,19 +17,19 @@ from services.visualizer.content.updates import (
     LineStrip,
     LogLines,
     Outlines,
-    Panel,
-    Picture,
+    PictureUpdate,
     Poses,
     Scalars,
     SolidMesh,
-    State,
+    StateUpdate,
+    TextPanel,
     Times,
     Tint,
     TranslucentArm,
     Update,
 )
 from services.visualizer.model.mesh_files import mesh_path
-from services.visualizer.model.triangle_meshes import TriangleMesh, primitive_mesh
+from services.visualizer.model.triangle_meshes import ShadedMesh, primitive_mesh
 from services.visualizer.model.visual_model import Visual, VisualJoint, VisualModel
 from services.visualizer.render.layout import TIMELINE
 
@@ -85,9 +85,9 @@ class Sink:
                 self._send(entity, times, columns)
             case LineStrip(entity, time, points):
                 self._send(entity, _once(time), rr.LineStrips3D.columns(strips=[points]))
-            case Panel(entity, time, markdown):
+            case TextPanel(entity, time, markdown):
                 self._send(entity, _once(time), rr.TextDocument.columns(text=[markdown], media_type=["text/markdown"]))
-            case State(entity, time, state):
+            case StateUpdate(entity, time, state):
                 self._send(entity, _once(time), rr.StateChange.columns(state=[state]))
             case Tint(root, time, mode):
                 self._tint(root, time, palette.TINTS.get(mode))
@@ -99,7 +99,7 @@ class Sink:
             case Labels(entity, time, points, texts):
                 dots = rr.Points3D(points, labels=texts, colors=[palette.LABEL], radii=[0.006], show_labels=True)
                 self._log(entity, time, dots)
-            case Picture(entity, time, jpeg):
+            case PictureUpdate(entity, time, jpeg):
                 self._log(entity, time, rr.EncodedImage(contents=jpeg, media_type="image/jpeg"))
             case Frustum():
                 self._frustum(update)
@@ -210,7 +210,7 @@ class Sink:
         self._static(entity, rr.SeriesLines(colors=colors, widths=widths, names=names))
 
 
-def _solid(mesh: TriangleMesh, color: palette.Rgba | None) -> rr.Mesh3D:
+def _solid(mesh: ShadedMesh, color: palette.Rgba | None) -> rr.Mesh3D:
     return rr.Mesh3D(
         vertex_positions=mesh.vertices, vertex_normals=mesh.normals, triangle_indices=mesh.triangles,
         albedo_factor=color,

@@ -12,7 +12,7 @@ from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm, load_arm
 from services.planner.kinematics.centring import Centring
 from services.planner.kinematics.descent import Descent
-from services.planner.kinematics.targets import Target
+from services.planner.kinematics.targets import ToolTarget
 from services.runtime.deployment import project_root
 
 ARMS = Path(__file__).parents[1] / "arms"
@@ -26,7 +26,7 @@ class Both:
     def __init__(self, arm: Arm) -> None:
         self.kinematics = Kinematics(arm)
         self.compiled, self.plain = Descent(arm, self.kinematics), Descent(arm, self.kinematics, is_plain=True)
-        assert self.compiled.knows_centring(Target(self.kinematics.tool(np.zeros(len(arm.joints))).position))
+        assert self.compiled.knows_centring(ToolTarget(self.kinematics.tool(np.zeros(len(arm.joints))).position))
         spans = np.array([(max(joint.lower, -3.0), min(joint.upper, 3.0)) for joint in arm.joints]).T
         self.rows = np.random.default_rng(1).uniform(*spans, (2 * STARTS, len(arm.joints)))
 
@@ -43,7 +43,7 @@ def both(request: pytest.FixtureRequest) -> Both:
 def test_they_end_where_those_in_python_end(both: Both, with_turn: bool):
     for wanted, start in both.pairs():
         pose = both.kinematics.tool(wanted)
-        target = Target(pose.position, pose.rotation if with_turn else None)
+        target = ToolTarget(pose.position, pose.rotation if with_turn else None)
         one, other = both.compiled.descend(target, start), both.plain.descend(target, start)
         assert one.is_solution == other.is_solution
         assert one.error == pytest.approx(other.error, abs=1e-6, rel=1e-2)
@@ -53,7 +53,7 @@ def test_they_end_where_those_in_python_end(both: Both, with_turn: bool):
 def test_what_they_call_a_solution_meets_the_target(both: Both, with_turn: bool):
     for wanted, start in both.pairs():
         pose = both.kinematics.tool(wanted)
-        target = Target(pose.position, pose.rotation if with_turn else None)
+        target = ToolTarget(pose.position, pose.rotation if with_turn else None)
         for near in (start, wanted + 0.01):
             attempt = both.compiled.descend(target, near)
             error, _ = target.error_and_jacobian(both.kinematics, attempt.positions)
@@ -69,7 +69,7 @@ def test_turns_of_every_size_are_taken_as_pinocchio_does(angle: float):
     for start, axis in zip(both.rows, axes, strict=True):
         pose = both.kinematics.tool(start)
         turn = pin.exp3(angle * axis / np.linalg.norm(axis))
-        target = Target(pose.position, turn @ pose.rotation)
+        target = ToolTarget(pose.position, turn @ pose.rotation)
         one, other = both.compiled.descend(target, start), both.plain.descend(target, start)
         assert one.is_solution == other.is_solution
         assert one.error == pytest.approx(other.error, abs=1e-6, rel=1e-2)
@@ -84,7 +84,7 @@ def test_compiled_self_motion_goes_as_far_to_the_middles_as_that_in_python_and_k
     plain = Centring(arm, both.kinematics, both.plain)
     for wanted, _ in both.pairs():
         pose = both.kinematics.tool(wanted)
-        target = Target(pose.position, pose.rotation if with_turn else None)
+        target = ToolTarget(pose.position, pose.rotation if with_turn else None)
         one, other = compiled.centred(target, wanted), plain.centred(target, wanted)
         assert (one is None) == (other is None)
         if one is None or other is None:
@@ -97,6 +97,6 @@ def test_compiled_self_motion_goes_as_far_to_the_middles_as_that_in_python_and_k
 
 def test_self_motion_towards_a_target_with_tolerances_is_left_to_python(both: Both):
     pose = both.kinematics.tool(both.rows[0])
-    assert both.compiled.knows_centring(Target(pose.position))
-    assert not both.compiled.knows_centring(Target(pose.position, position_tolerance=0.01))
-    assert not both.plain.knows_centring(Target(pose.position))
+    assert both.compiled.knows_centring(ToolTarget(pose.position))
+    assert not both.compiled.knows_centring(ToolTarget(pose.position, position_tolerance=0.01))
+    assert not both.plain.knows_centring(ToolTarget(pose.position))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
-from services.planner.collision_geometry.solids import Box, Capsule, Cylinder, Solid
+from services.planner.collision_geometry.solids import Box, Capsule, ConvexSolid, Cylinder
 from services.planner.native.sphere_cover import MOST_SPHERES, cover_of, cover_shapes, link_cover, mesh_cover
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import star_mesh
@@ -17,7 +17,7 @@ from tests.planner.native.scenes import star_mesh
 HAIR = 1e-9  # [m]
 
 
-def inside(solid: Solid, count: int, seed: int = 0) -> np.ndarray:
+def inside(solid: ConvexSolid, count: int, seed: int = 0) -> np.ndarray:
     """Points of the solid, most of them on its surface: what lies around it, brought to it."""
     rng = np.random.default_rng(seed)
     around = rng.uniform(-1.3, 1.3, (count, 3)) * solid.half

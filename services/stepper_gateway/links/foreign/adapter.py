@@ -29,7 +29,7 @@ class ForeignDevice(Protocol):
         """What the gateway is to hear."""
 
 
-class Heard(NamedTuple):
+class ForeignCall(NamedTuple):
     """Something that came over the foreign wire, as a call on the device."""
 
     handle: Callable[[float], None]
@@ -47,13 +47,13 @@ class Adapter:
 
     def __init__(self, device: ForeignDevice, write: Callable[[bytes], None], wake: Callable[[], None]) -> None:
         self._device, self._write = device, write
-        self._inbox: queue.SimpleQueue[FrameFor | Heard] = queue.SimpleQueue()
+        self._inbox: queue.SimpleQueue[FrameFor | ForeignCall] = queue.SimpleQueue()
         self._received = ReceiveQueue(wake)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="foreign-device", daemon=True)
         self._thread.start()
 
-    def put(self, item: FrameFor | Heard) -> bool:
+    def put(self, item: FrameFor | ForeignCall) -> bool:
         """False: too much waits already."""
         if self._inbox.qsize() >= FULL:
             return False
@@ -80,7 +80,7 @@ class Adapter:
             if said:
                 self._received.put(*said)
 
-    def _wait(self) -> list[FrameFor | Heard]:
+    def _wait(self) -> list[FrameFor | ForeignCall]:
         try:
             items = [self._inbox.get(timeout=PAUSE)]
         except queue.Empty:
@@ -89,10 +89,10 @@ class Adapter:
             items.append(self._inbox.get())
         return items
 
-    def _handle(self, item: FrameFor | Heard) -> None:
+    def _handle(self, item: FrameFor | ForeignCall) -> None:
         now = time.monotonic()
         match item:
             case FrameFor(kind, payload):
                 self._device.receive(kind, payload, now)
-            case Heard(handle):
+            case ForeignCall(handle):
                 handle(now)

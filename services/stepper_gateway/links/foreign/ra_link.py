@@ -17,7 +17,7 @@ from services.mqtt.client import CONNECT_TIMEOUT, MqttClient, code_of, is_failur
 from services.mqtt.failures import failure, refusal
 from services.stepper_gateway.links.connection import keep_connected
 from services.stepper_gateway.links.foreign import ra_messages
-from services.stepper_gateway.links.foreign.adapter import Adapter, FrameFor, Heard
+from services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor
 from services.stepper_gateway.links.foreign.ra_device import RaDevice
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.links.mqtt import KEEP_ALIVE
@@ -106,4 +106,4 @@ class RaLink:
 
     def _on_message(self, _client: paho.Client, _data: object, message: paho.MQTTMessage) -> None:
         topic, payload, retained = message.topic, bytes(message.payload), message.retain
-        self._adapter.put(Heard(partial(self._device.hear, topic, payload, retained)))
+        self._adapter.put(ForeignCall(partial(self._device.hear, topic, payload, retained)))

@@ -10,7 +10,7 @@ from functools import partial
 
 from services.arm.model.description import Arm
 from services.stepper_gateway.links.connection import keep_connected
-from services.stepper_gateway.links.foreign.adapter import Adapter, FrameFor, Heard
+from services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor
 from services.stepper_gateway.links.foreign.text_device import TextDevice
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.links.serial_port import Line, complaint, open_port
@@ -73,7 +73,7 @@ class TextLink:
         while self._line is line and not self._stop.is_set():
             data = line.read(max(1, line.in_waiting))
             if data:
-                self._adapter.put(Heard(partial(self.device.hear, data)))
+                self._adapter.put(ForeignCall(partial(self.device.hear, data)))
 
     def _write(self, payload: bytes) -> None:
         line = self._line
