@@ -20,7 +20,7 @@ from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, 
 from services.bench.scenes import rm1
 from services.bench.stack import Running, Stacks
 from services.bench.traffic import send_at_once
-from services.stepper_gateway.links.frames import BadFrame, State, decode
+from services.stepper_gateway.links.frames import BadFrame, StateFrame, decode
 
 LOOKUP_GOAL = FigureGoal(median=10.0)  # [us]
 SECOND = 1_000_000_000  # [ns]
@@ -127,7 +127,7 @@ def listen(running: Running, arrivals: dict[int, float]) -> Client:
             frame = decode(bytes(message.payload))
         except BadFrame:
             return
-        if isinstance(frame, State):
+        if isinstance(frame, StateFrame):
             arrivals[frame.t_us] = now
 
     client = Client(CallbackAPIVersion.VERSION2, client_id=f"bench-state-{time.time_ns()}")

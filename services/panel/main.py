@@ -21,7 +21,7 @@ from services.panel.model.readings import Readings
 from services.panel.view.arm_pages import arm_pages
 from services.panel.view.own_pages import own_pages_only
 from services.panel.view.page import Page
-from services.panel.view.world import World
+from services.panel.view.world import DrawnWorld
 from services.runtime.deployment import DeploymentError, exposure, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
@@ -46,7 +46,7 @@ class Panel:
         self.operator = Operator(arm)
         with contextlib.redirect_stdout(None), own_pages_only(deployment.panel.host):  # without its own greeting
             self._server = viser.ViserServer(deployment.panel.host, deployment.panel.port, verbose=False)
-        self._world = World(self._server, self.operator)
+        self._world = DrawnWorld(self._server, self.operator)
         self._server.on_client_connect(self._open)
         self._server.on_client_disconnect(self._close)
         log.info(f"page: http://{deployment.panel.host}:{deployment.panel.port}")

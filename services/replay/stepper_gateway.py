@@ -27,7 +27,7 @@ from services.recordings.table import action_topics, recorded_topics
 from services.replay.comparison import ABSENT, Comparison
 from services.replay.recorded import AGAIN, Heard, NotReplayable, Recorded
 from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import Began, Given, Input, Reply, digest_of, give, unpacked
+from services.stepper_gateway.inputs import BeganInput, Given, Input, Reply, digest_of, give, unpacked
 from services.stepper_gateway.outputs import GoalFinished, GripperFinished, Output, Publish, SendFrame
 
 SAID = tuple(
@@ -106,10 +106,10 @@ class GatewayAgain:
     def give(self, at: float, given: Given) -> None:
         """One input, `at` [s]."""
         self._count, self._last = self._count + 1, given.unix
-        if isinstance(given.input, Began):
+        if isinstance(given.input, BeganInput):
             self._begin(given.unix, given.input)
             return
-        assert self._core is not None  # the first message begins with `Began`
+        assert self._core is not None  # the first message begins with `BeganInput`
         try:
             reply, outputs = give(self._core, given.input, given.moment)
         except Exception as error:
@@ -148,14 +148,14 @@ class GatewayAgain:
         for said in self._said.values():
             said.end(self._last)
 
-    def _begin(self, unix: int, began: Began) -> None:
+    def _begin(self, unix: int, began: BeganInput) -> None:
         self._core = GatewayCore(self._arm, began.session, began.parameters, began.kept)
         for said in self._said.values():
             said.begin(unix)
 
     def _differ(self, at: float, given: Input, digest: int, now: str) -> None:
         was = f"others (BLAKE2 {digest:016x})" if digest else ABSENT
-        path = f"outputs of {type(given).__name__}"
+        path = f"outputs of {given.__struct_config__.tag}"
         self._comparison.differ(OTHERS, self._count - 1, at, path, was, now)
 
     def _unpacked(self, heard: Heard[GatewayInputs]) -> list[Given]:

@@ -12,7 +12,7 @@ from services.stepper_gateway.device.sensors import SensorRelay
 from services.stepper_gateway.goals.goal_executor import GoalExecutor
 from services.stepper_gateway.gripper.gripper_executor import GripperExecutor
 from services.stepper_gateway.ledger.record import LedgerRecord
-from services.stepper_gateway.ledger.step_ledger import Ledger
+from services.stepper_gateway.ledger.step_ledger import LedgerKeeper
 from services.stepper_gateway.ledger.stopping_watch import StoppingWatch
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.motion_controller import MotionController
@@ -32,7 +32,7 @@ class Components:
         self.controller = MotionController(self.device, session_id)
         self.goals = GoalExecutor(self.device, self.controller)
         self.streaming = TargetFollower(self.device, self.controller)
-        self.ledger = Ledger(self.device, kept)
+        self.ledger = LedgerKeeper(self.device, kept)
         self.stopping = StoppingWatch(self.device, self.controller)
         self.command_handler = CommandHandler(self.device, self.controller, self.ledger.on_reference)
         self.gripper = GripperExecutor(self.device, self.command_handler)

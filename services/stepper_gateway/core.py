@@ -26,20 +26,20 @@ from schemas.system import LogLevel
 from schemas.topics import DEVICE_STATUS
 from services.arm.model.description import Arm
 from services.stepper_gateway.components import Components
-from services.stepper_gateway.control.clients import Caller
+from services.stepper_gateway.control.clients import MotionCaller
 from services.stepper_gateway.control.control_handler import NOBODY
 from services.stepper_gateway.device.command_arguments import STOPS, kind_of
 from services.stepper_gateway.device.frame_handler import FrameHandler
 from services.stepper_gateway.device.gateway_device import status_of
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
 from services.stepper_gateway.ledger.record import LedgerRecord
-from services.stepper_gateway.links.frames import BadFrame, Command, Heartbeat, Sync, encode
+from services.stepper_gateway.links.frames import BadFrame, CommandFrame, Heartbeat, Sync, encode
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Answer, Output
 from services.stepper_gateway.parameters import GatewayParameters
 
-REGULAR = {Heartbeat: Kind.HB, Sync: Kind.SYNC, Command: Kind.CMD}  # what the session sends by itself
+REGULAR = {Heartbeat: Kind.HB, Sync: Kind.SYNC, CommandFrame: Kind.CMD}  # what the session sends by itself
 BAD_FRAME_REPORT = 1.0  # [s] between two; chosen: a flood of bad frames must not flood the log
 PAUSES = (  # commands that leave goals and targets as they are
     DeviceCommandKind.HOLD,
@@ -100,7 +100,7 @@ class GatewayCore:
         return self._finish(moment)
 
     def on_goal(
-        self, goal_id: str, goal: FollowJointTrajectoryGoal, moment: Moment, caller: Caller = NOBODY
+        self, goal_id: str, goal: FollowJointTrajectoryGoal, moment: Moment, caller: MotionCaller = NOBODY
     ) -> tuple[GoalVerdict, list[Output]]:
         """A goal, to be accepted or refused at once."""
         control = self._components.control
@@ -117,7 +117,7 @@ class GatewayCore:
         return reason, self._finish(moment)
 
     def on_grip(
-        self, goal_id: str, goal: GripperCommandGoal, moment: Moment, caller: Caller = NOBODY
+        self, goal_id: str, goal: GripperCommandGoal, moment: Moment, caller: MotionCaller = NOBODY
     ) -> tuple[GoalVerdict, list[Output]]:
         """A goal of the gripper, to be accepted or refused at once."""
         control = self._components.control
@@ -141,14 +141,14 @@ class GatewayCore:
         """How many scenes had a version that no planner gives."""
         return self._components.goals.scenes.dropped
 
-    def on_targets(self, targets: JointTargets, moment: Moment, caller: Caller = NOBODY) -> list[Output]:
+    def on_targets(self, targets: JointTargets, moment: Moment, caller: MotionCaller = NOBODY) -> list[Output]:
         """A streamed target; one that is refused for control's sake neither keeps nor ends the holder's stream."""
         if self._components.control.permits_targets(caller, moment):
             self._components.streaming.on_targets(targets, self._components.goals.is_active, moment)
         return self._finish(moment)
 
     def on_command(
-        self, request: DeviceCommandRequest, ticket: int, moment: Moment, caller: Caller = NOBODY
+        self, request: DeviceCommandRequest, ticket: int, moment: Moment, caller: MotionCaller = NOBODY
     ) -> list[Output]:
         """A person's command; its answer comes as an `Answer` with this ticket."""
         if not self._components.control.permits_command(caller, ticket, moment):
@@ -168,7 +168,7 @@ class GatewayCore:
         self._components.command_handler.send_due(moment)
         return self._finish(moment)
 
-    def on_configure(self, ticket: int, moment: Moment, caller: Caller = NOBODY) -> list[Output]:
+    def on_configure(self, ticket: int, moment: Moment, caller: MotionCaller = NOBODY) -> list[Output]:
         """A person wants the device configured; the answer comes as an `Answer` with this ticket."""
         if objection := self._components.control.objection(caller, moment):
             self._components.out.put(Answer(ticket, ConfigureResponse(accepted=False, reason=objection)))

@@ -13,7 +13,7 @@ import msgspec
 
 from schemas.device import GatewayInputs
 from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import Began, Given, Input, Reply, digest_of, give, packed
+from services.stepper_gateway.inputs import BeganInput, Given, Input, Reply, digest_of, give, packed
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Output
 
@@ -26,7 +26,7 @@ class InputLog:
     """Gives inputs to the core, and keeps them until they are published."""
 
     def __init__(
-        self, core: GatewayCore, began: Began, moment: Moment, publish: Callable[[GatewayInputs], object]
+        self, core: GatewayCore, began: BeganInput, moment: Moment, publish: Callable[[GatewayInputs], object]
     ) -> None:
         self._core, self._session, self._publish = core, began.session, publish
         self._encode = msgspec.msgpack.Encoder().encode

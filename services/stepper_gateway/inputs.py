@@ -17,7 +17,7 @@ from schemas.gripper import GripperCommandGoal
 from schemas.joints import JointTargets
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.scene import PlanningScene
-from services.stepper_gateway.control.clients import Caller
+from services.stepper_gateway.control.clients import MotionCaller
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
 from services.stepper_gateway.ledger.record import LedgerRecord
@@ -29,11 +29,11 @@ from services.stepper_gateway.parameters import GatewayParameters
 LARGEST = 64 * 1024 * 1024  # [B] of one message's inputs, unpacked; chosen: far beyond half a second of them
 
 
-class _Input(msgspec.Struct, frozen=True, tag=True, array_like=True):
-    """The base of every input."""
+class _Input(msgspec.Struct, frozen=True, tag=lambda name: name.removesuffix("Input"), array_like=True):
+    """The base of every input; a recording names it without "Input"."""
 
 
-class Began(_Input, frozen=True):
+class BeganInput(_Input, frozen=True):
     """The core was made; `kept` is the step ledger of the gateway before."""
 
     session: int
@@ -41,26 +41,26 @@ class Began(_Input, frozen=True):
     kept: LedgerRecord | None = None
 
 
-class Parameters(_Input, frozen=True):
+class ParametersInput(_Input, frozen=True):
     """Other parameters were set."""
 
     parameters: GatewayParameters
 
 
-class Step(_Input, frozen=True):
+class StepInput(_Input, frozen=True):
     """One turn of the control loop."""
 
     absences: dict[str, float] = {}  # [s] of liveliness tokens, by key
 
 
-class Link(_Input, frozen=True):
+class LinkInput(_Input, frozen=True):
     """How the wire is, whenever something has happened on it."""
 
     connected: bool
     reason: str
 
 
-class Frame(_Input, frozen=True):
+class FrameInput(_Input, frozen=True):
     """One payload from the device."""
 
     kind: Kind
@@ -69,64 +69,64 @@ class Frame(_Input, frozen=True):
     arrival: int  # [ns] monotonic clock
 
 
-class Goal(_Input, frozen=True):
+class GoalInput(_Input, frozen=True):
     goal_id: str
     goal: FollowJointTrajectoryGoal
     session: str = ""  # that asks, here and in the next ones
 
 
-class Cancel(_Input, frozen=True):
+class CancelInput(_Input, frozen=True):
     goal_id: str
 
 
-class Grip(_Input, frozen=True):
+class GripInput(_Input, frozen=True):
     goal_id: str
     goal: GripperCommandGoal
     session: str = ""
 
 
-class GripCancel(_Input, frozen=True):
+class GripCancelInput(_Input, frozen=True):
     goal_id: str
 
 
-class Scene(_Input, frozen=True):
+class SceneInput(_Input, frozen=True):
     """All of a scene that the gateway looks at."""
 
     version: int
     epoch: int
 
 
-class Targets(_Input, frozen=True):
+class TargetsInput(_Input, frozen=True):
     targets: JointTargets
     node: str = ""  # that they come from
 
 
-class Command(_Input, frozen=True):
+class CommandInput(_Input, frozen=True):
     ticket: int
     request: DeviceCommandRequest
     session: str = ""
 
 
-class Stop(_Input, frozen=True):
+class StopInput(_Input, frozen=True):
     ticket: int
     request: DeviceStopRequest
 
 
-class Configure(_Input, frozen=True):
+class ConfigureInput(_Input, frozen=True):
     ticket: int
     session: str = ""
 
 
-class Inject(_Input, frozen=True):
+class InjectInput(_Input, frozen=True):
     ticket: int
     request: InjectRequest
 
 
-class Echo(_Input, frozen=True):
+class EchoInput(_Input, frozen=True):
     ticket: int
 
 
-class TakeControl(_Input, frozen=True):
+class TakeControlInput(_Input, frozen=True):
     """Its secret is sealed, as in the next two: who reads the recording cannot use it."""
 
     ticket: int
@@ -134,20 +134,21 @@ class TakeControl(_Input, frozen=True):
     session: str
 
 
-class JoinControl(_Input, frozen=True):
+class JoinControlInput(_Input, frozen=True):
     ticket: int
     request: ControlJoin
     session: str
 
 
-class GiveControl(_Input, frozen=True):
+class GiveControlInput(_Input, frozen=True):
     ticket: int
     request: ControlGive
 
 
 Input = (
-    Began | Parameters | Step | Link | Frame | Goal | Cancel | Grip | GripCancel | Scene | Targets | Command | Stop
-    | Configure | Inject | Echo | TakeControl | JoinControl | GiveControl
+    BeganInput | ParametersInput | StepInput | LinkInput | FrameInput | GoalInput | CancelInput | GripInput
+    | GripCancelInput | SceneInput | TargetsInput | CommandInput | StopInput | ConfigureInput | InjectInput | EchoInput
+    | TakeControlInput | JoinControlInput | GiveControlInput
 )  # fmt: skip
 Reply = GoalVerdict | str | None  # what is said at once
 
@@ -168,43 +169,43 @@ class Given(msgspec.Struct, frozen=True, array_like=True):
 def give(core: GatewayCore, given: Input, moment: Moment) -> tuple[Reply, list[Output]]:
     """Gives the core one input; what it says at once, and its outputs."""
     match given:
-        case Step(absences):
+        case StepInput(absences):
             return None, core.step(moment, absences)
-        case Link(connected, reason):
+        case LinkInput(connected, reason):
             return None, core.on_link(connected, reason, moment)
-        case Frame(kind, payload, retained, arrival):
+        case FrameInput(kind, payload, retained, arrival):
             return None, core.on_received(Received(kind, payload, retained, arrival), moment)
-        case Targets(targets, node):
-            return None, core.on_targets(targets, moment, Caller(node=node))
-        case Goal(goal_id, goal, session):
-            return core.on_goal(goal_id, goal, moment, Caller(session))
-        case Cancel(goal_id):
+        case TargetsInput(targets, node):
+            return None, core.on_targets(targets, moment, MotionCaller(node=node))
+        case GoalInput(goal_id, goal, session):
+            return core.on_goal(goal_id, goal, moment, MotionCaller(session))
+        case CancelInput(goal_id):
             return core.on_cancel(goal_id, moment)
-        case Grip(goal_id, goal, session):
-            return core.on_grip(goal_id, goal, moment, Caller(session))
-        case GripCancel(goal_id):
+        case GripInput(goal_id, goal, session):
+            return core.on_grip(goal_id, goal, moment, MotionCaller(session))
+        case GripCancelInput(goal_id):
             return core.on_grip_cancel(goal_id, moment)
-        case Scene(version, epoch):
+        case SceneInput(version, epoch):
             core.on_scene(PlanningScene(version=version, epoch=epoch))
-        case Command(ticket, request, session):
-            return None, core.on_command(request, ticket, moment, Caller(session))
-        case Stop(ticket, request):
+        case CommandInput(ticket, request, session):
+            return None, core.on_command(request, ticket, moment, MotionCaller(session))
+        case StopInput(ticket, request):
             return None, core.on_stop(request, ticket, moment)
-        case Configure(ticket, session):
-            return None, core.on_configure(ticket, moment, Caller(session))
-        case Inject(ticket, request):
+        case ConfigureInput(ticket, session):
+            return None, core.on_configure(ticket, moment, MotionCaller(session))
+        case InjectInput(ticket, request):
             return None, core.on_inject(request, ticket, moment)
-        case Echo(ticket):
+        case EchoInput(ticket):
             return None, core.on_echo(ticket, moment)
-        case TakeControl(ticket, request, session):
+        case TakeControlInput(ticket, request, session):
             return None, core.on_take_control(request, session, ticket, moment)
-        case JoinControl(ticket, request, session):
+        case JoinControlInput(ticket, request, session):
             return None, core.on_join_control(request, session, ticket, moment)
-        case GiveControl(ticket, request):
+        case GiveControlInput(ticket, request):
             return None, core.on_give_control(request, ticket, moment)
-        case Parameters(parameters):
+        case ParametersInput(parameters):
             core.set_parameters(parameters)
-        case Began():
+        case BeganInput():
             raise ValueError("a core begins once: make another one")
     return None, []
 

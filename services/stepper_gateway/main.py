@@ -15,7 +15,7 @@ from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import Began
+from services.stepper_gateway.inputs import BeganInput
 from services.stepper_gateway.ledger.ledger_file import LedgerFile, read_ledger
 from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.parameters import GatewayParameters
@@ -38,7 +38,7 @@ def run(node: Node, deployment: Deployment) -> None:
     kept, trouble = read_ledger(file.path)
     if trouble:
         node.log.warning(trouble)
-    began = Began(secrets.randbelow(2**31 - 1) + 1, parameters.value, kept)
+    began = BeganInput(secrets.randbelow(2**31 - 1) + 1, parameters.value, kept)
     core = GatewayCore(arm, began.session, began.parameters, began.kept)
     shell = Shell(node, core, began, parameters, file)
     with closing(file), closing(open_device(deployment, arm, shell.wake)) as link:

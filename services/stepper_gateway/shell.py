@@ -51,27 +51,27 @@ from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
 from services.stepper_gateway.input_log import InputLog
 from services.stepper_gateway.inputs import (
-    Began,
-    Cancel,
-    Command,
-    Configure,
-    Echo,
-    Frame,
-    GiveControl,
-    Goal,
-    Grip,
-    GripCancel,
-    Inject,
+    BeganInput,
+    CancelInput,
+    CommandInput,
+    ConfigureInput,
+    EchoInput,
+    FrameInput,
+    GiveControlInput,
+    GoalInput,
+    GripCancelInput,
+    GripInput,
+    InjectInput,
     Input,
-    JoinControl,
-    Link,
-    Parameters,
+    JoinControlInput,
+    LinkInput,
+    ParametersInput,
     Reply,
-    Scene,
-    Step,
-    Stop,
-    TakeControl,
-    Targets,
+    SceneInput,
+    StepInput,
+    StopInput,
+    TakeControlInput,
+    TargetsInput,
 )
 from services.stepper_gateway.ledger.ledger_file import LedgerFile
 from services.stepper_gateway.links import link as links
@@ -107,7 +107,7 @@ class Shell:
         self,
         node: Node,
         core: GatewayCore,
-        began: Began,
+        began: BeganInput,
         parameters: ParameterSet[GatewayParameters],
         ledger: LedgerFile,
     ) -> None:
@@ -122,7 +122,7 @@ class Shell:
         self._gripper: Gripper = node.serve_action(GRIPPER_COMMAND, self._on_grip, self._on_grip_cancel)
         self._absences = node.absences()
         node.subscribe_signed(JOINT_TARGETS, self._on_targets)
-        node.subscribe(SCENE, lambda scene: self._give(Scene(scene.version, scene.epoch)))
+        node.subscribe(SCENE, lambda scene: self._give(SceneInput(scene.version, scene.epoch)))
         self._commands = node.serve_later(DEVICE_COMMAND, self._on_command)
         node.serve_later(DEVICE_STOP, self._on_stop)
         node.serve_later(DEVICE_CONFIGURE, self._on_configure)
@@ -146,9 +146,9 @@ class Shell:
         """One turn of the control loop."""
         if self._parameters.value is not self._told:
             self._told = self._parameters.value
-            self._give(Parameters(self._told))
+            self._give(ParametersInput(self._told))
         moment = self._moment()
-        self._give(Step(self._absences.seconds(self._core.watched_clients, moment.monotonic)))
+        self._give(StepInput(self._absences.seconds(self._core.watched_clients, moment.monotonic)))
         moment = self._moment()
         reason = self._core.not_ready(moment)
         self._node.set_ready(not reason, reason)
@@ -166,47 +166,47 @@ class Shell:
         link = self._link
         if link is None:
             return
-        self._give(Link(link.connected, link.reason))
+        self._give(LinkInput(link.connected, link.reason))
         received = link.take(AT_ONCE)
         for payload in received:
-            self._give(Frame(*payload))
+            self._give(FrameInput(*payload))
         if len(received) == AT_ONCE:
             self.wake()
 
     def _on_goal(self, goal_id: str, goal: FollowJointTrajectoryGoal) -> GoalDecision:
-        return _decision(self._give(Goal(goal_id, goal, self._server.session_of(goal_id))))
+        return _decision(self._give(GoalInput(goal_id, goal, self._server.session_of(goal_id))))
 
     def _on_cancel(self, goal_id: str) -> str:
-        return str(self._give(Cancel(goal_id)))
+        return str(self._give(CancelInput(goal_id)))
 
     def _on_grip(self, goal_id: str, goal: GripperCommandGoal) -> GoalDecision:
-        return _decision(self._give(Grip(goal_id, goal, self._gripper.session_of(goal_id))))
+        return _decision(self._give(GripInput(goal_id, goal, self._gripper.session_of(goal_id))))
 
     def _on_grip_cancel(self, goal_id: str) -> str:
-        return str(self._give(GripCancel(goal_id)))
+        return str(self._give(GripCancelInput(goal_id)))
 
     def _on_targets(self, targets: JointTargets, writer: str) -> None:
         """The planner's are those of whom it jogs for; of anybody else it does not count what they say of that."""
-        self._give(Targets(targets, targets.client or writer if writer == JOGGER else writer))
+        self._give(TargetsInput(targets, targets.client or writer if writer == JOGGER else writer))
 
     def _on_command(self, request: DeviceCommandRequest, pending: Pending[DeviceCommandResponse]) -> None:
-        self._give(Command(self._ticket(pending), request, pending.client))
+        self._give(CommandInput(self._ticket(pending), request, pending.client))
 
     def _on_stop(self, request: DeviceStopRequest, pending: Pending[DeviceCommandResponse]) -> None:
         """What was asked for before a stop must not move the arm after it."""
         reason = f"{request.kind} was asked for after it: ask again"
         for server in (self._server, self._gripper, self._commands):
             server.refuse_waiting(reason, pending.asked)
-        self._give(Stop(self._ticket(pending), request))
+        self._give(StopInput(self._ticket(pending), request))
 
     def _on_configure(self, _request: ConfigureRequest, pending: Pending[ConfigureResponse]) -> None:
-        self._give(Configure(self._ticket(pending), pending.client))
+        self._give(ConfigureInput(self._ticket(pending), pending.client))
 
     def _on_inject(self, request: InjectRequest, pending: Pending[InjectResponse]) -> None:
-        self._give(Inject(self._ticket(pending), request))
+        self._give(InjectInput(self._ticket(pending), request))
 
     def _on_echo(self, _request: EchoRequest, pending: Pending[EchoResponse]) -> None:
-        self._give(Echo(self._ticket(pending)))
+        self._give(EchoInput(self._ticket(pending)))
 
     def _give(self, given: Input) -> Reply:
         """Gives the core one input now, carries out what comes of it, and returns what it says at once."""
@@ -216,14 +216,14 @@ class Shell:
 
     def _on_take_control(self, request: ControlTake, pending: Pending[ControlAnswer]) -> None:
         sealed = replace(request, secret=seal(request.secret))
-        self._give(TakeControl(self._ticket(pending), sealed, pending.client))
+        self._give(TakeControlInput(self._ticket(pending), sealed, pending.client))
 
     def _on_join_control(self, request: ControlJoin, pending: Pending[ControlAnswer]) -> None:
         sealed = replace(request, secret=seal(request.secret))
-        self._give(JoinControl(self._ticket(pending), sealed, pending.client))
+        self._give(JoinControlInput(self._ticket(pending), sealed, pending.client))
 
     def _on_give_control(self, request: ControlGive, pending: Pending[ControlAnswer]) -> None:
-        self._give(GiveControl(self._ticket(pending), replace(request, secret=seal(request.secret))))
+        self._give(GiveControlInput(self._ticket(pending), replace(request, secret=seal(request.secret))))
 
     def _ticket(self, pending: Pending[Any]) -> int:
         ticket = next(self._tickets)

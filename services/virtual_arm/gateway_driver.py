@@ -37,7 +37,7 @@ from schemas.motion import (
 from schemas.system import LogLevel
 from schemas.topics import Topic
 from services.arm.model.description import Arm
-from services.stepper_gateway.control.clients import Caller
+from services.stepper_gateway.control.clients import MotionCaller
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.device.command_arguments import KINDS
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
@@ -59,7 +59,7 @@ from services.stepper_gateway.outputs import (
 )
 from services.stepper_gateway.parameters import GatewayParameters
 
-__all__ = ["Caller", "GatewayDriver", "GatewayParameters", "Kind", "Moment", "asked"]
+__all__ = ["GatewayDriver", "GatewayParameters", "Kind", "Moment", "MotionCaller", "asked"]
 
 Ended = tuple[GoalStatusCode, FollowJointTrajectoryResult]
 
@@ -128,7 +128,7 @@ class GatewayDriver(ABC):
         self,
         goal: FollowJointTrajectoryGoal | JointTrajectory,
         goal_id: str = "g",
-        caller: Caller = Caller(),  # noqa: B008 a tuple of texts
+        caller: MotionCaller = MotionCaller(),  # noqa: B008 a tuple of texts
     ) -> GoalVerdict:
         """Asks the gateway to follow a trajectory; returns its acceptance or refusal."""
         if isinstance(goal, JointTrajectory):
@@ -147,7 +147,7 @@ class GatewayDriver(ABC):
         position: float,
         max_effort: float = 0.0,
         goal_id: str = "grip",
-        caller: Caller = Caller(),  # noqa: B008 a tuple of texts
+        caller: MotionCaller = MotionCaller(),  # noqa: B008 a tuple of texts
     ) -> GoalVerdict:
         """Asks the gripper to open or close to `position` [m]; returns its acceptance or refusal."""
         goal = GripperCommandGoal(position=position, max_effort=max_effort)
@@ -178,7 +178,7 @@ class GatewayDriver(ABC):
 
     def stream(self, targets: JointTargets, node: str = "") -> None:
         """Hands the gateway one message of streamed targets of `node`."""
-        self.carry_out(self.core.on_targets(targets, self.moment, Caller(node=node)))
+        self.carry_out(self.core.on_targets(targets, self.moment, MotionCaller(node=node)))
 
     def command(self, kind: DeviceCommandKind, ticket: int = 1, **positions: float) -> None:
         """Asks for the command of that number, with positions [rad] or [m] of the joints named."""
@@ -190,7 +190,7 @@ class GatewayDriver(ABC):
             self.carry_out(self.core.on_stop(DeviceStopRequest(kind=wanted), ticket, self.moment))
         else:
             self.carry_out(
-                self.core.on_command(DeviceCommandRequest(command=wanted), ticket, self.moment, Caller(session))
+                self.core.on_command(DeviceCommandRequest(command=wanted), ticket, self.moment, MotionCaller(session))
             )
 
     def answer(self, wanted: DeviceCommand | StopKind, ticket: int = 1, seconds: float = 3.0) -> DeviceCommandResponse:

@@ -33,7 +33,7 @@ from services.runtime.errors import GoalRefused
 from services.runtime.node import Node
 from services.runtime.process.shutdown import ShutdownRequest
 from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import Began, unpacked
+from services.stepper_gateway.inputs import BeganInput, unpacked
 from services.stepper_gateway.ledger.ledger_file import LedgerFile
 from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.shell import Shell
@@ -66,7 +66,7 @@ class Lab:
             closing(LedgerFile(self._folder / f"run{self._gateways}", "rm1", node.log.warning))
         )
         core = GatewayCore(self.description, self._gateways, parameters.value)
-        self.shell = Shell(node, core, Began(self._gateways, parameters.value), parameters, ledger)
+        self.shell = Shell(node, core, BeganInput(self._gateways, parameters.value), parameters, ledger)
         self._spin = spinning(node, self.shell.step)
         self._spin.__enter__()
         self._stack.callback(self.stop_gateway)

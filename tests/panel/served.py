@@ -13,7 +13,7 @@ from services.bench.bare_browser import BareBrowser, Said, bare_browser
 from services.panel.main import Panel
 from services.panel.view.browser import STOP_SIGN
 from services.panel.view.page import Page
-from services.panel.view.world import World
+from services.panel.view.world import DrawnWorld
 from services.panel.words.en import ENGLISH
 from services.runtime.deployment import load_deployment
 from services.runtime.process.shutdown import ShutdownRequest
@@ -45,7 +45,7 @@ class Served:
         return self.panel.pages()[0]
 
     @property
-    def world(self) -> World:
+    def world(self) -> DrawnWorld:
         """What is drawn."""
         return self.panel._world
 

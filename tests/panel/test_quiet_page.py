@@ -17,7 +17,7 @@ from schemas.frames import Transform
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.model.description import load_arm
 from services.panel.main import TEXTS
-from services.panel.model.pace import EARLY, PERIOD, Pace
+from services.panel.model.pace import EARLY, PERIOD, DrawPace
 from services.panel.view.arms import DrawnArm, load_model
 from services.panel.view.browser import CHANNEL, STOP_SIGN
 from services.panel.view.page import LATE, LATE_AGAIN
@@ -174,7 +174,7 @@ def rotation(w: float, x: float, y: float, z: float) -> np.ndarray:
 
 
 def test_of_an_arm_that_moves_every_second_state_is_drawn_as_it_comes_and_the_last_one_too():
-    pace, drawn = Pace(), []
+    pace, drawn = DrawPace(), []
     for step in range(500):
         now, position = 0.02 * step + 0.004 * (step % 3), (float(min(step, 250)),)
         if pace.is_due(position, now):
@@ -187,7 +187,7 @@ def test_of_an_arm_that_moves_every_second_state_is_drawn_as_it_comes_and_the_la
 
 @given(st.lists(st.tuples(st.floats(0.0, 0.1), st.integers(0, 3)), max_size=100))
 def test_pictures_are_never_closer_than_they_may_be_and_never_of_what_is_drawn_already(heard: list[tuple[float, int]]):
-    pace, now, before, shown = Pace(), 0.0, float("-inf"), None
+    pace, now, before, shown = DrawPace(), 0.0, float("-inf"), None
     for wait, position in heard:
         now += wait
         if pace.is_due((float(position),), now):

@@ -14,7 +14,7 @@ from schemas.topics import GRIPPER_STATE
 from services.replay.main import replay
 from services.replay.recorded import NotReplayable
 from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import Frame, Given, give, packed, unpacked
+from services.stepper_gateway.inputs import FrameInput, Given, give, packed, unpacked
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.outputs import GoalFinished, LogLine, Publish
 from services.stepper_gateway.shell import Shell
@@ -45,7 +45,7 @@ def flipped(kind: Kind, which: int, place: int, mended: bool = False):
 
     def change(given: Given, _number: int) -> Given:
         nonlocal seen
-        if isinstance(given.input, Frame) and given.input.kind is kind:
+        if isinstance(given.input, FrameInput) and given.input.kind is kind:
             seen += 1
             if seen == which:
                 payload = bytearray(given.input.payload)
@@ -83,7 +83,7 @@ def test_an_answer_of_the_devices_clock_that_came_a_tenth_of_a_millisecond_later
 
     def later(given, _number):
         nonlocal seen
-        if isinstance(given.input, Frame) and given.input.kind is Kind.SYNC_R:
+        if isinstance(given.input, FrameInput) and given.input.kind is Kind.SYNC_R:
             seen += 1
             if seen == 3:
                 arrival = given.input.arrival + 100_000

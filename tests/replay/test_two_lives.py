@@ -15,7 +15,7 @@ from services.replay.stepper_gateway import EARLIER, OUTSIDE
 from services.state_publisher.main import describe
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.input_log import InputLog
-from services.stepper_gateway.inputs import Began, Link, Step
+from services.stepper_gateway.inputs import BeganInput, LinkInput, StepInput
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Publish
 from services.stepper_gateway.parameters import GatewayParameters
@@ -29,7 +29,7 @@ class Life:
 
     def __init__(self, session: int, start: float, entries: list[Entry]) -> None:
         self.now, self._entries = start, entries
-        began = Began(session, GatewayParameters())
+        began = BeganInput(session, GatewayParameters())
         core = GatewayCore(rm1(), session, began.parameters)
         self._log = InputLog(core, began, self.moment, lambda said: self._keep(GATEWAY_INPUTS, said))
 
@@ -40,9 +40,9 @@ class Life:
     def run(self, seconds: float) -> None:
         for turn in range(round(seconds / PERIOD)):
             self.now += PERIOD
-            self.give(Step())
+            self.give(StepInput())
             if turn % 50 == 0:
-                self.give(Link(turn % 100 == 0, "the broker is gone" if turn % 100 else ""))
+                self.give(LinkInput(turn % 100 == 0, "the broker is gone" if turn % 100 else ""))
             self._log.step(self.moment, True)
 
     def give(self, given) -> None:

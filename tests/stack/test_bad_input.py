@@ -30,7 +30,7 @@ from schemas.topics import (
 from services.runtime.actions.keys import cancel_request, feedback_topic, goal_request, result_request, status_topic
 from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.errors import GoalRefused
-from services.stepper_gateway.links.frames import Chunk, ChunkFlag, Command, Heartbeat
+from services.stepper_gateway.links.frames import Chunk, ChunkFlag, CommandFrame, Heartbeat
 from services.stepper_gateway.links.frames import encode as to_frame
 from tests.schemas.samples import sample
 from tests.schemas.strays import strays_for
@@ -276,7 +276,9 @@ def test_rubbish_and_stale_commands_on_every_mqtt_topic_move_nothing(wire, opera
     ]
     for frame in refused:
         wire.publish(f"{prefix}/traj", frame, qos=1).wait_for_publish(5.0)
-    wire.publish(f"{prefix}/cmd", to_frame(Command(boot_id=who.boot_id, cmd_id=1, expires_us=LONG_AGO, cmd=3)), qos=1)
+    wire.publish(
+        f"{prefix}/cmd", to_frame(CommandFrame(boot_id=who.boot_id, cmd_id=1, expires_us=LONG_AGO, cmd=3)), qos=1
+    )
     wire.publish(f"{prefix}/hb", to_frame(Heartbeat(boot_id=who.boot_id ^ 1, session=1, counter=1)))
     assert operator.wait_for(lambda: operator.device.message.refused >= before.refused + len(refused) + 1, 5.0)
     assert operator.wait_for(lambda: operator.device.message.bad_frames > before.bad_frames, 5.0)

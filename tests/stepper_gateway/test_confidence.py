@@ -21,7 +21,7 @@ from services.stepper_gateway.ledger.confidence import (
     confidence,
     strong_enough,
 )
-from services.stepper_gateway.ledger.joint_watch import WATCHED, JointWatch, Sample
+from services.stepper_gateway.ledger.joint_watch import WATCHED, JointSample, JointWatch
 from services.stepper_gateway.ledger.tool_error import CERTAIN, bounds, tool_shift
 from services.virtual_arm.virtual_arm import rm1
 
@@ -113,17 +113,17 @@ def test_the_load_is_the_share_of_the_pull_out_torque_that_inertia_and_friction_
 
 def test_between_two_states_turns_and_load_add_up() -> None:
     watch = watch_of(0)
-    moved = watch.between(HOMED, Sample(0, 0, 0.0), Sample(20_000, 400, 2000.0))
+    moved = watch.between(HOMED, JointSample(0, 0, 0.0), JointSample(20_000, 400, 2000.0))
     assert moved.turns == 1.0
     assert moved.load == pytest.approx(torque_share(watch.joint.drive.motor, 2000.0, 100_000.0))
-    assert watch.between(HOMED, Sample(0, 0, 0.0), Sample(20_000, 0, 0.0)) is HOMED
+    assert watch.between(HOMED, JointSample(0, 0, 0.0), JointSample(20_000, 0, 0.0)) is HOMED
 
 
 def test_a_motion_that_nobody_has_watched_counts_as_the_hardest_there_is() -> None:
     watch = watch_of(0)
     late = round((WATCHED + 0.1) * 1e6)
-    assert watch.between(HOMED, Sample(0, 0, 0.0), Sample(late, 40, 0.0)).load == watch.hardest
-    assert watch.between(HOMED, Sample(0, 0, 0.0), Sample(late, 0, 0.0)) is HOMED
+    assert watch.between(HOMED, JointSample(0, 0, 0.0), JointSample(late, 40, 0.0)).load == watch.hardest
+    assert watch.between(HOMED, JointSample(0, 0, 0.0), JointSample(late, 0, 0.0)) is HOMED
 
 
 COLUMNS = ((0.0, 0.3, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 1.0))

@@ -15,45 +15,45 @@ from schemas.device import DeviceCommandKind, StopKind
 from schemas.scene import PlanningScene
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.inputs import (
-    Began,
-    Cancel,
-    Command,
-    Configure,
-    Echo,
-    Frame,
+    BeganInput,
+    CancelInput,
+    CommandInput,
+    ConfigureInput,
+    EchoInput,
+    FrameInput,
     Given,
-    Goal,
-    Grip,
-    GripCancel,
+    GoalInput,
+    GripCancelInput,
+    GripInput,
     Input,
-    Link,
-    Scene,
-    Step,
-    Stop,
-    Targets,
+    LinkInput,
+    SceneInput,
+    StepInput,
+    StopInput,
+    TargetsInput,
     give,
     packed,
     unpacked,
 )
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.parameters import GatewayParameters
-from services.virtual_arm.gateway_driver import Caller
+from services.virtual_arm.gateway_driver import MotionCaller
 from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.stepper_gateway.harness import move
 
 WAYS: dict[str, Any] = {  # of the core's methods: the input that stands for a call
-    "step": lambda: Step(),
-    "on_link": Link,
-    "on_received": lambda received: Frame(*received),
-    "on_goal": Goal,
-    "on_cancel": Cancel,
-    "on_grip": Grip,
-    "on_grip_cancel": GripCancel,
-    "on_targets": Targets,
-    "on_command": lambda request, ticket: Command(ticket, request),
-    "on_stop": lambda request, ticket: Stop(ticket, request),
-    "on_configure": Configure,
-    "on_echo": Echo,
+    "step": lambda: StepInput(),
+    "on_link": LinkInput,
+    "on_received": lambda received: FrameInput(*received),
+    "on_goal": GoalInput,
+    "on_cancel": CancelInput,
+    "on_grip": GripInput,
+    "on_grip_cancel": GripCancelInput,
+    "on_targets": TargetsInput,
+    "on_command": lambda request, ticket: CommandInput(ticket, request),
+    "on_stop": lambda request, ticket: StopInput(ticket, request),
+    "on_configure": ConfigureInput,
+    "on_echo": EchoInput,
 }
 
 
@@ -63,14 +63,16 @@ class Watched(VirtualArm):
     def start_core(self, arm, session_id, parameters=None):
         super().start_core(arm, session_id, parameters)
         self.calls: list[tuple[Input, Moment, Any]] = []
-        self.began = Began(session_id, parameters or GatewayParameters())
+        self.began = BeganInput(session_id, parameters or GatewayParameters())
         for name, way in WAYS.items():
             setattr(self.core, name, self._watched(getattr(self.core, name), way))
 
     def _watched(self, method, way):
         def call(*arguments):
             [moment] = [each for each in arguments if isinstance(each, Moment)]
-            given = [each for each in arguments if not isinstance(each, Moment | Caller)]  # nobody says who he is here
+            given = [
+                each for each in arguments if not isinstance(each, Moment | MotionCaller)
+            ]  # nobody says who he is here
             returned = method(*arguments)
             self.calls.append((way(*given), moment, returned))
             return returned
@@ -119,6 +121,6 @@ def test_a_scene_is_given_by_its_version_alone():
     cores = [GatewayCore(rm1(), 7, GatewayParameters()) for _ in range(2)]
     moment = Moment(1, 1.0)
     cores[0].on_scene(PlanningScene(version=-3, epoch=4))
-    give(cores[1], Scene(-3, 4), moment)
+    give(cores[1], SceneInput(-3, 4), moment)
     assert cores[0].scenes_dropped == cores[1].scenes_dropped == 1
     assert cores[0].step(moment) == cores[1].step(moment)

@@ -26,14 +26,14 @@ from schemas.motion import FollowErrorCode
 from schemas.system import LogLevel
 from schemas.topics import CONTROL
 from services.stepper_gateway.control.control import MOST_MEMBERS
-from services.virtual_arm.gateway_driver import Caller
+from services.virtual_arm.gateway_driver import MotionCaller
 from services.virtual_arm.virtual_arm import GatewayParameters, VirtualArm
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 ZERO = (0.0, 0.0, 0.0)
 FAR = (1.2, -1.2, 0.08)
 GRACE = GatewayParameters().control_grace
-ANA, BEN = Caller("5e55a", "cli-1"), Caller("5e55b", "cli-2")
+ANA, BEN = MotionCaller("5e55a", "cli-1"), MotionCaller("5e55b", "cli-2")
 SECRETS = {ANA: "a" * 64, BEN: "b" * 64}
 NAMES = {ANA: "ana", BEN: "ben"}
 COMMANDS = [
@@ -42,11 +42,11 @@ COMMANDS = [
 ]  # fmt: skip
 
 
-def key_of(who: Caller) -> str:
+def key_of(who: MotionCaller) -> str:
     return f"@id/{who.node}/{1:020d}.{who.node[-1]}.desk-{who.node[-1]}"
 
 
-def take(who: Caller, force: bool = False) -> ControlTake:
+def take(who: MotionCaller, force: bool = False) -> ControlTake:
     return ControlTake(name=NAMES[who], client=key_of(who), secret=SECRETS[who], force=force)
 
 
@@ -57,8 +57,8 @@ def held_by_ana(rig: VirtualArm | None = None) -> VirtualArm:
     return rig
 
 
-def session_of(who: Caller) -> Caller:
-    return Caller(who.session)
+def session_of(who: MotionCaller) -> MotionCaller:
+    return MotionCaller(who.session)
 
 
 def state(rig: VirtualArm) -> ControlState:
@@ -99,8 +99,11 @@ def test_the_holder_moves_and_others_are_refused_by_name_since_when_and_from_whe
     assert state(rig).members == ("cli-1",)
 
 
-@pytest.mark.parametrize("caller", [Caller(), Caller("5e55"), Caller("5e55a "), Caller("cli-1"), Caller(node="5e55a")])
-def test_who_does_not_say_who_it_is_or_says_something_else_is_not_the_holder(caller: Caller) -> None:
+@pytest.mark.parametrize(
+    "caller",
+    [MotionCaller(), MotionCaller("5e55"), MotionCaller("5e55a "), MotionCaller("cli-1"), MotionCaller(node="5e55a")],
+)
+def test_who_does_not_say_who_it_is_or_says_something_else_is_not_the_holder(caller: MotionCaller) -> None:
     rig = held_by_ana()
     assert rig.goal(move(ZERO, FAR), "b", caller).code is FollowErrorCode.NOT_IN_CONTROL
 
@@ -344,7 +347,7 @@ def test_given_back_everybody_may_move() -> None:
 
 def test_a_node_that_knows_the_secret_moves_the_arm_until_it_ends() -> None:
     rig = held_by_ana()
-    script = Caller("5e55c", "pick-3")
+    script = MotionCaller("5e55c", "pick-3")
     rig.control(ControlJoin(client=key_of(script), secret=SECRETS[ANA]), script.session, 2)
     assert rig.controlled[2].accepted
     assert rig.goal(move(ZERO, FAR), "c", session_of(script)).accepted
@@ -406,7 +409,7 @@ def test_a_claimant_that_ends_before_the_arm_rests_does_not_get_control() -> Non
 
 def test_of_two_that_force_at_once_the_later_gets_it_and_the_earlier_hears_so() -> None:
     rig = VirtualArm().ready()
-    assert rig.goal(move(ZERO, FAR), "c", Caller("5e55c")).accepted
+    assert rig.goal(move(ZERO, FAR), "c", MotionCaller("5e55c")).accepted
     rig.run(1.0)
     rig.control(take(ANA), ANA.session, 1)
     rig.control(take(BEN), BEN.session, 2)

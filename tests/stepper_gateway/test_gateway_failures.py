@@ -10,7 +10,7 @@ from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.motion import FollowErrorCode
 from schemas.topics import DEVICE_STATUS, JOINT_STATES
-from services.stepper_gateway.links.frames import Ack, CommandReply, State, SyncReply, encode
+from services.stepper_gateway.links.frames import Ack, CommandReply, StateFrame, SyncReply, encode
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 from tests.stepper_gateway.harness import assert_within_limits, move
@@ -100,7 +100,9 @@ def test_a_late_frame_of_the_old_boot_is_no_reboot() -> None:
     rig = VirtualArm().ready()
     rig.reboot(78)
     rig.run(0.5)
-    rig.receive(Kind.STATE, encode(State(boot_id=77, t_us=99_000_000, mode=3, steps=(1, 2, 3), velocity=(0, 0, 0))))
+    rig.receive(
+        Kind.STATE, encode(StateFrame(boot_id=77, t_us=99_000_000, mode=3, steps=(1, 2, 3), velocity=(0, 0, 0)))
+    )
     assert rig.events().count("rebooted") == 1
     assert rig.messages(JOINT_STATES)[-1].position == HOME
     rig.run(0.1)
@@ -109,7 +111,7 @@ def test_a_late_frame_of_the_old_boot_is_no_reboot() -> None:
 
 def test_a_forged_boot_a_forged_time_and_a_stale_last_will_are_survived() -> None:
     rig = VirtualArm().ready()
-    forged = State(boot_id=5, t_us=2**60, mode=3, steps=(1, 2, 3), velocity=(0, 0, 0))
+    forged = StateFrame(boot_id=5, t_us=2**60, mode=3, steps=(1, 2, 3), velocity=(0, 0, 0))
     rig.receive(Kind.STATUS, b'{"online": false, "device": "rm1", "boot_id": 77}', retained=True)
     rig.receive(Kind.STATUS, b'{"online": true, "device": "rm1", "boot_id": 5, "joints": 9}')
     rig.run(0.1)
@@ -117,7 +119,7 @@ def test_a_forged_boot_a_forged_time_and_a_stale_last_will_are_survived() -> Non
     rig.receive(Kind.STATE, encode(forged))
     rig.run(1.5)
     assert not rig.core.not_ready(rig.moment)
-    rig.receive(Kind.STATE, encode(State(boot_id=77, t_us=2**60, mode=3, steps=(1, 2, 3), velocity=(0, 0, 0))))
+    rig.receive(Kind.STATE, encode(StateFrame(boot_id=77, t_us=2**60, mode=3, steps=(1, 2, 3), velocity=(0, 0, 0))))
     rig.run(1.5)
     assert_works_again(rig)
 
@@ -251,7 +253,7 @@ junk = st.one_of(
     st.binary(max_size=300),
     st.just(b"\0" * 1_000_000),
     st.builds(
-        lambda boot, t, mode: encode(State(boot_id=boot, t_us=t, mode=mode, steps=(9, 9), velocity=(1, 1))),
+        lambda boot, t, mode: encode(StateFrame(boot_id=boot, t_us=t, mode=mode, steps=(9, 9), velocity=(1, 1))),
         st.integers(0, 2**32 - 1),
         st.integers(0, 2**40),
         st.integers(0, 255),

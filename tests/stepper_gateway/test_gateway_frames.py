@@ -16,10 +16,10 @@ from services.stepper_gateway.links.frames import (
     Ack,
     BadFrame,
     Chunk,
-    Command,
+    CommandFrame,
     CommandReply,
     Heartbeat,
-    State,
+    StateFrame,
     Sync,
     SyncReply,
     decode,
@@ -36,8 +36,8 @@ from services.stepper_gateway.links.reports import (
 
 VECTORS = Path(__file__).resolve().parents[2] / "firmware" / "tests" / "vectors"
 KINDS = {
-    "TRAJ": Chunk, "ACK": Ack, "CMD": Command, "CMD_ACK": CommandReply, "HB": Heartbeat, "SYNC": Sync,
-    "SYNC_R": SyncReply, "STATE": State,
+    "TRAJ": Chunk, "ACK": Ack, "CMD": CommandFrame, "CMD_ACK": CommandReply, "HB": Heartbeat, "SYNC": Sync,
+    "SYNC_R": SyncReply, "STATE": StateFrame,
 }  # fmt: skip
 
 u8, u16, u32, u64 = (st.integers(0, 2**bits - 1) for bits in (8, 16, 32, 64))
@@ -67,10 +67,10 @@ def chunks(draw: st.DrawFn) -> Chunk:
 
 
 @st.composite
-def states(draw: st.DrawFn) -> State:
+def states(draw: st.DrawFn) -> StateFrame:
     joints = draw(st.integers(1, 6))
     (steps, velocity) = draw(rows(joints, 2))
-    return State(
+    return StateFrame(
         boot_id=draw(u32), t_us=draw(u64), mode=draw(u8), fault=draw(u8), inputs=draw(u16),
         time_scale=draw(u16) / 32768.0, buffered_ms=draw(u16), stream=draw(u32), next_seq=draw(u32),
         play_us=draw(u64), underruns=draw(u32), refused=draw(u32), bad_frames=draw(u32), steps=steps,
@@ -86,7 +86,7 @@ any_frame = st.one_of(
         credits=u16, buffered_ms=u16, t_us=u64,
     ),
     st.builds(
-        Command, boot_id=u32, cmd_id=u32, expires_us=u64, cmd=u8, positions=st.lists(i32, max_size=6).map(tuple)
+        CommandFrame, boot_id=u32, cmd_id=u32, expires_us=u64, cmd=u8, positions=st.lists(i32, max_size=6).map(tuple)
     ),
     st.builds(CommandReply, boot_id=u32, cmd_id=u32, cmd=u8, code=u8, mode=u8, t_us=u64),
     st.builds(Heartbeat, boot_id=u32, session=u32, counter=u32),
@@ -161,7 +161,7 @@ def test_the_shared_vectors_are_read_and_written_alike(vector: dict[str, Any]) -
 
 def in_units(kind: str, fields: dict[str, Any]) -> dict[str, Any]:
     """The vectors are in the wire's units, a state is read into steps/s and shares."""
-    if KINDS[kind] is not State:
+    if KINDS[kind] is not StateFrame:
         return fields
     velocity = tuple(rate / 256.0 for rate in fields["velocity"])
     scales = {"time_scale": fields["time_scale"] / 32768.0, "speed": fields["speed"] / 1000.0}

@@ -7,7 +7,7 @@ import pytest
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.topics import JOINT_STATES
-from services.stepper_gateway.links.frames import Command, decode
+from services.stepper_gateway.links.frames import CommandFrame, decode
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import assert_within_limits, move
@@ -75,4 +75,4 @@ def test_a_device_that_is_lost_in_a_move_finds_a_stop_on_the_wire() -> None:
     since = len(rig.sent)
     rig.run(0.5)
     late = [decode(payload) for _, kind, payload in rig.sent[since - 1 :] if kind == Kind.CMD]
-    assert [frame.cmd for frame in late if isinstance(frame, Command)].count(DeviceCommandKind.STOP) == 1
+    assert [frame.cmd for frame in late if isinstance(frame, CommandFrame)].count(DeviceCommandKind.STOP) == 1

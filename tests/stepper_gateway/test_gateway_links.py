@@ -19,10 +19,10 @@ from paho.mqtt.enums import CallbackAPIVersion
 from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 from services.stepper_gateway.links.frames import (
     Ack,
-    Command,
+    CommandFrame,
     CommandReply,
     Heartbeat,
-    State,
+    StateFrame,
     SyncReply,
     decode,
     encode,
@@ -35,7 +35,7 @@ from tests.stepper_gateway.wired import plain
 
 TEXT = b'{"some": "text"}'
 SAID = {  # something of every kind that a device says
-    Kind.STATE: encode(State(boot_id=1, t_us=5, mode=3, steps=(1, 2, 3), velocity=(0, 0, 0))),
+    Kind.STATE: encode(StateFrame(boot_id=1, t_us=5, mode=3, steps=(1, 2, 3), velocity=(0, 0, 0))),
     Kind.TRAJ_ACK: encode(Ack(boot_id=1, stream=2, seq=0, next_seq=1, code=0)),
     Kind.CMD_ACK: encode(CommandReply(boot_id=1, cmd_id=3, cmd=1, code=0, mode=3, t_us=9)),
     Kind.SYNC_R: encode(SyncReply(boot_id=1, t0=1, t1=2, t2=3)),
@@ -239,7 +239,7 @@ def test_a_stop_needs_no_room_and_overtakes_what_waits_for_a_slow_line(board: Se
         waiting = 0
         while bench.link.send(Kind.CONFIG, b'"' + b"x" * 1000 + b'"'):
             waiting += 1
-        stop = encode(Command(boot_id=0, cmd_id=1, expires_us=0, cmd=3))
+        stop = encode(CommandFrame(boot_id=0, cmd_id=1, expires_us=0, cmd=3))
         assert bench.link.send(Kind.CMD, stop, urgent=True)
         assert bench.until(lambda: len(board.heard()) == waiting + 1)
         place = [kind for kind, _ in board.heard()].index(Kind.CMD)

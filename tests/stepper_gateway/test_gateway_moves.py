@@ -10,7 +10,7 @@ from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTole
 from schemas.topics import COMMAND_ACKS, COMMANDS, JOINT_STATES, STEP_ERRORS
 from services.stepper_gateway.goals.active_goal import ActiveGoal
 from services.stepper_gateway.goals.goal_validator import GoalValidator
-from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.links.frames import StateFrame
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.parameters import GatewayParameters
 from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
@@ -24,12 +24,12 @@ def expected_steps(position: tuple[float, ...]) -> tuple[int, ...]:
     return tuple((joint.steps.to_q8(p) + 128) >> 8 for joint, p in zip(rm1().joints, position, strict=True))
 
 
-def execution_near_its_end(bound: JointTolerance) -> tuple[ActiveGoal, State]:
+def execution_near_its_end(bound: JointTolerance) -> tuple[ActiveGoal, StateFrame]:
     """A goal whose joints are on their last step, the first still at 1 step/s."""
     goal = FollowJointTrajectoryGoal(trajectory=move(HOME, READY), goal_tolerance=(bound,))
     joints = rm1().joints
     checked = GoalValidator(joints, 25_000).check(goal, 0, GatewayParameters())
-    state = State(t_us=1, mode=2, steps=expected_steps(READY), velocity=(1.0, 0.0, 0.0))
+    state = StateFrame(t_us=1, mode=2, steps=expected_steps(READY), velocity=(1.0, 0.0, 0.0))
     return ActiveGoal("g", checked, joints, Moment(0, 0.0)), state
 
 

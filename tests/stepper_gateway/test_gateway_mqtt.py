@@ -18,7 +18,7 @@ from schemas.device import ArmCommand, DeviceCommandKind, DeviceStatus, Referenc
 from schemas.device_config import config_crc, config_text
 from schemas.motion import FollowErrorCode
 from services.arm.device.device_config import device_config
-from services.stepper_gateway.links.frames import Chunk, Command, decode
+from services.stepper_gateway.links.frames import Chunk, CommandFrame, decode
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.links.mqtt import MqttLink
 from services.virtual_arm.virtual_arm import rm1
@@ -91,7 +91,7 @@ def test_a_stop_to_a_frozen_broker_is_answered_in_time_and_is_carried_out_when_i
         assert gateway.finish()[0] == GoalStatusCode.ABORTED
         gateway.ready()
         late = [decode(frame) for frame in wire.frames[sent_before:]]
-        commands = [frame for frame in late if isinstance(frame, Command)]
+        commands = [frame for frame in late if isinstance(frame, CommandFrame)]
         assert commands[0].cmd == DeviceCommandKind.STOP
         assert not [frame for frame in late[late.index(commands[0]) :] if isinstance(frame, Chunk)]
         states = gateway.published["joint_states"]

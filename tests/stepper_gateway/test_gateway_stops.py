@@ -8,7 +8,7 @@ from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceMode, InjectKind, InjectRequest, SpeedCommand, StopKind
 from services.stepper_gateway.device.clock import ClockSync
 from services.stepper_gateway.device.pending_commands import MOST_TICKETS, MOST_UNDER_WAY, PendingCommands
-from services.stepper_gateway.links.frames import Command, decode
+from services.stepper_gateway.links.frames import CommandFrame, decode
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.moment import Moment
 from services.virtual_arm.virtual_arm import VirtualArm
@@ -37,9 +37,9 @@ def restarted(*lost: Kind) -> VirtualArm:
     return rig
 
 
-def commands(rig: VirtualArm) -> list[Command]:
+def commands(rig: VirtualArm) -> list[CommandFrame]:
     frames = [decode(payload) for _, kind, payload in rig.sent if kind == Kind.CMD]
-    return [frame for frame in frames if isinstance(frame, Command)]
+    return [frame for frame in frames if isinstance(frame, CommandFrame)]
 
 
 def stands(rig: VirtualArm) -> bool:

@@ -14,10 +14,10 @@ from services.runtime.serial_frames import packet
 from services.stepper_gateway.links.frames import (
     Ack,
     Code,
-    Command,
+    CommandFrame,
     CommandReply,
     Heartbeat,
-    State,
+    StateFrame,
     Sync,
     decode,
     encode,
@@ -45,9 +45,9 @@ def last_beat(rig: VirtualArm) -> Heartbeat:
     return beat
 
 
-def commands(rig: VirtualArm) -> list[Command]:
+def commands(rig: VirtualArm) -> list[CommandFrame]:
     frames = [decode(payload) for _, kind, payload in rig.sent if kind == Kind.CMD]
-    return [frame for frame in frames if isinstance(frame, Command)]
+    return [frame for frame in frames if isinstance(frame, CommandFrame)]
 
 
 def test_a_replayed_heartbeat_from_far_ahead_holds_nothing() -> None:
@@ -134,7 +134,7 @@ def test_a_device_says_its_status_over_its_serial_line_too() -> None:
     device.attach_line()
     device.receive_serial(b"\0" + packet(encode(Sync(t0=1))))
     device.take_serial()
-    device.receive_serial(packet(encode(Command(boot_id=77, cmd_id=1, expires_us=NEVER, cmd=STATUS))))
+    device.receive_serial(packet(encode(CommandFrame(boot_id=77, cmd_id=1, expires_us=NEVER, cmd=STATUS))))
     assert b"reset_cause" in device.take_serial()
 
 
@@ -149,14 +149,14 @@ def test_an_empty_status_is_counted_and_changes_nothing() -> None:
 
 def test_a_state_from_far_ahead_of_the_devices_clock_is_dropped() -> None:
     rig = moving_rig()
-    rig.receive(Kind.STATE, encode(State(boot_id=77, t_us=2**60, mode=4, steps=(1, 2, 3), velocity=(0, 0, 0))))
+    rig.receive(Kind.STATE, encode(StateFrame(boot_id=77, t_us=2**60, mode=4, steps=(1, 2, 3), velocity=(0, 0, 0))))
     assert rig.core.bad_frames == 1
     assert rig.finish()[0] == GoalStatusCode.SUCCEEDED
 
 
 def test_the_hold_of_an_impostor_is_called_that() -> None:
     rig = moving_rig()
-    hold = Command(boot_id=77, cmd_id=999, expires_us=NEVER, cmd=DeviceCommandKind.HOLD)
+    hold = CommandFrame(boot_id=77, cmd_id=999, expires_us=NEVER, cmd=DeviceCommandKind.HOLD)
     rig.device.receive(encode(hold))
     status, result = rig.finish()
     assert status == GoalStatusCode.ABORTED

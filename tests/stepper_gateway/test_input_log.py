@@ -8,14 +8,14 @@ import pytest
 
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.input_log import HELD_BACK, PERIOD, InputLog
-from services.stepper_gateway.inputs import Began, Link, Scene, Step, digest_of, give, unpacked
+from services.stepper_gateway.inputs import BeganInput, LinkInput, SceneInput, StepInput, digest_of, give, unpacked
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import SendFrame
 from services.stepper_gateway.parameters import GatewayParameters
 from services.virtual_arm.virtual_arm import rm1
 
-BEGAN = Began(7, GatewayParameters())
+BEGAN = BeganInput(7, GatewayParameters())
 
 
 class Log:
@@ -34,7 +34,7 @@ class Log:
     def run(self, seconds: float, is_on: bool = True) -> None:
         for _ in range(round(seconds / 0.02)):
             self.now += 0.02
-            self.log.give(Step(), self.moment)
+            self.log.give(StepInput(), self.moment)
             self.log.step(self.moment, is_on)
 
     @property
@@ -69,9 +69,9 @@ def test_the_end_is_said_too():
 
 def test_each_input_has_its_moment_and_gives_the_same_again():
     log = Log()
-    log.log.give(Link(True, ""), log.moment)
+    log.log.give(LinkInput(True, ""), log.moment)
     log.run(2.0)
-    log.log.give(Scene(3, 4), log.moment)
+    log.log.give(SceneInput(3, 4), log.moment)
     log.log.finish()
     again = GatewayCore(rm1(), BEGAN.session, BEGAN.parameters)
     others = GatewayCore(rm1(), BEGAN.session, BEGAN.parameters)
@@ -106,5 +106,5 @@ def test_the_input_that_ends_the_core_is_said_before_its_error(monkeypatch):
 
     monkeypatch.setattr(log.core, "on_link", broken)
     with pytest.raises(ZeroDivisionError):
-        log.log.give(Link(False, "gone"), log.moment)
-    assert log.inputs[-1].input == Link(False, "gone")
+        log.log.give(LinkInput(False, "gone"), log.moment)
+    assert log.inputs[-1].input == LinkInput(False, "gone")

@@ -25,7 +25,7 @@ from services.runtime.endpoints import info_request
 from services.runtime.node import Node
 from services.runtime.process.shutdown import ShutdownRequest
 from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import Began
+from services.stepper_gateway.inputs import BeganInput
 from services.stepper_gateway.ledger.ledger_file import LedgerFile
 from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.shell import Shell
@@ -49,7 +49,7 @@ def client(tmp_path: Path) -> Iterator[MemoryBus]:
         parameters = node.parameters(GatewayParameters)
         file = stack.enter_context(closing(LedgerFile(tmp_path / "run", "rm1", node.log.warning)))
         core = GatewayCore(load_arm(ROOT / "urdf/rm1"), 1, parameters.value)
-        shell = Shell(node, core, Began(1, parameters.value), parameters, file)
+        shell = Shell(node, core, BeganInput(1, parameters.value), parameters, file)
         stack.enter_context(spinning(node, shell.step))
         yield stack.enter_context(closing(MemoryBus(network)))
 

@@ -17,7 +17,7 @@ FAR, TURNED = 0.1, pi / 4  # [m], [rad] chosen: to a goal so far away, as by a c
 
 
 @dataclass(frozen=True)
-class Goal:
+class GoalState:
     """Where the arm is to go, and what is wrong with that; `problem` is of `joints`, or of `wanted`."""
 
     joints: Mapping[str, float]  # [rad] or [m]
@@ -56,7 +56,7 @@ class GoalSolver:
         self.turns = tool_turns(arm.description)  # what the gizmo offers
         self.solved = 0  # wishes that were answered
         joints = arm.joints
-        self.goal = Goal(joints, arm.fk(joints))
+        self.goal = GoalState(joints, arm.fk(joints))
         self._thread = threading.Thread(target=self._run, name="goal", daemon=True)
         self._thread.start()
 
@@ -115,15 +115,15 @@ class GoalSolver:
                     self.goal = replace(goal, version=self.goal.version + 1, source=wish.source)
             self._on_change()
 
-    def _checked(self, before: Goal, wish: JointsWish) -> Goal:
+    def _checked(self, before: GoalState, wish: JointsWish) -> GoalState:
         """The configuration of the sliders, which is shown also where it cannot be."""
         try:
             pose = self._arm.fk(wish.joints)
         except Exception as error:
             return replace(before, problem=problem_of(error))
-        return Goal(wish.joints, pose, self._problem_at(wish.joints))
+        return GoalState(wish.joints, pose, self._problem_at(wish.joints))
 
-    def _followed(self, before: Goal, wish: PoseWish) -> Goal:
+    def _followed(self, before: GoalState, wish: PoseWish) -> GoalState:
         """The nearest configuration for the gizmo's pose; where there is none, the goal stays and says why."""
         target = self._target(wish)
         try:
@@ -141,14 +141,16 @@ class GoalSolver:
             return replace(before, problem=problem, wanted=wish.pose, jumped=())
         return self._arrived(before, joints, wish, self._problem_at(joints) or problem)
 
-    def _arrived(self, before: Goal, joints: Mapping[str, float], wish: PoseWish, problem: Problem | None) -> Goal:
+    def _arrived(
+        self, before: GoalState, joints: Mapping[str, float], wish: PoseWish, problem: Problem | None
+    ) -> GoalState:
         units = {joint.name: joint.unit for joint in self._arm.description.joints}
         is_far = dist(before.pose.position, wish.pose.position) > FAR or (
             wish.is_turned and _angle(before.pose, wish.pose) > TURNED
         )
         jumped = [name for name, at in joints.items() if abs(at - before.joints[name]) > JUMP[units[name]]]
         pose = wish.pose if wish.is_turned else self._arm.fk(joints)
-        return Goal(joints, pose, problem, None, () if is_far else tuple(jumped))
+        return GoalState(joints, pose, problem, None, () if is_far else tuple(jumped))
 
     def _target(self, wish: PoseWish) -> gemelo.ToolGoal:
         return gemelo.ToolGoal(pose=wish.pose) if wish.is_turned else gemelo.ToolGoal(position=wish.pose.position)

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import gemelo
 from services.panel.model.jogging import Jogging, JogWish
-from services.panel.model.readings import Bus
+from services.panel.model.readings import BusReadings
 
 PERIOD = 0.02  # [s] between two speeds
 GAIN = 4.0  # [1/s] chosen: with the 0.1 s from a jog command to its motion it does not overshoot
@@ -22,7 +22,7 @@ NEAR = {"rad": 0.001, "m": 0.0002}  # chosen: what is missing at the end, about 
 class LiveSliders:
     """Off at first, and after every Stop or refusal."""
 
-    def __init__(self, arm: gemelo.Arm, jogging: Jogging, bus: Bus) -> None:
+    def __init__(self, arm: gemelo.Arm, jogging: Jogging, bus: BusReadings) -> None:
         self._joints, self._jogging, self._bus = arm.description.joints, jogging, bus
         self._news = threading.Condition()
         self._target: Mapping[str, float] = {}

@@ -16,7 +16,7 @@ from services.panel.model.live import LiveSliders
 from services.panel.model.motions import MotionChoice, Motions
 from services.panel.model.picks import Picks
 from services.panel.model.problems import Problem, problem_of
-from services.panel.model.readings import Bus
+from services.panel.model.readings import BusReadings
 from services.panel.model.stop_lane import StopLane
 from services.panel.model.teaching import Teaching
 
@@ -38,7 +38,7 @@ class Operator:
 
     def __init__(self, arm: gemelo.Arm) -> None:
         self._changed = threading.Event()
-        self.arm, self.bus = arm, Bus(arm, self.wake)
+        self.arm, self.bus = arm, BusReadings(arm, self.wake)
         cell = deployed_cell(arm.deployment)
         self.cameras = CameraPictures(arm, cell.camera_names)
         self.picks = Picks(arm, cell, self.tell, self.wake)

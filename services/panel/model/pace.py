@@ -7,7 +7,7 @@ UNSEEN = 1e-5  # [rad] or [m] less of a joint is not drawn anew
 EARLY = 0.01  # [s] half the time between two joint states, so that each picture is of one that has just come
 
 
-class Pace:
+class DrawPace:
     """One thread asks with every joint state, another one says what it has drawn.
 
     Nothing is due while the arm stands; its first move, and the place where it ends, are drawn as soon as they may.

@@ -21,7 +21,7 @@ from schemas.scene import Contacts, PlanningScene, SceneObject
 from schemas.system import LogRecord
 from schemas.topics import Topic
 from services.arm.model.gripper import jaw_objects, jaws_apart
-from services.panel.model.pace import Pace
+from services.panel.model.pace import DrawPace
 from services.runtime.topics import Latest
 
 M = TypeVar("M", bound=Message)
@@ -57,13 +57,13 @@ class Readings:
         return self.state is not None and any(abs(speed) >= 1.0 for speed in self.state.velocity)
 
 
-class Bus:
+class BusReadings:
     """Subscriptions of one connection. Any thread may read."""
 
     def __init__(self, arm: gemelo.Arm, on_moved: Callable[[], object]) -> None:
         """`on_moved` is called with a joint state of which a picture is due."""
         node, topics = arm.node, gemelo.topics
-        self._arm, self._on_moved, self.pace = arm, on_moved, Pace()
+        self._arm, self._on_moved, self.pace = arm, on_moved, DrawPace()
         self._joints, self._commands = Latest(topics.JOINT_STATES), self._shown(topics.JOINT_COMMANDS)
         node.subscribe(topics.JOINT_STATES, self._on_joints)
         self._shaft = self._shown(topics.DEVICE_SHAFT)

@@ -22,7 +22,7 @@ DOT = 0.008  # [m] radius of a contact
 NodeOf = Callable[[str], str]  # the scene's node that moves with a link
 
 
-class Obstacles:
+class DrawnObstacles:
     """Draws what has changed only; `folders` are where mesh files are looked for."""
 
     def __init__(self, server: viser.ViserServer, folders: Sequence[Path]) -> None:

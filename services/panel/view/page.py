@@ -26,7 +26,7 @@ from services.panel.view.tabs.programs import ProgramsTab
 from services.panel.view.tabs.scene import SceneTab, require_small
 from services.panel.view.tabs.state import StateTab
 from services.panel.view.tabs.teach import TeachTab
-from services.panel.view.world import World
+from services.panel.view.world import DrawnWorld
 from services.panel.words.words import NAMES, Words, language_of
 
 MARK = 1.0  # [s] between two marks by which a browser's lag is measured
@@ -49,7 +49,7 @@ class Page:
     """Built anew when the language or the colours change."""
 
     def __init__(
-        self, client: viser.ClientHandle, operator: Operator, world: World, arms: tuple[ArmPage, ...] = ()
+        self, client: viser.ClientHandle, operator: Operator, world: DrawnWorld, arms: tuple[ArmPage, ...] = ()
     ) -> None:
         """`arms` are all that have a page, where there are several."""
         self.client, self._operator, self._world, self._arms = client, operator, world, arms

@@ -11,11 +11,11 @@ import numpy as np
 import viser
 
 import gemelo
-from services.panel.model.goal import Goal
+from services.panel.model.goal import GoalState
 from services.panel.model.operator import Operator
 from services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, ToolTurns
 from services.panel.view.arms import Array, DrawnArm
-from services.panel.view.obstacles import Obstacles
+from services.panel.view.obstacles import DrawnObstacles
 from services.runtime.deployment import project_root
 
 GOAL, BAD_GOAL, GHOST = (1.0, 0.62, 0.1, 0.45), (0.9, 0.2, 0.15, 0.5), (0.25, 0.55, 1.0, 0.35)
@@ -31,7 +31,7 @@ FARTHEST = 4.0  # times as far, at most
 GHOST_RATE = 20.0  # [Hz] of the plan that is played
 
 
-class World:
+class DrawnWorld:
     """Everything drawn under the server's scene; `update` is called again and again, and draws what has changed."""
 
     def __init__(self, server: viser.ViserServer, operator: Operator) -> None:
@@ -42,7 +42,7 @@ class World:
         self._goal = DrawnArm(server, arm, "/goal", GOAL)
         self._bad_goal = DrawnArm(server, arm, "/bad_goal", BAD_GOAL)
         self._ghost = DrawnArm(server, arm, "/ghost", GHOST)
-        self.obstacles = Obstacles(server, (project_root(), arm.folder))
+        self.obstacles = DrawnObstacles(server, (project_root(), arm.folder))
         reach = max(0.3, float(np.linalg.norm(operator.goal.goal.pose.position)))
         self._set_stage(server, reach)
         self._gizmos = self._make_gizmos(0.35 * reach, operator.goal.turns)
@@ -130,7 +130,7 @@ class World:
             source = event.client_id if event.client_id is not None else -1
             self._operator.goal.set_pose(pose, source, is_turned=gizmo is not self._gizmos[0])
 
-    def _show_goal(self, goal: Goal, measured: Mapping[str, float]) -> None:
+    def _show_goal(self, goal: GoalState, measured: Mapping[str, float]) -> None:
         apart = any(abs(at - measured.get(name, at)) > APART for name, at in goal.joints.items())
         is_bad = goal.problem is not None and goal.wanted is None
         self._goal.is_visible = apart and not is_bad

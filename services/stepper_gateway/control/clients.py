@@ -12,7 +12,7 @@ from services.stepper_gateway.goals.rejections import invalid
 TOKEN = re.compile(r"@id/([a-z0-9][a-z0-9_-]{0,63})/[0-9]{20}\.[0-9]{1,10}\.([A-Za-z0-9_-]{1,64})")
 
 
-class Caller(NamedTuple):
+class MotionCaller(NamedTuple):
     """Who asks for a motion: a request names the session, a streamed target the node; empty where it is not known."""
 
     session: str = ""
@@ -28,7 +28,7 @@ class Client:
     host: str
     session: str
 
-    def is_caller(self, caller: Caller) -> bool:
+    def is_caller(self, caller: MotionCaller) -> bool:
         """True if `caller` names this node."""
         if caller.session:
             return caller.session == self.session

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from schemas.control import ControlGive, ControlJoin, ControlState, ControlTake
 from schemas.system import LogLevel
-from services.stepper_gateway.control.clients import Caller, Client, client_of
+from services.stepper_gateway.control.clients import Client, MotionCaller, client_of
 from services.stepper_gateway.goals.rejections import invalid
 from services.stepper_gateway.moment import Moment
 
@@ -40,7 +40,7 @@ class Claim:
         return f"{self.name} (node {self.client.node} on {self.client.host})"
 
 
-class Control:
+class ControlHolder:
     """One holder at a time; a claim waits until the arm rests."""
 
     def __init__(self, robot: str, epoch: int) -> None:
@@ -66,7 +66,7 @@ class Control:
         """Of the present hold, or of the last."""
         return self._number
 
-    def is_claimed_by(self, caller: Caller) -> bool:
+    def is_claimed_by(self, caller: MotionCaller) -> bool:
         """True if `caller` waits for control."""
         return self._claim is not None and self._claim.client.is_caller(caller)
 
@@ -95,7 +95,7 @@ class Control:
             members=tuple(member.node for member in self._members.values()), pending=about.pending,
         )  # fmt: skip
 
-    def objection(self, caller: Caller, moment: Moment) -> str:
+    def objection(self, caller: MotionCaller, moment: Moment) -> str:
         """Why `caller` may not move the arm, empty if it may."""
         if self._claim is not None:
             return f"{self._claim.words} is taking control of {self._robot}: nothing moves until the arm rests"

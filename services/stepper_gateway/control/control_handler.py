@@ -11,8 +11,8 @@ from schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlStat
 from schemas.device import DeviceCommandKind, DeviceCommandResponse, DeviceMode
 from schemas.motion import FollowErrorCode
 from schemas.topics import CONTROL
-from services.stepper_gateway.control.clients import Caller
-from services.stepper_gateway.control.control import Control
+from services.stepper_gateway.control.clients import MotionCaller
+from services.stepper_gateway.control.control import ControlHolder
 from services.stepper_gateway.device.command_handler import CommandHandler
 from services.stepper_gateway.device.gateway_device import GatewayDevice
 from services.stepper_gateway.goals.goal_executor import GoalExecutor, GoalVerdict
@@ -27,7 +27,7 @@ STOP_AGAIN = 0.5  # [s] between two stops for an arm that does not come to rest;
 COMPLAINT = 1.0  # [s] between two words on streamed targets that are refused; chosen: the log stays readable
 IN_MOTION = (DeviceMode.RUN, DeviceMode.HOLD, DeviceMode.HOMING)
 STARTING = (DeviceCommandKind.HOME, DeviceCommandKind.RESUME)  # what they start begins with the device's answer
-NOBODY = Caller()
+NOBODY = MotionCaller()
 
 
 class Movers(Protocol):
@@ -46,7 +46,7 @@ class ControlHandler:
 
     def __init__(self, movers: Movers, robot: str, epoch: int) -> None:
         self._movers, self._device = movers, movers.device
-        self._control = Control(robot, epoch)
+        self._control = ControlHolder(robot, epoch)
         self._epoch = epoch
         self._mover = NOBODY  # who has moved the arm last
         self._stopped = -1.0e9  # [s] monotonic, when the arm was stopped last for a change of control
@@ -58,16 +58,16 @@ class ControlHandler:
         """Keys of the liveliness tokens whose absence counts."""
         return self._control.watched
 
-    def objection(self, caller: Caller, moment: Moment) -> str:
+    def objection(self, caller: MotionCaller, moment: Moment) -> str:
         """Why `caller` may not move the arm, nor change how it moves; empty if it may."""
         return self._control.objection(caller, moment)
 
-    def verdict(self, caller: Caller, moment: Moment) -> GoalVerdict | None:
+    def verdict(self, caller: MotionCaller, moment: Moment) -> GoalVerdict | None:
         """The refusal of a goal of `caller`; None if it may move the arm."""
         objection = self._control.objection(caller, moment)
         return GoalVerdict(False, FollowErrorCode.NOT_IN_CONTROL, objection) if objection else None
 
-    def permits_targets(self, caller: Caller, moment: Moment) -> bool:
+    def permits_targets(self, caller: MotionCaller, moment: Moment) -> bool:
         """True if `caller` may stream targets; else it is told why, once a second at most."""
         objection = self._control.objection(caller, moment)
         if not objection:
@@ -77,7 +77,7 @@ class ControlHandler:
             self._device.event("target_refused", objection, moment, client=caller.node)
         return not objection
 
-    def permits_command(self, caller: Caller, ticket: int, moment: Moment) -> bool:
+    def permits_command(self, caller: MotionCaller, ticket: int, moment: Moment) -> bool:
         """True if `caller` may command the device; else the answer is given."""
         objection = self._control.objection(caller, moment)
         if objection:
@@ -85,7 +85,7 @@ class ControlHandler:
             self._device.out.put(Answer(ticket, response))
         return not objection
 
-    def note_mover(self, caller: Caller) -> None:
+    def note_mover(self, caller: MotionCaller) -> None:
         """`caller` moves the arm from now on."""
         self._mover = caller
 

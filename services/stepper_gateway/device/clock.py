@@ -20,7 +20,7 @@ MOST_DRIFT = 2e-4  # of a clock; chosen: twice what a crystal's data sheet allow
 STEADY = 1000.0  # [us] that two clocks may part beyond any drift; chosen: a slot of the device, which stamps by slots
 
 
-class Exchange(NamedTuple):
+class SyncExchange(NamedTuple):
     """One SYNC and its reply."""
 
     asked: int  # [us] of our monotonic clock, when the SYNC was sent
@@ -29,7 +29,7 @@ class Exchange(NamedTuple):
     round_trip: float  # [us] without the device's own thinking time
 
 
-class Line(NamedTuple):
+class ClockLine(NamedTuple):
     """The offset as it was at `at`, and how it changes."""
 
     at: float  # [us]
@@ -41,9 +41,9 @@ class ClockSync:
     """Maps between our monotonic clock and the microseconds since the device's boot."""
 
     def __init__(self) -> None:
-        self._exchanges: deque[Exchange] = deque(maxlen=WINDOW)
-        self._contradicting: deque[Exchange] = deque(maxlen=WINDOW)  # since the last that agreed
-        self._line = Line(0.0, 0.0, 0.0)
+        self._exchanges: deque[SyncExchange] = deque(maxlen=WINDOW)
+        self._contradicting: deque[SyncExchange] = deque(maxlen=WINDOW)  # since the last that agreed
+        self._line = ClockLine(0.0, 0.0, 0.0)
 
     def reset(self) -> None:
         """Forget everything: another boot is another clock."""
@@ -55,7 +55,7 @@ class ClockSync:
         round_trip = (t3 - t0) - (t2 - t1)
         if round_trip < 0 or t2 < t1:
             return False
-        exchange = Exchange(t0, (t0 + t3) / 2.0, ((t1 - t0) + (t2 - t3)) / 2.0, round_trip)
+        exchange = SyncExchange(t0, (t0 + t3) / 2.0, ((t1 - t0) + (t2 - t3)) / 2.0, round_trip)
         if self._exchanges and not _agree(exchange, min(self._exchanges, key=lambda one: one.round_trip)):
             if not self._begin_anew(exchange):
                 return False
@@ -65,7 +65,7 @@ class ClockSync:
         self._line = _line(self._exchanges)
         return True
 
-    def _begin_anew(self, exchange: Exchange) -> bool:
+    def _begin_anew(self, exchange: SyncExchange) -> bool:
         """Go on with what agrees with `exchange`, if that is enough or nothing is known yet; else put it aside."""
         known = sorted((*self._exchanges, *self._contradicting), key=lambda one: one.at)
         # A quartz that drifts beyond its data sheet contradicts the old exchanges only: the young ones still tell.
@@ -118,16 +118,16 @@ class ClockSync:
         return min(self.monotonic(device_us), arrival) if self.is_synchronised else arrival
 
 
-def _line(exchanges: deque[Exchange]) -> Line:
+def _line(exchanges: deque[SyncExchange]) -> ClockLine:
     shortest = min(exchange.round_trip for exchange in exchanges)
     weights = [(1.0 + (exchange.round_trip - shortest) / QUICK) ** -2 for exchange in exchanges]
     total = sum(weights)
     at = sum(w * exchange.at for w, exchange in zip(weights, exchanges, strict=True)) / total
     offset = sum(w * exchange.offset for w, exchange in zip(weights, exchanges, strict=True)) / total
-    return Line(at, offset, _drift(exchanges, weights, at, offset))
+    return ClockLine(at, offset, _drift(exchanges, weights, at, offset))
 
 
-def _drift(exchanges: deque[Exchange], weights: list[float], at: float, offset: float) -> float:
+def _drift(exchanges: deque[SyncExchange], weights: list[float], at: float, offset: float) -> float:
     if exchanges[-1].at - exchanges[0].at < SPAN:
         return 0.0
     spread = product = 0.0
@@ -137,7 +137,7 @@ def _drift(exchanges: deque[Exchange], weights: list[float], at: float, offset: 
     return max(-MOST_DRIFT, min(MOST_DRIFT, product / spread)) if spread > 0.0 else 0.0
 
 
-def _agree(first: Exchange, second: Exchange) -> bool:
+def _agree(first: SyncExchange, second: SyncExchange) -> bool:
     """True if one clock can explain both: each is wrong by half its round trip at most.
 
     It cannot when this machine has slept meanwhile, as its monotonic clock stands still then.

@@ -7,7 +7,7 @@ from schemas.system import LogLevel
 from schemas.topics import DEVICE_SHAFT, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS
 from services.stepper_gateway.components import Components
 from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.links.frames import Ack, BadFrame, CommandReply, State, SyncReply, decode
+from services.stepper_gateway.links.frames import Ack, BadFrame, CommandReply, StateFrame, SyncReply, decode
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.links.reports import (
     ConfigAckReport,
@@ -65,7 +65,7 @@ class FrameHandler:
     def _on_frame(self, received: Received, arrival: float, moment: Moment) -> None:
         frame = decode(received.payload)
         match received.kind, frame:
-            case Kind.STATE, State():
+            case Kind.STATE, StateFrame():
                 self._on_state(frame, arrival, moment)
             case Kind.TRAJ_ACK, Ack():
                 self._device.session.require_known(frame)
@@ -81,7 +81,7 @@ class FrameHandler:
                 self._device.session.on_reply(frame)
                 self._components.command_handler.on_reply(frame, moment)
             case _:
-                raise BadFrame(f"a {type(frame).__name__} frame does not belong there")
+                raise BadFrame(f"a {type(frame).__name__.removesuffix('Frame')} frame does not belong there")
 
     def _on_status(self, status: StatusReport, moment: Moment) -> None:
         device = self._device
@@ -112,7 +112,7 @@ class FrameHandler:
         measured = self._device.session.clock.measured(report.t_us, arrival)
         self._device.out.publish(DEVICE_SHAFT, self._device.reporter.shaft(report, moment.unix_at(measured)))
 
-    def _on_state(self, state: State, arrival: float, moment: Moment) -> None:
+    def _on_state(self, state: StateFrame, arrival: float, moment: Moment) -> None:
         device, controller = self._device, self._controller
         is_news, is_reboot = device.session.on_state(state, arrival, device.parameters.state_timeout)
         if is_reboot:
@@ -142,7 +142,7 @@ class FrameHandler:
         self._components.stop_foreign_motion(moment)
         self._components.command_handler.tell_shown(moment)
 
-    def _publish(self, state: State, point: PathPoint, moment: Moment) -> None:
+    def _publish(self, state: StateFrame, point: PathPoint, moment: Moment) -> None:
         reporter = self._device.reporter
         stamp = self._publish_device(state, moment)
         is_open_loop = self._device.session.is_open_loop
@@ -151,7 +151,7 @@ class FrameHandler:
         if not is_open_loop:  # else nobody knows them
             self._device.out.publish(STEP_ERRORS, reporter.step_errors(point, state, stamp))
 
-    def _publish_device(self, state: State, moment: Moment) -> int:
+    def _publish_device(self, state: StateFrame, moment: Moment) -> int:
         """The state's stamp [ns]."""
         session = self._device.session
         stamp = moment.unix_at(session.clock.measured(state.t_us, session.state_arrival))

@@ -11,7 +11,7 @@ from services.stepper_gateway.device.pending_commands import PendingCommands
 from services.stepper_gateway.device.readiness import not_ready_reason
 from services.stepper_gateway.device.reporting import Reporter
 from services.stepper_gateway.device.session import DeviceSession
-from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.links.frames import StateFrame
 from services.stepper_gateway.links.reports import StatusReport
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Outbox
@@ -35,7 +35,7 @@ class GatewayDevice:
         self.reporter = Reporter(arm)
 
     @property
-    def state(self) -> State | None:
+    def state(self) -> StateFrame | None:
         """The latest state of the arm's joints; None before the first."""
         return self.session.state
 

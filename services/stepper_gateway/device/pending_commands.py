@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from schemas.device import DeviceCommandKind
 from services.stepper_gateway.device.clock import ClockSync
-from services.stepper_gateway.links.frames import ANY_BOOT, NEVER_EXPIRES, Command, CommandReply, State
+from services.stepper_gateway.links.frames import ANY_BOOT, NEVER_EXPIRES, CommandFrame, CommandReply, StateFrame
 from services.stepper_gateway.moment import Moment
 
 RETRY = 0.1  # [s] chosen: five states, as an answer may just be late
@@ -116,7 +116,7 @@ class PendingCommands:
         asked = [c.kind.name for c in self._pending if c.tickets and c.kind in EXCLUSIVE]
         return f"the device has not answered {asked[0]} yet: wait a moment" if asked else ""
 
-    def due(self, moment: Moment, clock: ClockSync, boot_id: int, is_reachable: bool) -> list[Command]:
+    def due(self, moment: Moment, clock: ClockSync, boot_id: int, is_reachable: bool) -> list[CommandFrame]:
         """The frames to send now; to a device that is not reachable, or not known, only those that stop it."""
         frames = []
         for command in self._pending:
@@ -126,7 +126,7 @@ class PendingCommands:
                 command.times_sent += 1
                 command.needs_clock &= is_reachable  # one that is silent may read it whenever it wakes
                 frames.append(
-                    Command(
+                    CommandFrame(
                         boot_id=boot_id if command.needs_boot else ANY_BOOT,
                         cmd_id=command.cmd_id,
                         expires_us=self._expiry(command, moment, clock),
@@ -143,7 +143,7 @@ class PendingCommands:
         unanswered = (c for c in self._pending if c.answer is None)
         return next((c for c in unanswered if c.cmd_id == reply.cmd_id and c.kind == reply.cmd), None)
 
-    def shown(self, state: State | None, moment: Moment) -> list[tuple[PendingCommand, CommandReply]]:
+    def shown(self, state: StateFrame | None, moment: Moment) -> list[tuple[PendingCommand, CommandReply]]:
         """Accepted commands whose effect `state` shows, or that have waited for one long enough; they are over."""
         told = []
         for command in self._pending:
@@ -186,6 +186,6 @@ class PendingCommands:
         return clock.device_time(moment.monotonic) + TIME_TO_LIVE
 
 
-def _is_since(state: State | None, reply: CommandReply) -> bool:
+def _is_since(state: StateFrame | None, reply: CommandReply) -> bool:
     """True if the device measured `state` after it had answered."""
     return state is not None and state.boot_id == reply.boot_id and state.t_us > reply.t_us

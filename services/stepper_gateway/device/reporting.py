@@ -8,7 +8,7 @@ from schemas.message import Vector
 from services.arm.model.description import Arm, Joint
 from services.stepper_gateway.device.clock import ClockSync
 from services.stepper_gateway.device.readiness import input_names, joint_name
-from services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, State, StateFlag, code_name
+from services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, StateFlag, StateFrame, code_name
 from services.stepper_gateway.links.reports import ShaftReport
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.commanded_path import PathPoint
@@ -38,7 +38,7 @@ class Reporter:
     def _rates(self, rates: tuple[float, ...], scale: float = 1.0) -> Vector:
         return tuple(rate * scale / joint.steps.per_unit for joint, rate in zip(self._joints, rates, strict=True))
 
-    def joint_state(self, state: State, stamp: int, is_open_loop: bool = False) -> JointState:
+    def joint_state(self, state: StateFrame, stamp: int, is_open_loop: bool = False) -> JointState:
         """The measured joints; in open loop what was sent, and marked as that."""
         return JointState(
             stamp=stamp,
@@ -48,7 +48,7 @@ class Reporter:
             commanded=is_open_loop,
         )
 
-    def joint_command(self, point: PathPoint, state: State, stamp: int) -> JointState:
+    def joint_command(self, point: PathPoint, state: StateFrame, stamp: int) -> JointState:
         """Positions [rad] or [m] and velocities [rad/s] or [m/s] that the path asks for at the same instant."""
         return JointState(
             stamp=stamp,
@@ -57,7 +57,7 @@ class Reporter:
             velocity=self._rates(point.rate, state.time_scale),
         )
 
-    def step_errors(self, point: PathPoint, state: State, stamp: int) -> StepErrors:
+    def step_errors(self, point: PathPoint, state: StateFrame, stamp: int) -> StepErrors:
         """Commanded minus executed [steps]."""
         error = tuple(wanted - done for wanted, done in zip(point.steps, state.steps, strict=True))
         self._max_error = [max(a, abs(b)) for a, b in zip(self._max_error, error, strict=True)]
@@ -70,7 +70,7 @@ class Reporter:
             max_error=tuple(self._max_error),
         )
 
-    def device_state(self, state: State, stamp: int, clock: ClockSync) -> DeviceState:
+    def device_state(self, state: StateFrame, stamp: int, clock: ClockSync) -> DeviceState:
         """Everything else that the device said."""
         return DeviceState(
             stamp=stamp,

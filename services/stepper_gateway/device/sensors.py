@@ -15,7 +15,7 @@ SILENCE = 2.0  # [s] without readings until nothing is republished; chosen: twen
 PERIOD = 0.1  # [s] between two messages; chosen: smooth for a person's eye, and a sonar is hardly faster
 
 
-class Readings(NamedTuple):
+class LatestReadings(NamedTuple):
     """The newest readings and when they came."""
 
     values: dict[str, float]
@@ -29,7 +29,7 @@ class SensorRelay:
     def __init__(self, device: GatewayDevice) -> None:
         self._device = device
         self._units = {sensor.name: sensor.unit for sensor in device.arm.sensors}
-        self._readings: Readings | None = None
+        self._readings: LatestReadings | None = None
         self._present_since: float | None = None  # [s] monotonic, of the device
         self._due = 0.0  # [s] monotonic
         self._is_silent = False
@@ -38,7 +38,7 @@ class SensorRelay:
         """Take what the board has measured; `arrival` [s] monotonic."""
         known = {name: value for name, value in report.values.items() if name in self._units}
         measured = self._device.session.clock.measured(report.t_us, arrival)
-        self._readings = Readings(known, moment.unix_at(measured), arrival)
+        self._readings = LatestReadings(known, moment.unix_at(measured), arrival)
         if self._is_silent:
             self._is_silent = False
             self._device.event("sensors_back", "the sensors report again", moment, LogLevel.INFO)
@@ -69,7 +69,7 @@ class SensorRelay:
             detail = f"no reading of {names} for {SILENCE:g} s: check the board's network and the sensors' wires"
             self._device.event("sensors_silent", detail, moment)
 
-    def _publish(self, readings: Readings) -> None:
+    def _publish(self, readings: LatestReadings) -> None:
         names = tuple(name for name in self._units if name in readings.values)
         self._device.out.publish(
             SENSORS,

@@ -13,12 +13,12 @@ from services.stepper_gateway.links.frames import (
     NEVER_EXPIRES,
     BadFrame,
     Code,
-    Command,
+    CommandFrame,
     CommandReply,
     Frame,
     Heartbeat,
-    State,
     StateFlag,
+    StateFrame,
     Sync,
     SyncReply,
 )
@@ -62,7 +62,7 @@ class DeviceSession:
         self._questions: deque[int] = deque(maxlen=QUESTIONS)  # [us] SYNCs that may be answered
         self.link_up = False
         self.link_reason = "no connection yet"
-        self.latest: State | None = None  # of any number of joints
+        self.latest: StateFrame | None = None  # of any number of joints
         self.state_arrival = -1.0e9  # [s] monotonic
         self.boot_id = 0
         self.clock = ClockSync()
@@ -78,7 +78,7 @@ class DeviceSession:
         return self.status is not None and self.status.open_loop
 
     @property
-    def state(self) -> State | None:
+    def state(self) -> StateFrame | None:
         """The latest state, if it is one of this arm."""
         return self.latest if self.latest is not None and self.fits(self.latest) else None
 
@@ -87,7 +87,7 @@ class DeviceSession:
         """True if the drivers are energised."""
         return self.latest is not None and bool(self.latest.flags & StateFlag.ARMED)
 
-    def fits(self, state: State) -> bool:
+    def fits(self, state: StateFrame) -> bool:
         """True if the state has this arm's joints; a device with another configuration has others."""
         return len(state.steps) == self._joints
 
@@ -124,7 +124,7 @@ class DeviceSession:
         if len(self._reports) > OLD_BOOTS:
             del self._reports[next(boot for boot in self._reports if boot != self.boot_id)]
 
-    def on_state(self, state: State, arrival: float, timeout: float) -> tuple[bool, bool]:
+    def on_state(self, state: StateFrame, arrival: float, timeout: float) -> tuple[bool, bool]:
         """(is it news, does it tell of a new boot); raises `BadFrame` for one that no device says.
 
         `arrival` [s] monotonic; states older than `timeout` [s] count as a pause.
@@ -188,9 +188,9 @@ class DeviceSession:
         self._heartbeat_due, self._beats_since = 0.0, moment.monotonic
         return True
 
-    def due(self, moment: Moment) -> list[Heartbeat | Sync | Command]:
+    def due(self, moment: Moment) -> list[Heartbeat | Sync | CommandFrame]:
         """Heartbeat, clock and status frames to send now; called by the control loop itself."""
-        frames: list[Heartbeat | Sync | Command] = []
+        frames: list[Heartbeat | Sync | CommandFrame] = []
         if not self.link_up:
             return frames
         if moment.monotonic >= self._heartbeat_due:
@@ -209,7 +209,9 @@ class DeviceSession:
             self._status_due = moment.monotonic + ASK_STATUS
             self._status_id = (self._status_id + 1) & 0xFFFFFFFF
             kind = DeviceCommandKind.STATUS
-            frames.append(Command(boot_id=self.boot_id, cmd_id=self._status_id, expires_us=NEVER_EXPIRES, cmd=kind))
+            frames.append(
+                CommandFrame(boot_id=self.boot_id, cmd_id=self._status_id, expires_us=NEVER_EXPIRES, cmd=kind)
+            )
         return frames
 
     def _lacks_status(self, moment: Moment) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from schemas.device import DeviceMode
-from services.stepper_gateway.links.frames import BadFrame, State
+from services.stepper_gateway.links.frames import BadFrame, StateFrame
 
 MOST_HASTE = 2000  # [us] by which more of the path may be played than time has passed; chosen: a slot, and again
 STRANGERS = 3  # states in a row of another boot while the present one is not silent; chosen: no single frame does it
@@ -14,10 +14,10 @@ class StateChecks:
     """Checks the states of a device that is not silent."""
 
     def __init__(self) -> None:
-        self._refused: State | None = None  # that did not follow from the latest
-        self._strangers: list[State] = []  # in a row, of one boot that is not the present one
+        self._refused: StateFrame | None = None  # that did not follow from the latest
+        self._strangers: list[StateFrame] = []  # in a row, of one boot that is not the present one
 
-    def require_steady(self, before: State | None, state: State) -> None:
+    def require_steady(self, before: StateFrame | None, state: StateFrame) -> None:
         """Raises `BadFrame` for a state of the present boot whose path is played faster than time, or backwards.
 
         The one before may have been wrong: then the next one follows from what was refused.
@@ -31,7 +31,7 @@ class StateChecks:
             raise BadFrame(objection)
         self._refused = None
 
-    def require_in_a_row(self, present: State, state: State) -> None:
+    def require_in_a_row(self, present: StateFrame, state: StateFrame) -> None:
         """Raises `BadFrame` until states of another boot come in a row, with none of the present one between them."""
         if self._strangers and self._strangers[-1].boot_id != state.boot_id:
             self._strangers.clear()
@@ -41,7 +41,7 @@ class StateChecks:
             raise BadFrame(f"a state of boot {state.boot_id}, while boot {present.boot_id} lives")
 
 
-def _objection(before: State, state: State) -> str:
+def _objection(before: StateFrame, state: StateFrame) -> str:
     """Why no device says `state` after `before`; empty if it may."""
     passed = state.t_us - before.t_us
     played = state.play_us - (before.play_us if state.stream == before.stream else 0)

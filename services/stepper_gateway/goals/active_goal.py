@@ -17,7 +17,7 @@ from schemas.motion import (
 )
 from services.arm.model.description import Joint
 from services.stepper_gateway.goals.goal_validator import MotionStart, ValidatedGoal
-from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.links.frames import StateFrame
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.commanded_path import PathPoint
 from services.stepper_gateway.motion.stream import Stream
@@ -70,7 +70,7 @@ class ActiveGoal:
         """Stream time at which it ends."""
         return self.start_us + self.duration_us
 
-    def follow(self, point: PathPoint, state: State) -> GoalEnding | None:
+    def follow(self, point: PathPoint, state: StateFrame) -> GoalEnding | None:
         """Take a state and the path [steps] at its instant; an ending if the arm has strayed from the path."""
         self.commanded = point.steps
         if state.play_us < self.start_us:
@@ -88,7 +88,7 @@ class ActiveGoal:
                 )
         return self._too_fast_or_slow(point, state)
 
-    def _too_fast_or_slow(self, point: PathPoint, state: State) -> GoalEnding | None:
+    def _too_fast_or_slow(self, point: PathPoint, state: StateFrame) -> GoalEnding | None:
         """An ending if a joint's velocity has left the path tolerance."""
         scale = state.time_scale
         rows = zip(self.joints, point.rate, state.velocity, self.goal.path_tolerance.velocity, strict=True)
@@ -104,7 +104,7 @@ class ActiveGoal:
                 )
         return None
 
-    def account(self, ending: GoalEnding, state: State | None, now: float) -> str:
+    def account(self, ending: GoalEnding, state: StateFrame | None, now: float) -> str:
         """A sentence for the log at `now` [s] monotonic: what moved where, how long, with what error, why it ended."""
         said = f"goal {self.goal_id} {ending.status.name.lower()} after {now - self.accepted.monotonic:.2f} s"
         if ending.reason:
@@ -120,11 +120,11 @@ class ActiveGoal:
         off = max(errors)
         return f"{said}; {moves}; {off:.2f} steps from the goal at most ({self.joints[errors.index(off)].name})"
 
-    def goal_errors(self, state: State) -> list[float]:
+    def goal_errors(self, state: StateFrame) -> list[float]:
         """[steps] goal minus executed."""
         return [wanted - done for wanted, done in zip(self.target_steps, state.steps, strict=True)]
 
-    def passing_error(self, point: PathPoint, state: State) -> GoalEnding | None:
+    def passing_error(self, point: PathPoint, state: StateFrame) -> GoalEnding | None:
         """The arm goes on past its end: an ending if it was not on its path there, to the goal tolerance."""
         bounds = self.goal.goal_tolerance.position
         for joint, wanted, done, bound in zip(self.joints, point.steps, state.steps, bounds, strict=True):
@@ -137,20 +137,20 @@ class ActiveGoal:
                 )
         return None
 
-    def _final_errors(self, state: State) -> list[float]:
+    def _final_errors(self, state: StateFrame) -> list[float]:
         """[steps] goal minus executed, or commanded minus executed where the arm has gone on."""
         if not self.is_passed:
             return self.goal_errors(state)
         return [wanted - done for wanted, done in zip(self.commanded, state.steps, strict=True)]
 
-    def is_reached(self, state: State) -> bool:
+    def is_reached(self, state: StateFrame) -> bool:
         """True if the executed steps and the velocities are within the goal tolerance."""
         tolerance = self.goal.goal_tolerance
         places = zip(self.goal_errors(state), tolerance.position, strict=True)
         speeds = zip(state.velocity, tolerance.velocity, strict=True)
         return all(bound is None or abs(error) <= bound for error, bound in (*places, *speeds))
 
-    def late(self, state: State, now: float) -> GoalEnding:
+    def late(self, state: StateFrame, now: float) -> GoalEnding:
         """The ending for a goal that was not reached by `now` [s] monotonic."""
         errors = self.goal_errors(state)
         bounds = [math.inf if bound is None else bound for bound in self.goal.goal_tolerance.position]
@@ -165,11 +165,11 @@ class ActiveGoal:
             f"{self.elapsed(state):.2f} s far",
         )
 
-    def elapsed(self, state: State) -> float:
+    def elapsed(self, state: StateFrame) -> float:
         """[s] along the goal's own trajectory."""
         return min(max(0, state.play_us - self.start_us), self.duration_us) * 1e-6
 
-    def feedback(self, point: PathPoint, state: State, positions: tuple[Vector, Vector], stamp: int) -> (
+    def feedback(self, point: PathPoint, state: StateFrame, positions: tuple[Vector, Vector], stamp: int) -> (
         FollowJointTrajectoryFeedback
     ):  # fmt: skip
         """`positions`: commanded and executed [rad] or [m]."""
@@ -197,7 +197,7 @@ class ActiveGoal:
             duration=self.duration_us * 1e-6,
         )
 
-    def result(self, ending: GoalEnding, state: State | None, now: float) -> FollowJointTrajectoryResult:
+    def result(self, ending: GoalEnding, state: StateFrame | None, now: float) -> FollowJointTrajectoryResult:
         """What the client gets at `now` [s]; without a state the steps stay empty."""
         return FollowJointTrajectoryResult(
             error_code=ending.code,

@@ -15,7 +15,7 @@ from services.stepper_gateway.goals.goal_validator import GoalValidator, Validat
 from services.stepper_gateway.goals.next_goal import CANCELED, NextGoal
 from services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from services.stepper_gateway.goals.scene_versions import PlannedIn, SceneVersions
-from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.links.frames import StateFrame
 from services.stepper_gateway.moment import Moment, next_beat
 from services.stepper_gateway.motion.commanded_path import PathPoint
 from services.stepper_gateway.motion.knot_sources import PathKnots
@@ -140,7 +140,7 @@ class GoalExecutor:
             execution.is_executing = True
             self._device.out.put(GoalExecuting(execution.goal_id))
 
-    def on_state(self, state: State, point: PathPoint, moment: Moment) -> None:
+    def on_state(self, state: StateFrame, point: PathPoint, moment: Moment) -> None:
         """Check the goal's tolerances, report progress, and see whether it is done.
 
         `point` is the path [steps] at the instant of `state`.
@@ -196,7 +196,7 @@ class GoalExecutor:
             self._next.take_away()
             self._finish(goal, GoalEnding(GoalStatusCode.ABORTED, rejected.code, rejected.reason), moment)
 
-    def _follow(self, execution: ActiveGoal, state: State, point: PathPoint, moment: Moment) -> None:
+    def _follow(self, execution: ActiveGoal, state: StateFrame, point: PathPoint, moment: Moment) -> None:
         strayed = execution.follow(point, state)
         stream = execution.stream
         if execution.ending is None and strayed is None and self._next.is_due(execution, state):
@@ -211,7 +211,7 @@ class GoalExecutor:
             return self._end(strayed, moment)
         self._report(execution, state, point, moment)
 
-    def _go_on_to_next(self, execution: ActiveGoal, state: State, point: PathPoint, moment: Moment) -> None:
+    def _go_on_to_next(self, execution: ActiveGoal, state: StateFrame, point: PathPoint, moment: Moment) -> None:
         """The arm has passed the end of the present goal on its way to that of the next."""
         execution.is_passed = True
         if (missed := execution.passing_error(point, state)) is not None:
@@ -223,7 +223,7 @@ class GoalExecutor:
         if ending is not None:  # it was cancelled when its knots were on their way
             self._end(ending, moment)
 
-    def _report(self, execution: ActiveGoal, state: State, point: PathPoint, moment: Moment) -> None:
+    def _report(self, execution: ActiveGoal, state: StateFrame, point: PathPoint, moment: Moment) -> None:
         if moment.monotonic < execution.feedback_due or not execution.is_executing:
             return
         period = 1.0 / self._device.parameters.feedback_rate

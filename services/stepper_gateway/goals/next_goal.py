@@ -7,7 +7,7 @@ from schemas.motion import FollowErrorCode
 from services.stepper_gateway.goals.active_goal import ActiveGoal, GoalEnding
 from services.stepper_gateway.goals.goal_validator import MotionStart, ValidatedGoal
 from services.stepper_gateway.goals.rejections import invalid
-from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.links.frames import StateFrame
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.knot_sources import PathKnots
 from services.stepper_gateway.motion.knots import Knot
@@ -81,11 +81,11 @@ class NextGoal:
             self._controller.transmission.follow(None)
         return goal
 
-    def is_due(self, present: ActiveGoal, state: State) -> bool:
+    def is_due(self, present: ActiveGoal, state: StateFrame) -> bool:
         """True if the arm has passed the end of the present goal, and is on the way to this one's."""
         return self.goal is not None and self.goal.stream is not None and state.play_us >= present.end_us
 
-    def begin(self, state: State, moment: Moment) -> ActiveGoal:
+    def begin(self, state: StateFrame, moment: Moment) -> ActiveGoal:
         """It is the present goal from now on, and executing."""
         goal, self.goal = self.goal, None
         assert goal is not None

@@ -16,7 +16,7 @@ from services.stepper_gateway.device.gateway_device import GatewayDevice
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
 from services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from services.stepper_gateway.gripper.jaws import Jaws, jaws_of
-from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.links.frames import StateFrame
 from services.stepper_gateway.links.reports import SensorReport
 from services.stepper_gateway.moment import Moment, next_beat
 from services.stepper_gateway.outputs import GripperExecuting, GripperFinished, GripperProgress
@@ -93,7 +93,7 @@ class GripperExecutor:
         """What was under way is not watched any more."""
         self._end(GoalStatusCode.ABORTED, reason, moment)
 
-    def on_state(self, state: State, moment: Moment) -> None:
+    def on_state(self, state: StateFrame, moment: Moment) -> None:
         """The device has said how its outputs and its servo are."""
         if self._jaws is None:
             return

@@ -10,7 +10,7 @@ from services.arm.model.description import Arm
 from services.arm.model.gripper import opening_of, pulse_of
 from services.stepper_gateway.device.pending_commands import Arguments
 from services.stepper_gateway.goals.rejections import invalid
-from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.links.frames import StateFrame
 
 SLACK = 1e-6  # [m] by which an end may be missed; chosen: rounding of a conversion
 
@@ -45,7 +45,7 @@ class Jaws(ABC):
         """[s] to `position` [m] from where it is, or from anywhere where that is not known."""
 
     @abstractmethod
-    def on_state(self, state: State, now: float) -> None:
+    def on_state(self, state: StateFrame, now: float) -> None:
         """Take what the device says; `now` [s] monotonic."""
 
     @abstractmethod
@@ -73,7 +73,7 @@ class ServoJaws(Jaws):
         way = gripper.open - gripper.closed if self.commanded is None else abs(position - self.commanded)
         return way / gripper.speed
 
-    def on_state(self, state: State, now: float) -> None:
+    def on_state(self, state: StateFrame, now: float) -> None:
         self.commanded = opening_of(self._gripper, state.servo_us) if state.servo_us else None
         self.target = opening_of(self._gripper, state.servo_target_us) if state.servo_target_us else None
 
@@ -113,7 +113,7 @@ class OutputJaws(Jaws):
         share = 1.0 if self.commanded is None else abs(position - self.commanded) / self._travel
         return self._gripper.travel_time * share
 
-    def on_state(self, state: State, now: float) -> None:
+    def on_state(self, state: StateFrame, now: float) -> None:
         is_closed = bool(state.outputs >> self._index & 1) == self._gripper.closes
         target = self._gripper.closed if is_closed else self._gripper.open
         if self.target is None or self.commanded is None:

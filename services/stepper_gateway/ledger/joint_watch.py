@@ -15,7 +15,7 @@ USUAL_FULL_STEPS = 200  # [steps/rev] of a motor without a pull-out curve; stand
 STILL = 1.0  # [steps/s] chosen: slower pulses are no load
 
 
-class Sample(NamedTuple):
+class JointSample(NamedTuple):
     """One joint in one state."""
 
     t_us: int  # of the device's clock
@@ -44,7 +44,7 @@ class JointWatch:
         """[steps] since the verification."""
         return evidence.turns * self._motor.pulses_per_turn + abs(evidence.lost)
 
-    def between(self, evidence: Evidence, before: Sample, now: Sample) -> Evidence:
+    def between(self, evidence: Evidence, before: JointSample, now: JointSample) -> Evidence:
         """The evidence after what the joint did from `before` to `now`."""
         moved, seconds = abs(now.steps - before.steps), (now.t_us - before.t_us) * 1e-6
         if seconds <= 0.0 or (not moved and max(abs(before.rate), abs(now.rate)) < STILL):

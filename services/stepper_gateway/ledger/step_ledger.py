@@ -21,11 +21,11 @@ from services.stepper_gateway.ledger.confidence import (
     after_verification,
     confidence,
 )
-from services.stepper_gateway.ledger.joint_watch import JointWatch, Sample
+from services.stepper_gateway.ledger.joint_watch import JointSample, JointWatch
 from services.stepper_gateway.ledger.reasons import doubt, open_loop_reason
 from services.stepper_gateway.ledger.record import LedgerRecord
 from services.stepper_gateway.ledger.tool_error import bounds, known_shift, tool_shift
-from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.links.frames import StateFrame
 from services.stepper_gateway.links.reports import EventReport
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.commanded_path import PathPoint
@@ -45,12 +45,12 @@ class JointRow:
 
     watch: JointWatch
     evidence: Evidence
-    sample: Sample | None = None  # of the last state; None: the next one is where it begins
+    sample: JointSample | None = None  # of the last state; None: the next one is where it begins
     verified_us: int = 0  # device time of the last verification: older states say nothing about it
     is_referenced: bool = False
 
 
-class Ledger:
+class LedgerKeeper:
     """Pure: takes states and events of one device, with the moment, and puts messages and records out."""
 
     def __init__(self, device: GatewayDevice, kept: LedgerRecord | None) -> None:
@@ -64,7 +64,7 @@ class Ledger:
         self._told = self._written = -1.0e9  # [s] monotonic
         self._last: LedgerRecord | None = None  # that was written
 
-    def on_state(self, state: State, point: PathPoint, moment: Moment) -> None:
+    def on_state(self, state: StateFrame, point: PathPoint, moment: Moment) -> None:
         """The device's word on every joint; nothing before it has said who it is."""
         status = self._device.session.status
         if status is None or status.open_loop:
@@ -73,7 +73,7 @@ class Ledger:
         self._point = point
         self._is_moving = state.mode == DeviceMode.HOMING or any(abs(rate) >= 1.0 for rate in state.velocity)
         for index, row in enumerate(self._rows):
-            self._account(row, Sample(state.t_us, state.steps[index], state.velocity[index]))
+            self._account(row, JointSample(state.t_us, state.steps[index], state.velocity[index]))
             if state.t_us >= row.verified_us:
                 self._refer(row, bool(state.referenced >> index & 1), state)
 
@@ -171,7 +171,7 @@ class Ledger:
             open_loop=True, level=LEVEL,
         )  # fmt: skip
 
-    def _meet(self, identity: tuple[bool, int], state: State) -> None:
+    def _meet(self, identity: tuple[bool, int], state: StateFrame) -> None:
         """Another device or configuration is another ledger; another boot is the same one with a doubt more."""
         if identity != self._identity:
             self._identity, self._boot = identity, state.boot_id
@@ -183,7 +183,7 @@ class Ledger:
             for index, row in enumerate(self._rows):
                 self._resume(row, state, index)
 
-    def _take(self, kept: LedgerRecord | None, identity: tuple[bool, int], state: State) -> None:
+    def _take(self, kept: LedgerRecord | None, identity: tuple[bool, int], state: StateFrame) -> None:
         """Begin with what was kept, if it is about this device and these steps."""
         is_same = kept is not None and (kept.virtual, kept.config_crc32) == identity
         for index, row in enumerate(self._rows):
@@ -196,13 +196,13 @@ class Ledger:
             unseen = row.watch.in_time(KEEP_EVERY) if kept.is_moving else 0.0
             row.evidence = row.watch.unwatched(known, unseen + abs(state.steps[index] - kept.steps[index]))
 
-    def _resume(self, row: JointRow, state: State, index: int) -> None:
+    def _resume(self, row: JointRow, state: StateFrame, index: int) -> None:
         """The joint's steps since the last state of the boot before were seen by nobody."""
         before = row.sample.steps if row.sample is not None else state.steps[index]
         row.evidence = row.watch.unwatched(row.evidence, abs(state.steps[index] - before))
         row.sample, row.verified_us = None, 0
 
-    def _account(self, row: JointRow, now: Sample) -> None:
+    def _account(self, row: JointRow, now: JointSample) -> None:
         """Turns and load since the last state; one from before the verification does not count."""
         if now.t_us < row.verified_us:
             return
@@ -210,7 +210,7 @@ class Ledger:
             row.evidence = row.watch.between(row.evidence, row.sample, now)
         row.sample = now
 
-    def _refer(self, row: JointRow, is_referenced: bool, state: State) -> None:
+    def _refer(self, row: JointRow, is_referenced: bool, state: StateFrame) -> None:
         """A joint whose place the device does not know is not verified; while it homes, what was known still counts."""
         row.is_referenced = is_referenced
         if not is_referenced and state.mode != DeviceMode.HOMING:

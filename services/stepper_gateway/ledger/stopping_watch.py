@@ -12,7 +12,7 @@ from services.arm.device.device_config import device_config
 from services.arm.frames.transforms import Point
 from services.arm.kinematics.tool_jacobian import ToolJacobian
 from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.links.frames import StateFrame
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.motion_controller import MotionController
@@ -67,7 +67,7 @@ class StoppingWatch:
             round_trip=longest,
         )
 
-    def _stop(self, state: State, moment: Moment, longest: float) -> tuple[StoppingPath | None, float]:
+    def _stop(self, state: StateFrame, moment: Moment, longest: float) -> tuple[StoppingPath | None, float]:
         """The stop, and the time [s] until it begins."""
         stream, silence = self._controller.stream, self._device.session.last_beat + JITTER * longest
         is_under_way = stream is not None and not stream.is_abandoned and not stream.is_finished
@@ -85,7 +85,9 @@ class StoppingWatch:
             return None, 0.0
         return StoppingPath(0.0, 0.0), 0.0
 
-    def _on_path(self, stream: Stream, state: State, moment: Moment, reaction: float) -> tuple[StoppingPath, float]:
+    def _on_path(
+        self, stream: Stream, state: StateFrame, moment: Moment, reaction: float
+    ) -> tuple[StoppingPath, float]:
         """Of the path that was sent; what of it is on its way may still arrive."""
         clock = self._device.session.clock
         played = stream.played_us(moment.monotonic, clock) - round(0.5e6 * clock.round_trip)
@@ -121,7 +123,7 @@ class StoppingWatch:
         """[s] that any speed of the path takes to rest."""
         return max((v / a for part in path for v, a in zip(part.speeds, self._limits, strict=True)), default=0.0)
 
-    def _of_ramps(self, state: State, reaction: float) -> tuple[StoppingPath, float]:
+    def _of_ramps(self, state: StateFrame, reaction: float) -> tuple[StoppingPath, float]:
         """Homing has no path: every joint goes on at the speed that it has, or that it homes with, and then brakes."""
         columns = self._jacobian.columns(self._device.reporter.positions(state.steps))
         distance = duration = 0.0

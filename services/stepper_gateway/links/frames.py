@@ -132,7 +132,7 @@ class Ack(Frame, frozen=True, kw_only=True, gc=False):
     t_us: int = 0
 
 
-class Command(Frame, frozen=True, kw_only=True, gc=False):
+class CommandFrame(Frame, frozen=True, kw_only=True, gc=False):
     """CMD: `positions` only for REFERENCE; `index` and `argument` as PROTOCOL.md has them for each command."""
 
     cmd_id: int
@@ -174,7 +174,7 @@ class SyncReply(Frame, frozen=True, kw_only=True, gc=False):
     t2: int
 
 
-class State(Frame, frozen=True, kw_only=True, gc=False):
+class StateFrame(Frame, frozen=True, kw_only=True, gc=False):
     """STATE: where the device is; `steps` belong to the path point at `play_us`."""
 
     t_us: int
@@ -201,7 +201,7 @@ class State(Frame, frozen=True, kw_only=True, gc=False):
     servo_target_us: int = 0
 
 
-AnyFrame = Chunk | Ack | Command | CommandReply | Heartbeat | Sync | SyncReply | State
+AnyFrame = Chunk | Ack | CommandFrame | CommandReply | Heartbeat | Sync | SyncReply | StateFrame
 
 
 def encode(frame: AnyFrame) -> bytes:
@@ -219,7 +219,7 @@ def encode(frame: AnyFrame) -> bytes:
                 frame.stream, frame.seq, frame.next_seq, frame.code, frame.joint, frame.knot,
                 frame.value, frame.limit, frame.credits, frame.buffered_ms, frame.t_us,
             )  # fmt: skip
-        case Command():
+        case CommandFrame():
             kind, joints = FrameType.CMD, len(frame.positions)
             body = _CMD.pack(frame.cmd_id, frame.expires_us, frame.cmd, frame.index, frame.argument) + _rows(
                 frame.positions
@@ -233,7 +233,7 @@ def encode(frame: AnyFrame) -> bytes:
             kind, joints, body = FrameType.SYNC, 0, _SYNC.pack(frame.t0)
         case SyncReply():
             kind, joints, body = FrameType.SYNC_R, 0, _SYNC_R.pack(frame.t0, frame.t1, frame.t2)
-        case State():
+        case StateFrame():
             kind, joints = FrameType.STATE, len(frame.steps)
             body = _STATE.pack(
                 frame.t_us, frame.mode, frame.fault, frame.inputs, round(frame.time_scale * UNITY), frame.buffered_ms,
@@ -291,10 +291,10 @@ def _read_ack(boot_id: int, _joints: int, body: bytes) -> Ack:
     )  # fmt: skip
 
 
-def _read_command(boot_id: int, joints: int, body: bytes) -> Command:
+def _read_command(boot_id: int, joints: int, body: bytes) -> CommandFrame:
     cmd_id, expires_us, cmd, index, argument = _CMD.unpack_from(body)
     (positions,) = _read_rows(body, _CMD.size, joints, 1)
-    return Command(
+    return CommandFrame(
         boot_id=boot_id, cmd_id=cmd_id, expires_us=expires_us, cmd=cmd, index=index, argument=argument,
         positions=positions,
     )  # fmt: skip
@@ -319,12 +319,12 @@ def _read_sync_reply(boot_id: int, _joints: int, body: bytes) -> SyncReply:
     return SyncReply(boot_id=boot_id, t0=t0, t1=t1, t2=t2)
 
 
-def _read_state(boot_id: int, joints: int, body: bytes) -> State:
+def _read_state(boot_id: int, joints: int, body: bytes) -> StateFrame:
     t_us, mode, fault, inputs, scale, buffered, stream, next_seq, play_us, *counts = _STATE.unpack_from(body)
     end = _STATE.size + 8 * joints
     steps, velocity = _read_rows(body[:end], _STATE.size, joints, 2)
     servo_us, servo_target_us = _SERVO.unpack(body[end:]) if len(body) > end else (0, 0)
-    return State(
+    return StateFrame(
         boot_id=boot_id, t_us=t_us, mode=mode, fault=fault, inputs=inputs, time_scale=scale / UNITY,
         buffered_ms=buffered, stream=stream, next_seq=next_seq, play_us=play_us, underruns=counts[0], refused=counts[1],
         bad_frames=counts[2], flags=counts[3], fault_joint=counts[4], outputs=counts[5], referenced=counts[6],

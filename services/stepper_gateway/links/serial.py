@@ -15,7 +15,7 @@ from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame,
 from services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
 from services.stepper_gateway.links.frames import FrameType
 from services.stepper_gateway.links.link import Kind, Received
-from services.stepper_gateway.links.serial_port import Line, complaint, open_port
+from services.stepper_gateway.links.serial_port import OpenPort, complaint, open_port
 
 TYPES = {
     FrameType.ACK: Kind.TRAJ_ACK,
@@ -44,7 +44,7 @@ class SerialLink:
         self._inbox = ReceiveQueue(wake)
         self._outgoing: deque[bytes] = deque()
         self._has_outgoing = threading.Event()
-        self._line: Line | None = None
+        self._line: OpenPort | None = None
         self._reason = f"the serial port {port} has not been opened yet"
         self._stop = threading.Event()
         self._thread = threading.Thread(
@@ -99,7 +99,7 @@ class SerialLink:
         self._wake()
         return True
 
-    def _read(self, line: Line) -> None:
+    def _read(self, line: OpenPort) -> None:
         """Until the port fails, the writer gives it up, or the link is closed."""
         packets = PacketDecoder()
         while self._line is line and not self._stop.is_set():
@@ -111,7 +111,7 @@ class SerialLink:
             if received:
                 self._inbox.put(*received)
 
-    def _write(self, line: Line) -> None:
+    def _write(self, line: OpenPort) -> None:
         while self._line is line:
             self._has_outgoing.wait()
             self._has_outgoing.clear()

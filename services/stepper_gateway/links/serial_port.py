@@ -14,7 +14,7 @@ READ_TIMEOUT = 0.1  # [s] after which the reader looks whether it is to end; cho
 WRITE_TIMEOUT = 0.5  # [s] after which a line that takes nothing is given up; chosen: as a heartbeat's silence
 
 
-class Line(Protocol):
+class OpenPort(Protocol):
     """An open port; every call raises OSError once it has failed."""
 
     @property
@@ -28,12 +28,12 @@ class Line(Protocol):
     def close(self) -> None: ...
 
 
-def open_port(port: str, baud: int) -> Line:
+def open_port(port: str, baud: int) -> OpenPort:
     """For us alone; raises OSError or ValueError.
 
     DTR and RTS stay as the kernel sets them, both raised: on the usual boards one without the other resets the chip.
     """
-    line: Line = serial.Serial(port, baud, timeout=READ_TIMEOUT, write_timeout=WRITE_TIMEOUT, exclusive=True)
+    line: OpenPort = serial.Serial(port, baud, timeout=READ_TIMEOUT, write_timeout=WRITE_TIMEOUT, exclusive=True)
     return line
 
 

@@ -9,14 +9,14 @@ from schemas.message import Vector
 from schemas.topics import COMMAND_ACKS, COMMANDS
 from services.stepper_gateway.device.gateway_device import GatewayDevice
 from services.stepper_gateway.goals.goal_validator import MotionStart
-from services.stepper_gateway.links.frames import Ack, Chunk, State, encode
+from services.stepper_gateway.links.frames import Ack, Chunk, StateFrame, encode
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.commanded_path import PathPoint
 from services.stepper_gateway.motion.knot_sources import KnotSource
 from services.stepper_gateway.motion.knots import Knot, whole_steps
 from services.stepper_gateway.motion.stream import SentChunk, Stream
-from services.stepper_gateway.motion.transmission import Transmission
+from services.stepper_gateway.motion.transmission import MotionTransmission
 
 HISTORY = 1.0  # [s] of measured positions: a trajectory may have been planned from any of them
 EXPIRED = 1.5  # [s] after which the device takes nothing that was sent before; chosen: its time to live, and half
@@ -31,7 +31,7 @@ class Slowdown:
     def __init__(self) -> None:
         self.share = 0.0  # of the time that passes, by which a goal may end later
 
-    def on_state(self, state: State, is_held: bool) -> None:
+    def on_state(self, state: StateFrame, is_held: bool) -> None:
         """Take the time scale of a state; `is_held`: by a person's command."""
         slowness = 1.0 - state.time_scale
         if is_held:
@@ -48,7 +48,7 @@ class MotionController:
 
     def __init__(self, device: GatewayDevice, first_stream: int) -> None:
         self._device = device
-        self.transmission = Transmission(device.joints, first_stream)
+        self.transmission = MotionTransmission(device.joints, first_stream)
         self._slowness = Slowdown()
         self.lead = device.parameters.trajectory_lead  # [s]
         self._holds = False  # by a person's command, who will resume
@@ -76,7 +76,7 @@ class MotionController:
         """True if a person has asked for a hold, and has not ended it."""
         return self._holds or self._device.commands.is_pending(DeviceCommandKind.HOLD)
 
-    def is_followed(self, state: State) -> bool:
+    def is_followed(self, state: StateFrame) -> bool:
         """True if the device plays the stream that we want it to play."""
         return self.transmission.owns_motion and self.stream is not None and state.stream == self.stream.id
 
@@ -129,7 +129,7 @@ class MotionController:
         steps = device.state.steps if device.state is not None else ()
         device.out.publish(COMMAND_ACKS, device.reporter.ack(ack, round_trip, moment.unix_at(arrival), steps))
 
-    def on_state(self, state: State, arrival: float) -> None:
+    def on_state(self, state: StateFrame, arrival: float) -> None:
         """Account for what the device says of the stream at `arrival` [s]."""
         stream = self.stream
         if stream is not None and state.stream == stream.id:
@@ -144,7 +144,7 @@ class MotionController:
             self._holds = False
         self._slowness.on_state(state, self.is_held)
 
-    def commanded(self, state: State) -> PathPoint:
+    def commanded(self, state: StateFrame) -> PathPoint:
         """The path [steps] at the instant of `state`; where it is, if it follows no path of ours."""
         stream = self.stream
         if stream is None or state.stream != stream.id:

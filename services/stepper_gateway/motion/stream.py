@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from schemas.device import DeviceMode
 from services.arm.model.description import Joint
 from services.stepper_gateway.device.clock import ClockSync
-from services.stepper_gateway.links.frames import NO_JOINT, Ack, BadFrame, Chunk, ChunkFlag, Code, State, code_name
+from services.stepper_gateway.links.frames import NO_JOINT, Ack, BadFrame, Chunk, ChunkFlag, Code, StateFrame, code_name
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.commanded_path import CommandedPath, PathPoint
 from services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot
@@ -55,7 +55,7 @@ class Stream:
     is_abandoned: bool = False  # nothing more is to be sent
     failure: str = ""  # why the device refuses it for good
     _credits: int = 0
-    _play: State | None = None
+    _play: StateFrame | None = None
     _round_trip: float = 0.02  # [s] smoothed
 
     def __post_init__(self) -> None:
@@ -134,7 +134,7 @@ class Stream:
             self.failure = refusal(ack, self.joints)
         return round_trip, []
 
-    def on_state(self, state: State) -> None:
+    def on_state(self, state: StateFrame) -> None:
         """A state whose stream is this one: acknowledges chunks, and says how far the path is played."""
         self._play = state
         self._acknowledge(min(state.next_seq, self.next_seq))

@@ -14,7 +14,7 @@ LARGEST_CHUNK = 20  # [knots] chosen: 0.4 s of path, in one frame also with eigh
 SMALLEST_CHUNK = 2  # [knots] 25 chunks a second at 20 ms; chosen: half as many frames as knots
 
 
-class Transmission:
+class MotionTransmission:
     """The motion that is being sent and the stream it travels on."""
 
     def __init__(self, joints: tuple[Joint, ...], first_stream: int) -> None:

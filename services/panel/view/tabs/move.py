@@ -14,7 +14,7 @@ from services.panel.model.units import SHOWN, STEP, meant, slider_range, slider_
 from services.panel.view.kit import OWN_CHANGE, Kit, Mirror, box, esc, note, set_if_new, table
 from services.panel.view.tabs.jog import jog_text
 from services.panel.view.tabs.tool_fields import ToolFields
-from services.panel.view.world import World
+from services.panel.view.world import DrawnWorld
 
 SCRUB = 100.0  # parts of the plan's duration
 
@@ -22,7 +22,7 @@ SCRUB = 100.0  # parts of the plan's duration
 class MoveTab:
     """A slider for each joint, named states, Plan, Execute, and what is known of the plan."""
 
-    def __init__(self, kit: Kit, world: World) -> None:
+    def __init__(self, kit: Kit, world: DrawnWorld) -> None:
         self._kit, self._world, self._operator = kit, world, kit.operator
         self._client = kit.client.client_id
         self._touched = 0.0  # [s] monotonic, of this browser's last slider

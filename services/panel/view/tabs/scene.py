@@ -14,7 +14,7 @@ from schemas.scene import BoxShape, CylinderShape, SceneObject, Shape, SphereSha
 from services.panel.model.readings import Readings
 from services.panel.view.browser import LARGEST_UPLOAD
 from services.panel.view.kit import Kit, esc, note, set_if_new
-from services.panel.view.world import World
+from services.panel.view.world import DrawnWorld
 from services.panel.words.words import Words
 
 SIZE = (40.0, 40.0, 40.0)  # [mm] of a new object
@@ -25,7 +25,7 @@ SHAPES = ("box", "sphere", "cylinder")
 class SceneTab:
     """One object at a time is chosen, and can be dragged by its gizmo."""
 
-    def __init__(self, kit: Kit, world: World) -> None:
+    def __init__(self, kit: Kit, world: DrawnWorld) -> None:
         self._kit, self._operator, self._world = kit, kit.operator, world
         words, gui, scene = kit.words, kit.gui, kit.operator.arm.scene
         self._names: tuple[str, ...] = ()

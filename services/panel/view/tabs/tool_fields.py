@@ -9,7 +9,7 @@ import viser
 
 import gemelo
 from services.arm.frames.transforms import Point, Quaternion, from_rpy, to_rpy
-from services.panel.model.goal import Goal
+from services.panel.model.goal import GoalState
 from services.panel.model.tool_turns import ALL_RINGS
 from services.panel.view.kit import OWN_CHANGE, Kit, set_if_new
 
@@ -30,7 +30,7 @@ class ToolFields:
             self._turn = kit.gui.add_vector3(kit.words("tool_deg"), _shown_turn(goal.goal), step=TURN_STEP)
             self._turn.on_update(lambda event: self._lead(event, is_turned=True))
 
-    def show(self, goal: Goal) -> None:
+    def show(self, goal: GoalState) -> None:
         """The pose of the goal, or the one that was asked for and cannot be."""
         if goal.version == self._version or time.monotonic() - self._touched < OWN_CHANGE:
             return
@@ -47,13 +47,13 @@ class ToolFields:
         pose = gemelo.Pose(self._position(goal.goal), self._orientation(goal.goal))
         goal.set_pose(pose, self._client, is_turned=is_turned)
 
-    def _position(self, goal: Goal) -> Point:
+    def _position(self, goal: GoalState) -> Point:
         """[m] of the fields; exactly the goal's where they show it, since they round."""
         fields = zip(self._place.value, _shown_place(goal), _pose(goal).position, strict=True)
         x, y, z = (exact if typed == shown else typed / 1000.0 for typed, shown, exact in fields)
         return x, y, z
 
-    def _orientation(self, goal: Goal) -> Quaternion:
+    def _orientation(self, goal: GoalState) -> Quaternion:
         """That of the fields; exactly the goal's where they show it, since they round."""
         if self._turn is None or tuple(self._turn.value) == _shown_turn(goal):
             return _pose(goal).orientation
@@ -61,17 +61,17 @@ class ToolFields:
         return from_rpy(roll, pitch, yaw)
 
 
-def _pose(goal: Goal) -> gemelo.Pose:
+def _pose(goal: GoalState) -> gemelo.Pose:
     return goal.wanted or goal.pose
 
 
-def _shown_place(goal: Goal) -> Point:
+def _shown_place(goal: GoalState) -> Point:
     """[mm] as the fields show it."""
     x, y, z = (round(1000.0 * value, 1) for value in _pose(goal).position)
     return x, y, z
 
 
-def _shown_turn(goal: Goal) -> Point:
+def _shown_turn(goal: GoalState) -> Point:
     """[deg] as the fields show it."""
     roll, pitch, yaw = (round(degrees(value), 1) for value in to_rpy(_pose(goal).orientation))
     return roll, pitch, yaw

@@ -18,9 +18,9 @@ from services.arm.model.description import Arm
 from services.stepper_gateway.links.frames import (
     BadFrame,
     Code,
-    Command,
+    CommandFrame,
     CommandReply,
-    State,
+    StateFrame,
     Sync,
     SyncReply,
     decode,
@@ -122,7 +122,7 @@ class StandIn:
             command = decode(payload)
         except BadFrame:
             return payload
-        if not isinstance(command, Command):
+        if not isinstance(command, CommandFrame):
             return payload
         if command.cmd == DeviceCommandKind.DISARM:
             self._refuse(command)
@@ -131,7 +131,7 @@ class StandIn:
             self._is_stopping = True
         return payload
 
-    def _refuse(self, command: Command) -> None:
+    def _refuse(self, command: CommandFrame) -> None:
         reply = CommandReply(
             boot_id=self._device.boot_id,
             cmd_id=command.cmd_id,
@@ -150,12 +150,12 @@ class StandIn:
                 return kind, msgspec.json.encode(status)
             case Kind.STATE:
                 state = decode(payload)
-                assert isinstance(state, State)
+                assert isinstance(state, StateFrame)
                 return kind, encode(self._with_what_is_under_way(state, is_settled))
             case _:
                 return kind, payload
 
-    def _with_what_is_under_way(self, state: State, is_settled: bool) -> State:
+    def _with_what_is_under_way(self, state: StateFrame, is_settled: bool) -> StateFrame:
         mode = state.mode
         if mode == DeviceMode.IDLE and not is_settled:
             mode = DeviceMode.HOLD if self._is_stopping else DeviceMode.RUN

@@ -13,7 +13,7 @@ from services.stepper_gateway.links.connection import keep_connected
 from services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor
 from services.stepper_gateway.links.foreign.text_device import TextDevice
 from services.stepper_gateway.links.link import Kind, Received
-from services.stepper_gateway.links.serial_port import Line, complaint, open_port
+from services.stepper_gateway.links.serial_port import OpenPort, complaint, open_port
 
 
 class TextLink:
@@ -21,7 +21,7 @@ class TextLink:
 
     def __init__(self, port: str, baud: int, arm: Arm, wake: Callable[[], None]) -> None:
         self._port, self._baud, self._wake = port, baud, wake
-        self._line: Line | None = None
+        self._line: OpenPort | None = None
         self._reason = f"the serial port {port} has not been opened yet"
         self._stop = threading.Event()
         self.device = TextDevice(arm, lambda: secrets.randbelow((1 << 32) - 1) + 1, time.monotonic())
@@ -68,7 +68,7 @@ class TextLink:
         self._wake()
         return True
 
-    def _read(self, line: Line) -> None:
+    def _read(self, line: OpenPort) -> None:
         """Until the port fails, the writer gives it up, or the link is closed."""
         while self._line is line and not self._stop.is_set():
             data = line.read(max(1, line.in_waiting))
