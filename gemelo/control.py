@@ -117,7 +117,7 @@ class Control:
 
         >>> arm.control.give()
         Traceback (most recent call last):
-        gemelo.errors.RequestRefused: refused: this connection does not hold control: nothing to give back
+        gemelo.errors.Refused: refused: this connection does not hold control: nothing to give back
         """
         own, self._own = self._own, None
         if own is None:
