@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
 
-from schemas.message import Message, Vector, has_finite_sum
+from schemas.message import Message, Vector
 
 
 class TrajectoryPoint(Message, frozen=True, kw_only=True):
@@ -21,9 +22,13 @@ class TrajectoryPoint(Message, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         """As of any message, by one look at all numbers together: a trajectory has hundreds of points."""
-        vectors = (*self.positions, *self.velocities, *self.accelerations, self.time_from_start)
-        if not has_finite_sum(vectors):
-            super().__post_init__()
+        try:
+            total = sum(self.positions) + sum(self.velocities) + sum(self.accelerations) + self.time_from_start
+            if math.isfinite(total):
+                return
+        except (TypeError, OverflowError):
+            pass
+        super().__post_init__()
 
 
 class JointTrajectory(Message, frozen=True, kw_only=True):

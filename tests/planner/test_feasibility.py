@@ -30,7 +30,7 @@ from services.planner.verification.feasibility import (
     slowed,
     step_stream,
 )
-from services.planner.verification.verify import at_times
+from services.planner.verification.verify import at_times, states_of
 from services.stepper_gateway.links.frames import Chunk, ChunkFlag, Heartbeat, encode
 
 FAR = (1.5, -1.2, 0.1)
@@ -194,3 +194,16 @@ def test_compiled_and_in_python_the_peaks_are_the_same_to_the_bit(rm1: Arm):
     for goal in (FAR, (-0.7, 0.3, 1.0), (0.0, 0.0, 0.0)):
         stream = step_stream(rm1, line(rm1, goal))
         assert np.array_equal(feasibility.peak_rates_in_python(stream), stream.peaks)
+        states = states_of(line(rm1, goal))
+        knots = len(stream.first)
+        for part in ((0, knots), (0, (knots + 1) // 2), (knots // 2, knots)):
+            python = feasibility.stream_rates_in_python(rm1, states, part)
+            assert np.array_equal(feasibility.stream_rates(rm1, states, part), python), part
+
+
+def test_a_rate_that_is_not_a_number_is_seen_however_many_numbers_come_behind_it():
+    start, none = np.ones((5, 2)), np.zeros((5, 2))
+    start[1, 0] = np.nan
+    rates = feasibility.peak_rates(feasibility.StepStream(*(part[:, None] for part in (none, start, none, none))))
+    assert np.isnan(rates[0])
+    assert rates[1] == 1.0 / (feasibility.KNOT * feasibility.Q8)

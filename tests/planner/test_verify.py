@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import msgspec
 import numpy as np
 import pytest
@@ -67,6 +69,46 @@ def test_compiled_and_in_python_the_samples_are_the_same_to_the_bit_and_jerks_to
     for name in ("times", "positions", "velocities", "accelerations"):
         assert np.array_equal(getattr(compiled, name), getattr(python, name)), name
     assert np.allclose(compiled.jerks, python.jerks, rtol=1e-12, atol=0.0)
+
+
+def test_compiled_and_in_python_a_trajectory_is_seen_to_reach_as_far(trajectory: JointTrajectory):
+    states = verify.states_of(trajectory)
+    compiled, python = verify.look(states), verify.look_in_python(states)
+    assert np.array_equal(compiled.positions, sample(trajectory).positions)
+    for name in ("lower", "upper", "velocity", "acceleration"):
+        assert np.array_equal(getattr(compiled, name), getattr(python, name)), name
+    assert np.allclose(compiled.jerk, python.jerk, rtol=1e-12, atol=0.0)
+    line = np.array((START, GOAL)) + np.array(((0.0, 1e-3, 0.0), (2e-3, 0.0, 0.0)))
+    aside = verify.aside(line, compiled.positions)
+    assert aside == pytest.approx(verify.aside_in_python(line, compiled.positions), rel=1e-9)
+    assert aside > 1e-4
+
+
+@pytest.mark.parametrize("what", ["positions", "velocities", "accelerations", "times"])
+def test_what_is_not_a_number_is_not_within_limits_however_much_comes_behind_it(
+    rm1: Arm, trajectory: JointTrajectory, what: str
+):
+    states = verify.states_of(trajectory)
+    odd = getattr(states, what).copy()
+    odd[3] = np.nan
+    broken = states._replace(**{what: odd})
+    with np.errstate(all="ignore"), pytest.raises(BadTrajectory, match="nan"):
+        verify.require_limits(rm1, broken, verify.look(broken), joint_limits(rm1), True)
+
+
+@pytest.mark.parametrize("what", ["position", "velocity", "acceleration", "jerk"])
+def test_of_a_quick_look_each_limit_is_told_in_the_same_words(rm1: Arm, trajectory: JointTrajectory, what: str):
+    states, limits = verify.states_of(trajectory), joint_limits(rm1)
+    verify.require_limits(rm1, states, verify.look(states), limits, True)
+    if what == "position":
+        beyond = straight_line(rm1.joint_names, START, (0.0, 3.0, 0.0), limits)
+        states = verify.states_of(beyond)
+    else:
+        limits = dataclasses.replace(limits, **{what: 0.9 * getattr(limits, what)})
+    with pytest.raises(BadTrajectory, match=f"^{what} of"):
+        verify.require_limits(rm1, states, verify.look(states), limits, True)
+    if what == "jerk":
+        verify.require_limits(rm1, states, verify.look(states), limits, False)
 
 
 def test_wrong_ends_are_refused(trajectory: JointTrajectory):

@@ -45,6 +45,8 @@ class FullTurns:
     def other_ways_round(self, values: Array, near: Array, most: int) -> list[Array]:
         """`values` (n,) [rad] or [m] with a full turn more or less of one or more joints without limits, where the arm
         stands as it does at `values`: at most `most`, the fastest to reach from `near` (n,) first."""
+        if not np.isinf(self._upper).any():
+            return []
         choices = [(-1, 0, 1) if endless else (0,) for endless in np.isinf(self._upper).tolist()]
         turns = np.array([each for each in product(*choices) if any(each)], dtype=float).reshape(-1, len(values))
         rows = values + math.tau * turns

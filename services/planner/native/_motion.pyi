@@ -112,6 +112,23 @@ def quintics(
     times: Array,
     index: NDArray[np.int64],
 ) -> tuple[Array, Array, Array, Array]: ...
+def sampled(
+    stamps: Array, positions: Array, velocities: Array, accelerations: Array, shares: Array
+) -> tuple[Array, Array, Array, Array, Array, Array]: ...
+def most_aside(line: Array, rows: Array) -> float: ...
+def stream_rates(
+    stamps: Array,
+    positions: Array,
+    velocities: Array,
+    accelerations: Array,
+    scale: Array,
+    shares: Array,
+    begin: int,
+    end: int,
+    last: int,
+    knot: float,
+    subdivision: float,
+) -> Array: ...
 def peak_rates(start: Array, square: Array, cube: Array, shares: Array, knot: float) -> Array: ...
 def timed_curve(
     control: Array, velocity: Array, acceleration: Array, jerk: Array

@@ -23,10 +23,10 @@ from services.planner.timing.timing import timed_path
 from services.planner.verification.feasibility import feasible_scale, require_feasible, slowed
 from services.planner.verification.verify import (
     BadTrajectory,
+    aside,
+    look,
     require_ends,
-    require_jerk,
-    require_within_limits,
-    sample_between,
+    require_limits,
     states_of,
 )
 
@@ -133,18 +133,16 @@ class TrajectoryBuilder:
         """
         with self._watch.phase("verification"):
             states = states or states_of(trajectory)
-            samples = sample_between(*states)
-            self._require_free(samples.positions, free_line)
+            seen = look(states)
+            self._require_free(seen.positions, free_line)
             trajectory, margins, scale = self._feasible(trajectory, states)
             if scale < 1.0:
                 states = states_of(trajectory)
-                samples = sample_between(*states)
-                self._require_free(samples.positions, free_line)
+                seen = look(states)
+                self._require_free(seen.positions, free_line)
             try:
                 require_ends(trajectory, start, goal, states)
-                require_within_limits(self._arm, samples, self._limits)
-                if self._request.timing is Timing.JERK_LIMITED:
-                    require_jerk(self._arm, samples, self._limits)
+                require_limits(self._arm, states, seen, self._limits, self._request.timing is Timing.JERK_LIMITED)
             except BadTrajectory as error:
                 raise not_verified(str(error)) from error
         return VerifiedTrajectory(trajectory, margins, scale)
@@ -173,10 +171,7 @@ class TrajectoryBuilder:
 
 def lies_on(line: Array, rows: Array) -> bool:
     """True if all `rows` (m, n) [rad] or [m] lie between the two rows of `line` (2, n), and so what is between them."""
-    way = line[1] - line[0]
-    squared = float(way @ way)
-    shares = np.clip((rows - line[0]) @ way / squared, 0.0, 1.0) if squared > 0.0 else np.zeros(len(rows))
-    return bool(np.abs(rows - (line[0] + shares[:, None] * way)).max() <= ASIDE)
+    return aside(line, rows) <= ASIDE
 
 
 def _duration(states: States) -> float:

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import repeat
 
 import numpy as np
 from msgspec.structs import replace
@@ -103,7 +104,7 @@ def _stream(arm: Arm, states: States, part: tuple[int, int] | None = None) -> St
     last = _knots(duration)
     begin, end = part or (0, last)
     samples = states_at(states, np.minimum(np.arange(begin, end + 1) * KNOT, duration))
-    scale = np.array([joint.steps.per_unit * Q8 for joint in arm.joints])
+    scale = _scale(arm)
     position = np.rint(samples.positions * scale)
     slope = np.rint(samples.velocities * scale) * KNOT
     if end == last:
@@ -115,14 +116,39 @@ def _stream(arm: Arm, states: States, part: tuple[int, int] | None = None) -> St
 
 def margins(arm: Arm, stream: StepStream) -> tuple[StepMargin, ...]:
     """How near each stepper comes to what it can do."""
-    return tuple(_margin(arm, joint, index, stream) for index, joint in enumerate(arm.joints))
+    torques = (_torque_share(joint, index, stream) for index, joint in enumerate(arm.joints))
+    return tuple(map(partial(_margin, arm), arm.joints, stream.peaks.tolist(), torques))
+
+
+def _part_margins(arm: Arm, states: States, part: tuple[int, int]) -> tuple[StepMargin, ...]:
+    """The `margins` from one knot to another; without the stream where no motor says how its torque falls."""
+    if any(joint.drive.motor.pull_out is not None for joint in arm.joints):
+        return margins(arm, _stream(arm, states, part))
+    return tuple(map(partial(_margin, arm), arm.joints, stream_rates(arm, states, part).tolist(), repeat(0.0)))
+
+
+def stream_rates_in_python(arm: Arm, states: States, part: tuple[int, int]) -> Array:
+    """`stream_rates`, where the core is not built."""
+    return _stream(arm, states, part).peaks
+
+
+@where_built(stream_rates_in_python)
+def stream_rates(arm: Arm, states: States, part: tuple[int, int]) -> Array:
+    """(n,) [steps/s] the largest rate of each joint from one knot to another of the stream through `states`."""
+    last = _knots(float(states.times[-1]))
+    return motion.stream_rates(*states, _scale(arm), PLACES, *part, last, KNOT, Q8)
+
+
+def _scale(arm: Arm) -> Array:
+    """(n,) [1/256 steps per rad or m]."""
+    return np.array([joint.steps.per_unit * Q8 for joint in arm.joints])
 
 
 def _margins(arm: Arm, states: States) -> tuple[StepMargin, ...]:
     """Of all of it, by parts that the memory holds."""
     knots = _knots(float(states.times[-1]))
     parts = [(begin, min(begin + MOST_KNOTS, knots)) for begin in range(0, knots, MOST_KNOTS)]
-    found = [margins(arm, _stream(arm, states, part)) for part in parts]
+    found = [_part_margins(arm, states, part) for part in parts]
     if len(found) == 1:
         return found[0]
     worst = (max(of_joint, key=lambda margin: margin.share) for of_joint in zip(*found, strict=True))
@@ -226,10 +252,10 @@ def _can(arm: Arm, trajectory: JointTrajectory) -> bool:
     return max(margin.share for margin in found) <= FULL and _queue_share(arm, states) <= 1.0
 
 
-def _margin(arm: Arm, joint: Joint, index: int, stream: StepStream) -> StepMargin:
-    peak = float(stream.peaks[index])
+def _margin(arm: Arm, joint: Joint, peak: float, torque: float) -> StepMargin:
+    """Of a rate of `peak` [steps/s], and a share of the pull-out torque."""
     limit, by = _rate_limit(arm, joint)
-    share, torque = peak / limit, _torque_share(joint, index, stream)
+    share = peak / limit
     if torque > share:
         share, by = torque, "pull-out torque"
     return StepMargin(name=joint.name, peak_rate=peak, rate_limit=limit, share=share, limited_by=by)

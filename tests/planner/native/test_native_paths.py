@@ -19,6 +19,7 @@ from tests.planner.native.coal_truth import Truth
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import random_shape
 
+MARGIN = 1e-3  # [m]
 UNSURE = 1e-5  # [m] of coal's own distances
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 TRIANGLES = (ShapeKind.MESH, ShapeKind.HULL)  # of these the compiled core knows the surface, and so less for sure
@@ -50,6 +51,24 @@ def test_a_refused_line_comes_within_the_margin_and_the_bulge(arm, core, configu
         if not core.edge_free(start, goal):
             ways = start + np.linspace(0.0, 1.0, 3000)[:, None] * (goal - start)
             assert not core.free(ways).all() or min(core.distance(row) for row in ways) < core.margin + 0.001
+
+
+@pytest.mark.parametrize("count", [65, 200, 607])
+def test_a_way_of_many_lines_is_free_where_each_part_of_it_is(arm, core, configurations, count):
+    """Many lines are looked at eight together: uneven ones, and a rest of fewer than eight."""
+    rng, found = np.random.default_rng(count), []
+    for round_ in range(6):
+        core.set_scene([random_shape(rng, kind, kind) for kind in ShapeKind if kind not in TRIANGLES])
+        rows = configurations(80, round_)
+        for start, goal in pairwise(rows[core.free(rows)]):
+            shares = np.sort(rng.uniform(0.0, 1.0, count) ** 3)[:, None]
+            bent = start + shares * (goal - start) + 0.1 * np.sin(7.0 * shares) * (goal - start)[::-1]
+            is_free = core.path_free(bent)
+            found.append(is_free)
+            core.margin = (0.5 if is_free else 1.5) * MARGIN  # both are told apart to 0.2 mm
+            assert all(core.path_free(bent[first : first + 21]) for first in range(0, count - 1, 20)) == is_free
+            core.margin = MARGIN
+    assert 10 < sum(found) < len(found) - 10
 
 
 def test_what_surely_touches_is_within_the_margin_by_coal_too(arm, core, configurations):

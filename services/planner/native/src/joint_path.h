@@ -22,25 +22,39 @@ class JointPath {
     virtual void speed(size_t span, double* speeds) const = 0;
 };
 
+// Through rows (count, dof); a span leads from a row to the one `stride` rows on, or to the last, by way of those
+// between them.
 class Polyline : public JointPath {
   public:
-    Polyline(const double* rows, size_t count, size_t dof) : rows_(rows), count_(count), dof_(dof) {}
+    Polyline(const double* rows, size_t count, size_t dof, size_t stride = 1)
+        : rows_(rows), count_(count), dof_(dof), stride_(stride) {}
 
-    size_t span_count() const override { return count_ - 1; }
+    size_t span_count() const override { return (count_ - 2) / stride_ + 1; }
 
     void at(size_t span, double share, double* joints) const override {
-        const double *from = rows_ + span * dof_, *to = from + dof_;
-        for (size_t i = 0; i < dof_; ++i) joints[i] = from[i] + share * (to[i] - from[i]);
+        const size_t lines = lines_of(span);
+        const double along = share * static_cast<double>(lines);
+        const size_t line = std::min(static_cast<size_t>(along), lines - 1);
+        const double here = along - static_cast<double>(line);
+        const double *from = rows_ + (span * stride_ + line) * dof_, *to = from + dof_;
+        for (size_t i = 0; i < dof_; ++i) joints[i] = from[i] + here * (to[i] - from[i]);
     }
 
     void speed(size_t span, double* speeds) const override {
-        const double *from = rows_ + span * dof_, *to = from + dof_;
-        for (size_t i = 0; i < dof_; ++i) speeds[i] = std::abs(to[i] - from[i]);
+        const size_t lines = lines_of(span);
+        std::fill_n(speeds, dof_, 0.0);
+        for (size_t line = 0; line < lines; ++line) {
+            const double *from = rows_ + (span * stride_ + line) * dof_, *to = from + dof_;
+            for (size_t i = 0; i < dof_; ++i) speeds[i] = std::max(speeds[i], std::abs(to[i] - from[i]));
+        }
+        for (size_t i = 0; i < dof_; ++i) speeds[i] *= static_cast<double>(lines);
     }
 
   private:
+    size_t lines_of(size_t span) const { return std::min(stride_, count_ - 1 - span * stride_); }
+
     const double* rows_;
-    size_t count_, dof_;
+    size_t count_, dof_, stride_;
 };
 
 // The uniform cubic B-spline of control points (n, dof); span i is that of the points i to i + 3.

@@ -264,6 +264,12 @@ nb::tuple first_contact(const World& world, const Kernel& kernel, const Row& row
     return nb::make_tuple(!is_free, validator.result().first, validator.result().second);
 }
 
+// Measured: a sampled trajectory is looked at in fewer stretches where they begin as long as so many of its lines. Few
+// lines are looked at one by one.
+constexpr size_t kManyRows = 64, kLinesTogether = 8;
+
+size_t stride_for(size_t rows) { return rows < kManyRows ? 1 : kLinesTogether; }
+
 // Verdict of a polyline (degree 1) or of a B-spline by its control points (degree 3), and where on it, if it touches.
 nb::tuple look(const World& world, const Kernel& kernel, const Rows& rows, int degree, double margin, double finest,
                double seconds, Flag cancel) {
@@ -277,8 +283,9 @@ nb::tuple look(const World& world, const Kernel& kernel, const Rows& rows, int d
     tolerances.finest = finest;
     MotionValidator validator(world, kernel, tolerances);
     const StopCondition stop(seconds, cancel);
-    const Verdict verdict = degree == 1 ? validator.look(Polyline(rows.data(), rows.shape(0), rows.shape(1)), stop)
-                                        : validator.look(Spline(rows.data(), rows.shape(0), rows.shape(1)), stop);
+    const size_t count = rows.shape(0), dof = rows.shape(1);
+    const Verdict verdict = degree == 1 ? validator.look(Polyline(rows.data(), count, dof, stride_for(count)), stop)
+                                        : validator.look(Spline(rows.data(), count, dof), stop);
     nb::gil_scoped_acquire acquire;
     return nb::make_tuple(static_cast<int>(verdict),
                           array_of(Joints(validator.touching()), {validator.touching().size()}));

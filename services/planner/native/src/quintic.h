@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 namespace gemelo {
 
@@ -22,24 +23,104 @@ struct SampleView {
     double *positions, *velocities, *accelerations, *jerks;
 };
 
-// At `time` [s], in the segment that begins with the point `index` (Biagiotti and Melchiorri 2008, section 2.1).
-inline void sample_quintic(const TrajectoryView& trajectory, double time, size_t index, const SampleView& sample) {
-    const double dt = trajectory.stamps[index + 1] - trajectory.stamps[index];
-    const double u = (time - trajectory.stamps[index]) / dt, squared = dt * dt, cubed = std::pow(dt, 3.0);
-    const size_t from = index * trajectory.dof, to = from + trajectory.dof;
-    for (size_t i = 0; i < trajectory.dof; ++i) {
-        const double p0 = trajectory.positions[from + i], v0 = trajectory.velocities[from + i] * dt,
-                     a0 = trajectory.accelerations[from + i] * dt * dt;
-        const double rise = trajectory.positions[to + i] - p0 - v0 - 0.5 * a0;
-        const double climb = trajectory.velocities[to + i] * dt - v0 - a0,
-                     bend = trajectory.accelerations[to + i] * dt * dt - a0;
-        const double third = 10.0 * rise - 4.0 * climb + bend / 2.0, fourth = -15.0 * rise + 7.0 * climb - bend,
-                     fifth = 6.0 * rise - 3.0 * climb + bend / 2.0;
-        sample.positions[i] = p0 + u * (v0 + u * (a0 / 2.0 + u * (third + u * (fourth + u * fifth))));
-        sample.velocities[i] = (v0 + u * (a0 + u * (3.0 * third + u * (4.0 * fourth + u * 5.0 * fifth)))) / dt;
-        sample.accelerations[i] = (a0 + u * (6.0 * third + u * (12.0 * fourth + u * 20.0 * fifth))) / squared;
-        sample.jerks[i] = (6.0 * third + u * (24.0 * fourth + u * 60.0 * fifth)) / cubed;
+// One joint between two points, as a polynomial of the share u of the segment, which lasts `dt` [s] (Biagiotti and
+// Melchiorri 2008, section 2.1).
+struct Quintic {
+    double p0, v0, a0, third, fourth, fifth;
+
+    Quintic() = default;
+    Quintic(const TrajectoryView& trajectory, size_t index, size_t joint, double dt) {
+        const size_t from = index * trajectory.dof + joint, to = from + trajectory.dof;
+        p0 = trajectory.positions[from], v0 = trajectory.velocities[from] * dt;
+        a0 = trajectory.accelerations[from] * dt * dt;
+        const double rise = trajectory.positions[to] - p0 - v0 - 0.5 * a0;
+        const double climb = trajectory.velocities[to] * dt - v0 - a0,
+                     bend = trajectory.accelerations[to] * dt * dt - a0;
+        third = 10.0 * rise - 4.0 * climb + bend / 2.0, fourth = -15.0 * rise + 7.0 * climb - bend;
+        fifth = 6.0 * rise - 3.0 * climb + bend / 2.0;
     }
+};
+
+// The joints between the points `index` and `index` + 1.
+class Segment {
+  public:
+    void begin(const TrajectoryView& trajectory, size_t index) {
+        began_ = trajectory.stamps[index], dt_ = trajectory.stamps[index + 1] - began_;
+        squared_ = dt_ * dt_, cubed_ = std::pow(dt_, 3.0);
+        joints_.resize(trajectory.dof);
+        for (size_t i = 0; i < trajectory.dof; ++i) joints_[i] = Quintic(trajectory, index, i, dt_);
+    }
+
+    // At `time` [s].
+    void sample(double time, const SampleView& sample) const {
+        const double u = (time - began_) / dt_;
+        for (size_t i = 0; i < joints_.size(); ++i) {
+            const auto [p0, v0, a0, third, fourth, fifth] = joints_[i];
+            sample.positions[i] = p0 + u * (v0 + u * (a0 / 2.0 + u * (third + u * (fourth + u * fifth))));
+            sample.velocities[i] = (v0 + u * (a0 + u * (3.0 * third + u * (4.0 * fourth + u * 5.0 * fifth)))) / dt_;
+            sample.accelerations[i] = (a0 + u * (6.0 * third + u * (12.0 * fourth + u * 20.0 * fifth))) / squared_;
+            sample.jerks[i] = (6.0 * third + u * (24.0 * fourth + u * 60.0 * fifth)) / cubed_;
+        }
+    }
+
+  private:
+    double began_ = 0.0, dt_ = 1.0, squared_ = 1.0, cubed_ = 1.0;
+    std::vector<Quintic> joints_;
+};
+
+// The least and the largest positions, and the largest sizes of the derivatives, (dof,) each.
+struct ExtremesView {
+    double *lower, *upper, *velocity, *acceleration, *jerk;
+};
+
+// What is no number is larger than all others and less than all others, and stays.
+inline void grow(double value, double& largest) {
+    if (!(value <= largest) && !std::isnan(largest)) largest = value;
+}
+inline void shrink(double value, double& least) {
+    if (!(value >= least) && !std::isnan(least)) least = value;
+}
+
+// Samples at so many `shares` of each segment: positions by rows into `positions`, and what they and their derivatives
+// reach.
+inline void sample_all(const TrajectoryView& trajectory, size_t segments, const double* shares, size_t count,
+                       double* positions, const ExtremesView& reached) {
+    const size_t dof = trajectory.dof;
+    for (double* most : {reached.velocity, reached.acceleration, reached.jerk}) std::fill_n(most, dof, 0.0);
+    std::copy_n(trajectory.positions, dof, reached.lower);
+    std::copy_n(trajectory.positions, dof, reached.upper);
+    std::vector<double> derivatives(3 * dof);
+    Segment quintics;
+    for (size_t segment = 0; segment < segments; ++segment) {
+        const double begin = trajectory.stamps[segment], lasts = trajectory.stamps[segment + 1] - begin;
+        quintics.begin(trajectory, segment);
+        for (size_t place = 0; place < count; ++place) {
+            const SampleView sample{positions, &derivatives[0], &derivatives[dof], &derivatives[2 * dof]};
+            quintics.sample(begin + shares[place] * lasts, sample);
+            for (size_t i = 0; i < dof; ++i) {
+                shrink(sample.positions[i], reached.lower[i]);
+                grow(sample.positions[i], reached.upper[i]);
+                grow(std::abs(sample.velocities[i]), reached.velocity[i]);
+                grow(std::abs(sample.accelerations[i]), reached.acceleration[i]);
+                grow(std::abs(sample.jerks[i]), reached.jerk[i]);
+            }
+            positions += dof;
+        }
+    }
+}
+
+// How far any of `rows` (count, dof) is at most from the line between two rows (2, dof), in any joint.
+inline double aside(const double* line, const double* rows, size_t count, size_t dof) {
+    const double* to = line + dof;
+    double squared = 0.0, most = 0.0;
+    for (size_t i = 0; i < dof; ++i) squared += (to[i] - line[i]) * (to[i] - line[i]);
+    for (size_t row = 0; row < count; ++row, rows += dof) {
+        double along = 0.0;
+        for (size_t i = 0; i < dof; ++i) along += (rows[i] - line[i]) * (to[i] - line[i]);
+        const double share = squared > 0.0 ? std::min(1.0, std::max(0.0, along / squared)) : 0.0;
+        for (size_t i = 0; i < dof; ++i) grow(std::abs(rows[i] - (line[i] + share * (to[i] - line[i]))), most);
+    }
+    return most;
 }
 
 // The stream between knots: start + u (2 square + u 3 cube) per knot, (knots, dof) each in 1/256 steps, u at `slots`
@@ -60,11 +141,50 @@ inline void peak_rates(const StreamView& stream, const double* shares, double* p
             const double cube = cubic * stream.cube[at], square = quadratic * stream.square[at],
                          start = stream.start[at] / stream.knot;
             for (size_t slot = 0; slot < stream.slots; ++slot) {
-                const double rate = std::abs(shares[slot] * (shares[slot] * cube + square) + start);
-                if (!(rate <= peaks[i])) peaks[i] = rate;
+                grow(std::abs(shares[slot] * (shares[slot] * cube + square) + start), peaks[i]);
             }
         }
     }
+}
+
+// From one knot to another of a trajectory of so many points, `knot` [s] apart; `scale` (dof,) [1/256 steps per rad or
+// m]. After the knot `last` the arm stands.
+struct KnotsView {
+    const double* scale;
+    size_t points, begin, end, last;
+    double knot, subdivision;
+};
+
+// As `peak_rates`, of the stream that is made of the trajectory.
+inline void peak_rates_of(const TrajectoryView& trajectory, const KnotsView& knots, const double* shares, size_t slots,
+                          double* peaks) {
+    const size_t dof = trajectory.dof, rows = knots.end - knots.begin + 1;
+    const double duration = trajectory.stamps[knots.points - 1];
+    std::vector<double> position(rows * dof), slope(rows * dof), unused(2 * dof);
+    Segment quintics;
+    size_t segment = 0;
+    quintics.begin(trajectory, 0);
+    for (size_t row = 0; row < rows; ++row) {
+        const double time = std::min(static_cast<double>(knots.begin + row) * knots.knot, duration);
+        const size_t before = segment;
+        while (segment + 2 < knots.points && trajectory.stamps[segment + 1] <= time) ++segment;
+        if (segment != before) quintics.begin(trajectory, segment);
+        double *at = &position[row * dof], *speed = &slope[row * dof];
+        quintics.sample(time, {at, speed, &unused[0], &unused[dof]});
+        const bool is_last = row + 1 == rows && knots.end == knots.last;
+        for (size_t i = 0; i < dof; ++i) {
+            at[i] = std::nearbyint(at[i] * knots.scale[i]);
+            speed[i] = is_last ? 0.0 : std::nearbyint(speed[i] * knots.scale[i]) * knots.knot;
+        }
+    }
+    std::vector<double> square((rows - 1) * dof), cube((rows - 1) * dof);
+    for (size_t i = 0; i < square.size(); ++i) {
+        const double rise = position[i + dof] - position[i];
+        square[i] = 3.0 * rise - 2.0 * slope[i] - slope[i + dof];
+        cube[i] = slope[i] + slope[i + dof] - 2.0 * rise;
+    }
+    peak_rates({slope.data(), square.data(), cube.data(), rows - 1, dof, slots, knots.knot * knots.subdivision}, shares,
+               peaks);
 }
 
 }  // namespace gemelo

@@ -10,14 +10,22 @@
 namespace gemelo {
 namespace {
 
+// A trajectory of at least two points (m,), (m, n).
+TrajectoryView trajectory_of(const Row& stamps, const Rows& p, const Rows& v, const Rows& a) {
+    const size_t points = stamps.size(), dof = p.shape(1);
+    require(points > 1, "a trajectory has two points at least");
+    for (const Rows* rows : {&p, &v, &a}) {
+        require(rows->shape(0) == points && rows->shape(1) == dof, "points must be as many as stamps, and alike");
+    }
+    return {stamps.data(), p.data(), v.data(), a.data(), dof};
+}
+
 // Positions, velocities, accelerations and jerks, (m, n) each, of the quintics through a trajectory's points at `times`
 // (m,), each in the segment `index` (m,).
 nb::tuple quintics(const Row& stamps, const Rows& p, const Rows& v, const Rows& a, const Row& times,
                    const Segments& index) {
-    const size_t points = stamps.size(), dof = p.shape(1), count = times.size();
-    for (const Rows* rows : {&p, &v, &a}) {
-        require(rows->shape(0) == points && rows->shape(1) == dof, "points must be as many as stamps, and alike");
-    }
+    const TrajectoryView trajectory = trajectory_of(stamps, p, v, a);
+    const size_t points = stamps.size(), dof = trajectory.dof, count = times.size();
     require(index.size() == count, "each time needs its segment");
     for (size_t i = 0; i < count; ++i) {
         require(index(i) >= 0 && static_cast<size_t>(index(i)) + 1 < points, "a segment must exist");
@@ -26,9 +34,10 @@ nb::tuple quintics(const Row& stamps, const Rows& p, const Rows& v, const Rows& 
     for (auto& column : columns) column.resize(count * dof);
     {
         nb::gil_scoped_release release;
-        const TrajectoryView trajectory{stamps.data(), p.data(), v.data(), a.data(), dof};
+        Segment segment;
         for (size_t i = 0; i < count; ++i) {
-            sample_quintic(trajectory, times(i), static_cast<size_t>(index(i)),
+            if (i == 0 || index(i) != index(i - 1)) segment.begin(trajectory, static_cast<size_t>(index(i)));
+            segment.sample(times(i),
                            {&columns[0][i * dof], &columns[1][i * dof], &columns[2][i * dof], &columns[3][i * dof]});
         }
     }
@@ -36,9 +45,52 @@ nb::tuple quintics(const Row& stamps, const Rows& p, const Rows& v, const Rows& 
     return nb::make_tuple(taken(0), taken(1), taken(2), taken(3));
 }
 
+// Positions (k, n) of samples at `shares` of each segment, the least and the largest of them, and the
+// largest sizes of velocities, accelerations and jerks, (n,) each.
+nb::tuple sampled(const Row& stamps, const Rows& p, const Rows& v, const Rows& a, const Row& shares) {
+    const TrajectoryView trajectory = trajectory_of(stamps, p, v, a);
+    const size_t dof = trajectory.dof, segments = stamps.size() - 1, rows = segments * shares.size();
+    std::vector<double> positions(rows * dof);
+    std::array<std::vector<double>, 5> reached;
+    for (auto& each : reached) each.resize(dof);
+    {
+        nb::gil_scoped_release release;
+        sample_all(trajectory, segments, shares.data(), shares.size(), positions.data(),
+                   {reached[0].data(), reached[1].data(), reached[2].data(), reached[3].data(), reached[4].data()});
+    }
+    const auto taken = [&](size_t k) { return array_of(std::move(reached[k]), {dof}); };
+    return nb::make_tuple(array_of(std::move(positions), {rows, dof}), taken(0), taken(1), taken(2), taken(3),
+                          taken(4));
+}
+
+// How far any of `rows` (m, n) is at most from the line between two rows (2, n), in any joint.
+double most_aside(const Rows& line, const Rows& rows) {
+    require(line.shape(0) == 2, "a line has two ends");
+    require_columns(rows.shape(1), line.shape(1), "joint values");
+    return aside(line.data(), rows.data(), rows.shape(0), rows.shape(1));
+}
+
+// The largest rate (n,) of the step stream of a trajectory from the knot `begin` to the knot `end`, at `shares` of its
+// knots; `scale` (n,) is in parts of a step, of which there are `subdivision`.
+nb::ndarray<nb::numpy, double> stream_rates(const Row& stamps, const Rows& p, const Rows& v, const Rows& a,
+                                            const Row& scale, const Row& shares, size_t begin, size_t end, size_t last,
+                                            double knot, double subdivision) {
+    const TrajectoryView trajectory = trajectory_of(stamps, p, v, a);
+    require_columns(scale.size(), trajectory.dof, "scales");
+    require(begin < end, "a stream has two knots at least");
+    std::vector<double> peaks(trajectory.dof);
+    {
+        nb::gil_scoped_release release;
+        peak_rates_of(trajectory, {scale.data(), stamps.size(), begin, end, last, knot, subdivision}, shares.data(),
+                      shares.size(), peaks.data());
+    }
+    const size_t dof = peaks.size();
+    return array_of(std::move(peaks), {dof});
+}
+
 // The largest rate (n,) of a step stream, whose coefficients (k, n) are in 1/256 steps, at `shares` of its knots.
-nb::ndarray<nb::numpy, double> peak_rates_of(const Rows& start, const Rows& square, const Rows& cube, const Row& shares,
-                                             double knot) {
+nb::ndarray<nb::numpy, double> rates_of(const Rows& start, const Rows& square, const Rows& cube, const Row& shares,
+                                        double knot) {
     const size_t knots = start.shape(0), dof = start.shape(1);
     for (const Rows* rows : {&square, &cube}) {
         require(rows->shape(0) == knots && rows->shape(1) == dof, "coefficients must be alike");
@@ -96,7 +148,11 @@ void add_trajectories(nb::module_& module) {
     nb::exception<TurnsOnTheSpot>(module, "TurnsOnTheSpot", PyExc_ValueError);
     module.def("quintics", &quintics, "stamps"_a, "positions"_a, "velocities"_a, "accelerations"_a, "times"_a,
                "index"_a);
-    module.def("peak_rates", &peak_rates_of, "start"_a, "square"_a, "cube"_a, "shares"_a, "knot"_a);
+    module.def("peak_rates", &rates_of, "start"_a, "square"_a, "cube"_a, "shares"_a, "knot"_a);
+    module.def("sampled", &sampled, "stamps"_a, "positions"_a, "velocities"_a, "accelerations"_a, "shares"_a);
+    module.def("most_aside", &most_aside, "line"_a, "rows"_a);
+    module.def("stream_rates", &stream_rates, "stamps"_a, "positions"_a, "velocities"_a, "accelerations"_a, "scale"_a,
+               "shares"_a, "begin"_a, "end"_a, "last"_a, "knot"_a, "subdivision"_a);
     module.def("timed_curve", &timed_curve, "control"_a, "velocity"_a, "acceleration"_a, "jerk"_a);
     module.def("timed_lines", &timed_lines, "corners"_a, "velocity"_a, "acceleration"_a, "jerk"_a);
 }
