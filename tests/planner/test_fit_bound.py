@@ -23,6 +23,7 @@ from services.collision_fitting.mesh_fit import LinkFit, beyond_bound
 from services.collision_fitting.mesh_surface import MeshSurface
 from services.collision_fitting.parts import shapes_around
 from services.planner.collision_geometry.coal_shapes import is_inside, tree_of
+from services.planner.collision_geometry.link_shapes import hull_mesh
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from services.planner.collision_geometry.solids import polytope_around
 
@@ -204,7 +205,7 @@ def test_a_hull_of_few_sides_holds_all_points_and_stands_out_little(seed: int, c
     assert hull is not None
     (shape,) = hull.shapes
     assert depth_in([shape], points).min() >= 1e-6
-    own = polytope_around(points)
+    own = polytope_around(hull_mesh(points))
     assert own.depth(np.array(hull.corners) + hull.origin.xyz).min() >= -0.004
     assert len(hull.corners) <= 2 * MOST_SIDES
 
@@ -218,7 +219,7 @@ def test_points_on_a_plane_have_no_hull():
 @settings(max_examples=30, deadline=None)
 def test_projection_onto_a_polytope_brings_no_point_farther_from_any_of_its_points(seed: int):
     random = np.random.default_rng(seed)
-    solid = polytope_around(random.normal(size=(30, 3)))
+    solid = polytope_around(hull_mesh(random.normal(size=(30, 3))))
     outside, inner = random.normal(size=(50, 3)) * 4.0, random.normal(size=(200, 3))
     inner = inner[solid.depth(inner) >= 0.0]
     moved = solid.nearest(outside)

@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from services.arm.errors import DescriptionError
-from services.arm.kinematics.convex_meshes import corners_of
+from services.arm.kinematics.convex_meshes import corners_of, hull_of, triangles_of
 from services.arm.kinematics.self_collisions import load_collision_geometry
 from services.arm.model.description import Arm
 from services.planner.collision_geometry.coal_shapes import mesh_of
@@ -57,28 +57,20 @@ def _form_of(geometry: coal.CollisionGeometry, link: str) -> Form:
 
 
 def hull_mesh(points: Array) -> TriangleMesh:
-    """The convex hull of points (n, 3) [m] that have a volume, its triangles turned outwards; of equal points the same
-    mesh, so that what is built of it is built once."""
+    """The convex hull of points (n, 3) [m], its triangles turned outwards; of equal points the same mesh, so that what
+    is built of it is built once. Raises ValueError for points that have no volume."""
     return _hull_mesh(np.ascontiguousarray(points, dtype=float).tobytes())
 
 
 @lru_cache(maxsize=1024)
 def _hull_mesh(content: bytes) -> TriangleMesh:
-    from scipy.spatial import ConvexHull  # takes as long to load as the rest of the planner: only of arms with hulls
-
-    points = np.frombuffer(content).reshape(-1, 3)
-    hull = ConvexHull(points)
-    corners = points[hull.simplices]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inwards = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) < 0.0
-    faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
-    used, numbers = np.unique(faces, return_inverse=True)
-    return TriangleMesh(points[used], numbers.reshape(-1, 3).astype(np.int32))
+    hull = hull_of(np.frombuffer(content).reshape(-1, 3))
+    return TriangleMesh(corners_of(hull), triangles_of(hull))
 
 
 @lru_cache(maxsize=1024)
 def _polytope_of(mesh: TriangleMesh) -> Polytope:
-    return polytope_around(mesh.vertices)
+    return polytope_around(mesh)
 
 
 def solid_of(shape: CollisionShape) -> ConvexSolid:

@@ -10,11 +10,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from services.planner.collision_geometry.shapes import TriangleMesh
+
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 PROJECTIONS = 40  # onto one side of a polytope after the other; some ten are enough
-PLANE_DIGITS = 9  # to which the sides' planes are rounded: two triangles of one side are one plane
+PLANE_DIGITS = 9  # to which the sides' directions are rounded: two triangles of one side are one plane
+THIN = 1e-7  # of its length is the height of a triangle whose direction nine digits do not tell
 
 
 class ConvexSolid(Hashable, Protocol):
@@ -157,11 +160,18 @@ class Polytope:
         return np.array(self.planes)[:, 3]
 
 
-def polytope_around(corners: Array) -> Polytope:
-    """The convex hull of corners (n, 3) [m] that have a volume."""
-    from scipy.spatial import ConvexHull  # takes as long to load as the rest of the planner: only of arms with hulls
+def polytope_around(mesh: TriangleMesh) -> Polytope:
+    """The solid that a convex mesh is the surface of, its triangles turned outwards.
 
-    equations = ConvexHull(corners).equations
-    planes = np.unique(np.round(np.column_stack((equations[:, :3], -equations[:, 3])), PLANE_DIGITS), axis=0)
-    x, y, z = np.abs(corners).max(axis=0).tolist()
-    return Polytope(tuple(tuple(plane) for plane in planes.tolist()), (x, y, z))
+    Each side lies on the corner that is farthest out in its direction, so that no corner is outside, however little is
+    known of a thin triangle's direction; that of the thinnest is left to its neighbours.
+    """
+    first, second, third = (mesh.vertices[column] for column in mesh.faces.T)
+    normals = np.cross(second - first, third - first)
+    sizes = np.linalg.norm(normals, axis=1)
+    longest = np.max([np.linalg.norm(edge, axis=1) for edge in (second - first, third - second, first - third)], axis=0)
+    wide = sizes > THIN * longest**2
+    normals = np.unique(np.round(normals[wide] / sizes[wide, None], PLANE_DIGITS), axis=0)
+    offsets = (mesh.vertices @ normals.T).max(axis=0)
+    x, y, z = np.abs(mesh.vertices).max(axis=0).tolist()
+    return Polytope(tuple(map(tuple, np.column_stack((normals, offsets)).tolist())), (x, y, z))
