@@ -159,6 +159,8 @@ def test_the_figures_count_what_is_not_solved(monkeypatch: pytest.MonkeyPatch, s
     monkeypatch.setattr(any_planning, "every_trial", lambda count: {"seven box": some})
     assert any_planning.plan_any_success(FEW).met
     figure = any_planning.plan_any_ms(FEW)
+    assert figure.median is not None
+    assert figure.p99 is not None
     assert 0.0 < figure.median <= figure.p99
     assert figure.reference["of roboplan's, p50"] > 0.0
     response = msgspec.structs.replace(some[0].response, code=PlanCode.TIMED_OUT, refusal=Refusal(message="too late"))

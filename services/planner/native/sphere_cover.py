@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from services.planner.collision_geometry.link_shapes import solid_of
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
-from services.planner.collision_geometry.solids import Capsule, ConvexSolid
+from services.planner.collision_geometry.solids import PROJECTIONS, Capsule, ConvexSolid, Polytope
 from services.planner.native.binding import motion
 from services.planner.native.model_cache import cached_rows
 
@@ -43,6 +43,35 @@ class SphereCover:
 
     spheres: Array
     bulge: float
+
+
+@dataclass(frozen=True)
+class CompiledPolytope:
+    """A polytope that is asked in C++, in a tenth of the time."""
+
+    polytope: Polytope
+
+    @property
+    def half(self) -> Array:
+        """(3,) half sizes [m] of the box around it."""
+        return self.polytope.half
+
+    def depth(self, points: Array) -> Array:
+        """As `Polytope.depth`."""
+        return motion.depths(self._sides, _rows(points)).reshape(points.shape[:-1])
+
+    def nearest(self, points: Array) -> Array:
+        """As `Polytope.nearest`."""
+        return motion.projected(self._sides, _rows(points), PROJECTIONS).reshape(points.shape)
+
+    @cached_property
+    def _sides(self) -> Array:
+        return np.array(self.polytope.planes)
+
+
+def _rows(points: Array) -> Array:
+    """(n, 3) of points (..., 3)."""
+    return np.ascontiguousarray(points.reshape(-1, 3))
 
 
 def cover_shapes(shapes: Sequence[CollisionShape], bulge: float) -> SphereCover:
@@ -112,6 +141,8 @@ def cover_of(solid: ConvexSolid, bulge: float = BULGE) -> SphereCover:
     """The spheres [m] of a convex solid in its own frame, which reach at most `bulge` [m] beyond it."""
     if isinstance(solid, Capsule) and solid.half_length == 0.0:
         return SphereCover(np.array([[0.0, 0.0, 0.0, solid.radius]]), 0.0)
+    if isinstance(solid, Polytope):
+        solid = CompiledPolytope(solid)
     cells = cells_of(solid, FINENESS * bulge)
     centres = medial(solid, FINENESS * bulge)
     candidates = with_radii(centres, np.maximum(solid.depth(centres), 0.0) + bulge)

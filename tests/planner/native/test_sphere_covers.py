@@ -7,10 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.planner.collision_geometry.link_shapes import link_shapes
+from services.planner.collision_geometry.link_shapes import hull_mesh, link_shapes
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
-from services.planner.collision_geometry.solids import Box, Capsule, ConvexSolid, Cylinder
-from services.planner.native.sphere_cover import MOST_SPHERES, cover_of, cover_shapes, link_cover, mesh_cover
+from services.planner.collision_geometry.solids import Box, Capsule, ConvexSolid, Cylinder, polytope_around
+from services.planner.native.sphere_cover import (
+    MOST_SPHERES,
+    CompiledPolytope,
+    cover_of,
+    cover_shapes,
+    link_cover,
+    mesh_cover,
+)
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import star_mesh
 
@@ -137,3 +144,15 @@ def test_a_long_mesh_has_about_as_few_spheres_as_a_cylinder_and_bulges_less_than
     cover = mesh_cover(vertices, np.array(faces, dtype=np.int32), 0.005)
     assert cover.bulge < 0.6 / 40.0
     assert len(cover.spheres) < 2 * len(cover_of(Cylinder(0.05, 0.3), 0.005).spheres)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_compiled_a_polytope_is_the_same_solid_as_in_python(seed: int):
+    random = np.random.default_rng(seed)
+    polytope = polytope_around(hull_mesh(random.normal(scale=0.1, size=(20 + 60 * seed, 3))))
+    compiled, points = CompiledPolytope(polytope), random.normal(scale=0.15, size=(7, 31, 3))
+    assert np.allclose(compiled.depth(points), polytope.depth(points), atol=1e-15)
+    assert (compiled.depth(points) < 0.0).any()
+    assert (compiled.depth(points) > 0.0).any()
+    assert np.allclose(compiled.nearest(points), polytope.nearest(points), atol=1e-12)
+    assert np.array_equal(compiled.half, polytope.half)

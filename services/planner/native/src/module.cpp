@@ -12,6 +12,7 @@
 #include "descent.h"
 #include "kernels.h"
 #include "plan.h"
+#include "polytope.h"
 #include "trajectories.h"
 
 namespace gemelo {
@@ -144,6 +145,36 @@ nb::ndarray<nb::numpy, double> cover(const Rows& cells, const Rows& candidates, 
     }
     const size_t count = rows.size() / 4;
     return array_of(std::move(rows), {count, size_t{4}});
+}
+
+PolytopeView polytope_of(const Rows& sides, const Rows& points) {
+    require_columns(sides.shape(1), 4, "sides");
+    require_columns(points.shape(1), 3, "points");
+    return {sides.data(), sides.shape(0)};
+}
+
+// (n,) of points (n, 3) in the solid with these sides (k, 4).
+nb::ndarray<nb::numpy, double> depths(const Rows& sides, const Rows& points) {
+    const PolytopeView solid = polytope_of(sides, points);
+    const size_t count = points.shape(0);
+    std::vector<double> found(count);
+    {
+        nb::gil_scoped_release release;
+        depths_in(solid, points.data(), count, found.data());
+    }
+    return array_of(std::move(found), {count});
+}
+
+// (n, 3) the points (n, 3), those outside after at most so many projections onto the sides (k, 4).
+nb::ndarray<nb::numpy, double> projected(const Rows& sides, const Rows& points, int times) {
+    const PolytopeView solid = polytope_of(sides, points);
+    const size_t count = points.shape(0);
+    std::vector<double> moved(points.data(), points.data() + 3 * count);
+    {
+        nb::gil_scoped_release release;
+        project_onto(solid, moved.data(), count, times);
+    }
+    return array_of(std::move(moved), {count, size_t{3}});
 }
 
 std::vector<Triangle> triangles_of(const Rows& vertices, const Integers& faces) {
@@ -406,6 +437,8 @@ NB_MODULE(_motion, module) {
                "metres_per_radian"_a, "position_tolerance"_a, "rotation_tolerance"_a);
     module.def("part", &make_part, "frame"_a, "spheres"_a, "solids"_a);
     module.def("cover", &cover, "cells"_a, "candidates"_a, "least"_a);
+    module.def("depths", &depths, "sides"_a, "points"_a);
+    module.def("projected", &projected, "sides"_a, "points"_a, "times"_a);
     module.def("mesh", &make_mesh, "vertices"_a, "faces"_a);
     module.def("solid_cells", &solid_cells, "vertices"_a, "faces"_a, "cell"_a);
     module.def("obstacle", &make_obstacle, "shape"_a, "pose"_a, "size"_a, "rounding"_a, "touching"_a, "mesh"_a.none());
