@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import chain
 
 import msgspec
 import numpy as np
@@ -171,7 +172,7 @@ class Planner:
         touching: list[Start] = []
         goals: list[Start] = []
         blocked: list[Array] = []
-        for goal in self._configurations(context):
+        for goal in chain(self._configurations(context), self._other_ways(goals, context)):
             if not self.checker.keeps(goal, self.checker.clearance):
                 touching.append(goal)
             else:
@@ -192,20 +193,20 @@ class Planner:
         raise timed_out()
 
     def _configurations(self, context: PlanningContext) -> Iterator[Start]:
-        """The goal's configurations, nearest first, on the clock of the kinematics; then, where any way will do, the
-        first of them with joints without limits turned the other way round."""
+        """The goal's configurations, nearest first, on the clock of the kinematics."""
         with context.watch.phase("ik"):
             configurations = self._goals.candidates(context.request.goal, context.start, context.deadline)
-        first: Start | None = None
         while True:
             with context.watch.phase("ik"):
                 configuration = next(configurations, None)
             if configuration is None:
                 break
-            first = first or configuration
             yield configuration
-        if first is not None and isinstance(context.request.motion, FreeMotion):
-            yield from self._goals.other_ways_round(first, context.start)
+
+    def _other_ways(self, goals: list[Start], context: PlanningContext) -> Iterator[Start]:
+        """Where any way will do, the goals found by then, with joints without limits turned the other way round."""
+        if isinstance(context.request.motion, FreeMotion):
+            yield from self._goals.other_ways_round(goals, context.start)
 
     def _around(
         self, motion: FreeMotion, goals: Array, blocked: Array, context: PlanningContext

@@ -32,9 +32,10 @@ class Centring:
         )
         self._weight = np.array([2.0 / (upper - lower) for lower, upper in spans])  # 0 without limits
 
-    def is_redundant(self, target: ToolTarget, solution: Array) -> bool:
-        """True if the joints can move at `solution` (n,) [rad] or [m] without the tool leaving its target."""
-        return len(self._free_motions(target, solution)) > 0
+    def is_redundant(self, target: ToolTarget, solution: Array, idle: int = 0) -> bool:
+        """True if the joints can move at `solution` (n,) [rad] or [m] without the tool leaving its target, other than
+        those `idle` ones that never move it."""
+        return len(self._free_motions(target, solution)) > idle
 
     def centred(self, target: ToolTarget, solution: Array) -> Array | None:
         """Joint values (n,) [rad] or [m] nearer to the middles of their ranges, reached from `solution` (n,) by

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,11 +67,16 @@ class Goals:
                     INVALID, "goal", "this planner takes one goal at a time", "ask for the first point alone"
                 )
 
-    def other_ways_round(self, configuration: Start, start: Start) -> list[Start]:
-        """Where the arm stands as in `configuration` (n,) [rad] or [m], with joints without limits a full turn away;
-        the fastest to reach from `start` (n,) first."""
-        rows = self._turns.other_ways_round(np.array(configuration), np.array(start), MOST_OTHER_WAYS)
-        return [tuple(row.tolist()) for row in rows]
+    def other_ways_round(self, configurations: Sequence[Start], start: Start) -> list[Start]:
+        """Where the arm stands as in one of the `configurations` (n,) [rad] or [m], with joints without limits a full
+        turn away; the fastest to reach from `start` (n,) first."""
+        near = np.array(start)
+        rows = [
+            tuple(row.tolist())
+            for configuration in configurations
+            for row in self._turns.other_ways_round(np.array(configuration), near, MOST_OTHER_WAYS)
+        ]
+        return sorted(rows, key=lambda row: self.travel(start, row))
 
     def _named(self, goal: NamedGoal, start: Start) -> Start:
         values = self._arm.named_state(goal.name, start)

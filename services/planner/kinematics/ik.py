@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import chain, islice
 
@@ -29,6 +30,7 @@ FINE_TURNS, MOST_AT_LIMITS = (
     120,
     12,
 )  # the same, where none of those has a configuration, and configurations that are tried then
+LOOKS, NO_EFFECT = 5, 1e-9  # configurations in which a joint does not move the tool, by so much per rad or m
 TURNS = 16  # rotations about the axis of a tool that only has to point somewhere
 SAME = 1e-4  # [s] at full speed: solutions nearer than that are one
 SAME_REDUNDANT = 0.1  # [s] the same, where solutions lie in a continuum; chosen: neighbours there are no other choice
@@ -45,8 +47,11 @@ class InverseKinematics:
         self._parallel: ParallelAxes | None = None if is_numeric else parallel_axes(arm, kinematics)
         self._lower, self._upper = one_turn(arm)
         self._speed = np.array([joint.velocity for joint in arm.joints])
+        self._idle = self._without_effect(arm)
         # The first joint of the chain turns the whole arm as it is: its mirror image is no other configuration.
-        self._mirrored = [index for index in chain_order(arm)[1:] if arm.joints[index].unit == "rad"]
+        turning = [index for index in chain_order(arm)[1:] if arm.joints[index].unit == "rad"]
+        self._mirrored = [index for index in turning if not self._idle[index]]
+        self._period = np.array([math.tau if math.isinf(joint.upper) else 0.0 for joint in arm.joints])
         self._starts = spread(arm, self._start_count(arm))
 
     @property
@@ -142,6 +147,17 @@ class InverseKinematics:
             if attempt.is_solution:
                 yield attempt.positions
 
+    def _as_near(self, positions: Array, near: Array) -> Array:
+        """The same pose of the tool with joints without limits less than half a turn from `near` (n,) [rad] or [m], and
+        those that do not move the tool, as of a gripper, as they are there."""
+        turns = np.rint((positions - near) / np.where(self._period > 0.0, self._period, 1.0))
+        return np.where(self._idle, near, positions - turns * self._period)
+
+    def _without_effect(self, arm: Arm) -> NDArray[np.bool_]:
+        """(n,) True for the joints that do not move the tool."""
+        rows = [self._kinematics.jacobian(start) for start in spread(arm, LOOKS)]
+        return np.asarray(np.abs(np.vstack(rows)).max(axis=0) < NO_EFFECT)
+
     def _start_count(self, arm: Arm) -> int:
         return MORE_STARTS if len(arm.joints) >= FULL_POSE_JOINTS and self._closed is None else STARTS
 
@@ -153,7 +169,7 @@ class InverseKinematics:
             new: list[Array] = []
             for attempt in batch:
                 if attempt.is_solution:
-                    self._collect(target, attempt.positions, found, new)
+                    self._collect(target, attempt.positions, near, found, new)
             yield from sorted(new, key=lambda positions: self.travel(near, positions))
 
     def _first(self, target: ToolTarget, near: Array) -> list[Array]:
@@ -161,21 +177,23 @@ class InverseKinematics:
         first = self.descend(target, near)
         if not first.is_solution:
             return []
-        found = [first.positions]
-        if len(near) < FULL_POSE_JOINTS and not self._centring.is_redundant(target, first.positions):
+        found = [self._as_near(first.positions, near)]
+        idle = int(np.count_nonzero(self._idle))
+        if len(near) - idle < FULL_POSE_JOINTS and not self._centring.is_redundant(target, first.positions, idle):
             for joint in self._mirrored:
                 start = first.positions.copy()
                 start[joint] = self._lower[joint] + self._upper[joint] - start[joint]
                 attempt = self.descend(target, start)
-                if attempt.is_solution and self._is_new(attempt.positions, found, SAME):
-                    found.append(attempt.positions)
+                positions = self._as_near(attempt.positions, near)
+                if attempt.is_solution and self._is_new(positions, found, SAME):
+                    found.append(positions)
         return sorted(found, key=lambda positions: self.travel(near, positions))
 
-    def _collect(self, target: ToolTarget, positions: Array, found: list[Array], new: list[Array]) -> None:
+    def _collect(self, target: ToolTarget, positions: Array, near: Array, found: list[Array], new: list[Array]) -> None:
         """Puts a solution that is none of those found into both lists; far from `near`, freedom goes to the middles."""
         centred = self._centring.centred(target, positions)
         is_redundant = centred is not None
-        positions = positions if centred is None else centred
+        positions = self._as_near(positions if centred is None else centred, near)
         if self._is_new(positions, found, SAME_REDUNDANT if is_redundant else SAME):
             found.append(positions)
             new.append(positions)
