@@ -86,7 +86,14 @@ def test_a_reader_that_stops_reading_holds_nobody_up(links, capsys, frozen):
         if frozen:
             process.send_signal(signal.SIGSTOP)
         require_exact_and_stoppable(links, capsys)
+        assert all(unread(links, process.pid)), "it has read on"
         process.send_signal(signal.SIGCONT)
+
+
+def unread(links: Links, pid: int) -> list[int]:
+    """[bytes] that wait in each link of the process; empty where its links were dropped."""
+    said = subprocess.run(links.hosts.command("desk", "ss", "-tnpH"), capture_output=True, text=True, check=True).stdout
+    return [int(line.split()[1]) for line in said.splitlines() if f"pid={pid}," in line]
 
 
 def test_after_all_of_it_everything_is_ready_and_a_move_goes_on(links):
