@@ -7,7 +7,8 @@ from schemas.site import Site
 from services.hosts.layout import Process, listening, processes
 from services.hosts.quoting import Value, toml
 
-HEADER = "# Written by `gemelo deploy render {site} {host}`; what it is made of is deploy/hosts/{site}.toml.\n\n"
+WRITTEN = "# Written by `gemelo deploy render "
+HEADER = WRITTEN + "{site} {host}`; what it is made of is deploy/hosts/{site}.toml.\n\n"
 HOST = "host"  # the file of router and broker; no robot may have this name
 
 

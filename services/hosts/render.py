@@ -14,6 +14,8 @@ from services.mqtt.secure_folder import lines, mosquitto_conf
 from services.runtime.bus.zenoh_config import locked_router
 from services.runtime.permissions import access_control
 
+OF_A_PLACE = ("router.json5", "mosquitto.conf")  # of a host where router or broker run
+
 
 def rendered(site: Site, host: str) -> dict[str, str]:
     """The files of a host by path, relative to its folder; none of them holds a secret."""
@@ -33,17 +35,23 @@ def rendered(site: Site, host: str) -> dict[str, str]:
 
 
 def write(site: Site, host: str, folder: Path) -> tuple[Path, ...]:
-    """Writes the files of a host into `folder`, and returns them; units of services that have left it go."""
+    """Writes the files of a host into `folder`, and returns them; those of what has left it go."""
     files, written = rendered(site, host), []
-    for unit in (folder / "systemd").glob("*"):
-        if f"systemd/{unit.name}" not in files:
-            unit.unlink()
+    for file in (*folder.glob("*"), *folder.glob("systemd/*")):
+        name = str(file.relative_to(folder))
+        if name not in files and (file.parent != folder or name in OF_A_PLACE or _is_deployment(file)):
+            file.unlink()
     for name, text in files.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
         written.append(path)
     return tuple(written)
+
+
+def _is_deployment(file: Path) -> bool:
+    """True for a robot's file of a former render, and false for any that a person has put there."""
+    return file.suffix == ".toml" and file.read_text(encoding="utf-8").startswith(deployments.WRITTEN)
 
 
 def router(site: Site) -> str:

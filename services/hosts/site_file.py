@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Iterable
 from enum import EnumType
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import msgspec
 
@@ -18,7 +18,7 @@ from schemas.site import Site, SiteBroker, SiteHost, SiteRecord, SiteRobot, Site
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,30}")  # of a host or a site: part of file names, units and certificates
 PLAIN = '1 to 31 lower-case letters, digits, "_" or "-"'
-WANTED = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$([^`]*)`)?")  # msgspec's own sentence
+WANTED = re.compile(r"Expected `(\w+)`, got `(\w+)`")  # msgspec's own sentence
 IN_TOML = {
     "array": "a list", "object": "a table", "str": 'a text in "..."', "int": "a whole number",
     "float": "a number with a point", "bool": "true or false",
@@ -111,15 +111,37 @@ def _record(kind: type[R], raw: dict[str, Any], place: Where, problems: Problems
                 problems.add(place, f'key "{".".join(map(str, (*place, name)))}" is missing')
             continue
         try:
-            values[name] = msgspec.convert(raw[name], field.type)
-            _require_plain(raw[name])
-        except (msgspec.ValidationError, ValueError) as error:
+            values[name] = _converted(raw[name], field.type)
+        except ValueError:
             is_whole = False
             if raw[name] is not None and not _is_reported(raw[name]):
-                problems.add(
-                    (*place, name), f'key "{".".join(map(str, (*place, name)))}": {_in_toml(str(error), field.type)}'
-                )
+                problems.add(*_wrong((*place, name), raw[name], field.type))
     return kind(**values) if is_whole else None
+
+
+def _converted(value: object, kind: Any) -> Any:
+    """Raises `ValueError` where the value is no `kind`, or holds what no file may hold."""
+    made = msgspec.convert(value, kind)  # whose error is a ValueError
+    _require_plain(value)
+    return made
+
+
+def _wrong(place: Where, value: object, kind: Any) -> tuple[Where, str]:
+    """The innermost thing of a value that is no `kind`: where it stands, and what is wrong with it."""
+    key, inner = ".".join(str(each) for each in place if not isinstance(each, int)), get_args(kind)
+    parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for at, part in parts if inner else ():
+        of_part = inner[1] if isinstance(value, dict) else inner[0]
+        try:
+            _converted(part, of_part)
+        except ValueError:
+            return _wrong((*place, at), part, of_part)
+    try:
+        _converted(value, kind)
+    except ValueError as error:
+        what = "what stands in it " if isinstance(place[-1], int) else ""
+        return place, f'key "{key}": {what}{_in_toml(str(error), kind)}'
+    raise AssertionError(f"{key} is right")
 
 
 def _in_toml(said: str, kind: object) -> str:
@@ -128,9 +150,8 @@ def _in_toml(said: str, kind: object) -> str:
         return f"{said.removeprefix('Invalid enum value ')} is not one of {', '.join(kind)}"
     if not (found := WANTED.fullmatch(said)):
         return said
-    wanted, got, within = found.groups()
-    what = "what stands in it " if within else ""
-    return f"{what}must be {IN_TOML.get(wanted, wanted)}, not {IN_TOML.get(got, got)}"
+    wanted, got = found.groups()
+    return f"must be {IN_TOML.get(wanted, wanted)}, not {IN_TOML.get(got, got)}"
 
 
 def _is_reported(value: object) -> bool:

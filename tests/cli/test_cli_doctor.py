@@ -18,6 +18,7 @@ from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.mqtt import secure_folder
 from services.runtime.clock_offset import ClockOffset
+from services.runtime.deployment import when_silent
 from tests.stepper_gateway.locked import Mosquitto, external, locked
 
 OK = ClockOffset(0.0, 0.001)
@@ -147,6 +148,7 @@ device = "/dev/nobody"
     monkeypatch.setenv("GEMELO_CONFIG", str(file))
     found = {each.subject: each for each in doctor.diagnoses()}
     assert found["wire"].verdict is doctor.Verdict.OK
+    assert found["wire"].found == "the gateway is on another host of the site, and the device's wire with it"
     (keys / "gateway.pem").touch()
     found = {each.subject: each for each in doctor.diagnoses()}
     assert found["broker" if wire == "mqtt" else "serial port"].verdict is doctor.Verdict.ERROR
@@ -165,3 +167,11 @@ def test_the_doctor_says_what_is_wrong_with_the_deployment(monkeypatch, tmp_path
     monkeypatch.setenv("GEMELO_CONFIG", str(tmp_path / "site.toml"))
     assert run(["doctor"]) is ExitCode.FAILED
     assert "rober" in capsys.readouterr().out
+
+
+def test_a_gateway_that_says_nothing_is_looked_for_on_its_own_host():
+    here, away = (doctor.device(None, None, when_silent(host)) for host in ("127.0.0.1", "10.0.0.12"))
+    assert here.found == away.found == "stepper_gateway says nothing of it"
+    assert "make up" in here.remedy
+    assert "make up" not in away.remedy
+    assert "ping 10.0.0.12" in away.remedy

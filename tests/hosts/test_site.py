@@ -104,7 +104,13 @@ def test_a_virtual_device_on_a_serial_line_is_on_the_host_of_its_gateway(tmp_pat
     [
         ('host = "cell"', 'host = "cell"\nport = 883', "line 9: 883 is root's, which the services are not"),
         ('host = "cell"', 'host = "cell"\nport = 70000', "line 9: 70000 is no port: 1024 to 65535"),
-        (PLANS, 'rm1 = "planner"', 'line 21: key "hosts.brain.services": what stands in it must be a list, not a text'),
+        (PLANS, 'rm1 = "planner"', 'line 22: key "hosts.brain.services.rm1": must be a list, not a text'),
+        (PLANS, 'rm1 = [\n"planner",\n7]', 'line 24: key "hosts.brain.services.rm1": what stands in it must be a text'),
+        (
+            PLANS,
+            'rm1 = ["plan\\ner"]',
+            "line 22: key \"hosts.brain.services.rm1\": what stands in it 'plan\\ner' holds",
+        ),
         ("# A lab", "certificate_days = 40000\n# A lab", "line 1: 40000 days: a certificate has 1 to 3650"),
         (
             "# A lab",
