@@ -21,7 +21,7 @@ RUN apt-get update \\
 COPY . /opt/gemelo
 # Compiled here, as no process can write there later; without what only building needs.
 RUN cd /opt/gemelo \\
-    && EXTRAS="{extras}" deploy/bootstrap \\
+    && EXTRAS="{extras}" SUPERVISOR=none deploy/bootstrap \\
     && .venv/bin/python -m compileall -q -j 0 .venv/lib gemelo schemas services firmware \\
     && rm -rf .gemelo \\
     && chmod -R a+rX .
@@ -107,9 +107,9 @@ def _mount(path: str, is_read_only: bool) -> dict[str, Any]:
 
 
 def _probe(site: Site, process: Process, project: str) -> str:
-    """A line of shell that succeeds while the process says that it is ready."""
+    """A line of shell that succeeds while the process says that it is ready, and ends it where it stands still."""
     run = shlex.quote(f"{site.state}/{process.robot or HOST}/run")
-    return f"GEMELO_PATHS_RUN={run} {shlex.quote(f'{project}/deploy/probe')} {process.service.name}"
+    return f"GEMELO_PATHS_RUN={run} {shlex.quote(f'{project}/deploy/probe')} {process.service.name} restart"
 
 
 def _text(content: dict[str, Any]) -> str:

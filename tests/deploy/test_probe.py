@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
+import sys
 import time
+from collections.abc import Iterator
 
 import pytest
 
 from services.runtime.deployment import project_root
+from services.runtime.process.readiness import Readiness
+from tests.runtime.support import until
 
 ROOT = project_root()
 
 
-def probe(name, **environment):
+def probe(name, *words, **environment):
     return subprocess.run(
-        ["deploy/probe", name],
+        ["deploy/probe", name, *words],
         cwd=ROOT,
         env={"PATH": os.environ["PATH"], **environment},
         capture_output=True,
@@ -52,3 +57,92 @@ def test_the_folder_may_stand_in_the_deployment_file(tmp_path):
 
 def test_the_local_deployment_has_the_default_folder(tmp_path):
     assert ".gemelo/run/absent.ready" in probe("absent").stdout
+
+
+BEATS = """
+import sys, time
+from pathlib import Path
+from services.runtime.process.readiness import Readiness
+readiness = Readiness(Path(sys.argv[1]), "gateway")
+while True:
+    readiness.beat()
+    time.sleep(0.1)
+"""
+
+
+@pytest.fixture
+def beating(tmp_path) -> Iterator[subprocess.Popen[bytes]]:
+    """A process whose board is off: it is not ready, and its loop runs."""
+    process = subprocess.Popen([sys.executable, "-c", BEATS, str(tmp_path)], cwd=ROOT)
+    try:
+        alive = tmp_path / "gateway.alive"
+        assert until(lambda: alive.exists() and alive.read_text(), 20.0)
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def age(folder, name: str, seconds: float) -> None:
+    os.utime(folder / f"gateway.{name}", (time.time() - seconds,) * 2)
+
+
+def look(folder, *words: str) -> None:
+    assert probe("gateway", *words, GEMELO_PATHS_RUN=str(folder)).returncode == 1
+
+
+def stand_still(process: subprocess.Popen[bytes], folder) -> None:
+    """Long enough to be ended at the second look, which is 3 s after the first."""
+    process.send_signal(signal.SIGSTOP)
+    assert until(lambda: "T" in status(process)), status(process)
+    age(folder, "alive", 9.0)
+    look(folder, "restart")
+    age(folder, "still", 3.0)
+
+
+def status(process: subprocess.Popen[bytes]) -> str:
+    with open(f"/proc/{process.pid}/stat") as file:
+        return file.read().rpartition(")")[2].split()[0]
+
+
+def test_who_stands_still_is_ended_at_the_second_look(tmp_path, beating):
+    stand_still(beating, tmp_path)
+    said = probe("gateway", "restart", GEMELO_PATHS_RUN=str(tmp_path))
+    assert (said.returncode, "gateway stood still" in said.stdout) == (1, True)
+    assert beating.wait(5.0) == -signal.SIGKILL
+
+
+def test_who_is_not_ready_and_goes_on_is_never_ended(tmp_path, beating):
+    """Nor one that stood still once, was seen so, and has gone on since, as after a laptop's sleep."""
+    for _ in range(2):
+        (tmp_path / "gateway.still").unlink(missing_ok=True)  # here all is older than it would be
+        beating.send_signal(signal.SIGSTOP)
+        age(tmp_path, "alive", 9.0)
+        look(tmp_path, "restart")
+        assert (tmp_path / "gateway.still").exists()
+        beating.send_signal(signal.SIGCONT)
+        assert until(lambda: time.time() - (tmp_path / "gateway.alive").stat().st_mtime < 1.0)
+        age(tmp_path, "still", 3.0)
+        look(tmp_path, "restart")
+    assert beating.poll() is None
+
+
+def test_a_look_for_readiness_alone_ends_nobody(tmp_path, beating):
+    stand_still(beating, tmp_path)
+    look(tmp_path)
+    assert beating.poll() is None
+
+
+def test_another_process_that_has_the_number_now_is_not_ended(tmp_path, beating):
+    stand_still(beating, tmp_path)
+    pid, started = (tmp_path / "gateway.alive").read_text().split()
+    (tmp_path / "gateway.alive").write_text(f"{pid} {int(started) - 1}\n")
+    age(tmp_path, "alive", 9.0)
+    look(tmp_path, "restart")
+    assert beating.poll() is None
+
+
+def test_who_starts_anew_is_not_judged_by_the_beats_of_its_former_self(tmp_path):
+    (tmp_path / "planner.alive").write_text("1 1\n")
+    Readiness(tmp_path, "planner")
+    assert not (tmp_path / "planner.alive").exists()

@@ -24,7 +24,7 @@ def test_an_image_has_the_user_of_the_services_and_installs_what_its_host_runs(t
     lab = site(tmp_path)
     for host in lab.hosts:
         lines = rendered(lab, host)["Containerfile"].splitlines()
-        assert f'    && EXTRAS="{" ".join(extras(lab, host))}" deploy/bootstrap \\' in lines
+        assert f'    && EXTRAS="{" ".join(extras(lab, host))}" SUPERVISOR=none deploy/bootstrap \\' in lines
         # Its folders are readable for this user alone, and root without capabilities is nobody special.
         assert lines[-1] == f"USER {lab.user}"
         assert not any("user" in service for service in services(lab, host).values())

@@ -18,7 +18,7 @@ from services.hosts import install
 from services.hosts.checks import load_site
 from services.hosts.containers import IN_IMAGE
 from services.hosts.layout import Process, processes, robots
-from services.hosts.render import rendered
+from services.hosts.render import rendered, write
 from services.hosts.site_file import SiteError
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.process.readiness import GOES_ON
@@ -105,7 +105,7 @@ def require_nothing_injected(lab: Site, plain: Site) -> None:
 
 def probe_words(lab: Site, process: Process, project: str) -> list[str]:
     run = f"GEMELO_PATHS_RUN={lab.state}/{process.robot or 'host'}/run"
-    return [run, f"{project}/deploy/probe", process.service.name]
+    return [run, f"{project}/deploy/probe", process.service.name, "restart"]
 
 
 def require_same_image(text: str, plain: str, user: str) -> None:
@@ -303,3 +303,22 @@ def test_no_rendered_file_of_a_host_names_the_authoritys_key(tmp_path):
     lab = site(tmp_path)
     for host in lab.hosts:
         assert not any("ca.key" in text for text in rendered(lab, host).values())
+
+
+def test_what_has_left_a_site_leaves_the_hosts_folders_and_what_a_person_put_there_stays(tmp_path):
+    folder = tmp_path / "desk"
+    parol6 = '[robots.parol6]\nfolder = "urdf/parol6"\npanel_port = 8089\n'
+    every = 'parol6 = ["stepper_gateway", "virtual_esp32", "state_publisher", "panel"]'
+    file = changed(tmp_path, "[hosts.cell]", f"{parol6}[hosts.cell]")
+    text = file.read_text().replace('rm1 = ["panel"]', f'rm1 = ["panel"]\n{every}')
+    file.write_text(text.replace('host = "brain"', 'host = "desk"').replace('host = "cell"', 'host = "desk"'))
+    write(load_site(file, project_root()), "desk", folder)
+    assert (folder / "parol6.toml").exists()
+    own = {"notes.toml": "# my own\n", "keys/ca.pem": ""}
+    for name, content in own.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(content)
+    lab = site(tmp_path)
+    write(lab, "desk", folder)
+    left = {str(each.relative_to(folder)) for each in folder.rglob("*") if each.is_file()}
+    assert left == rendered(lab, "desk").keys() | own.keys()

@@ -1,6 +1,7 @@
 """`<run>/<name>.ready`: the file by which a process says that its state is valid; `<name>.problem` says why it is not.
 
-Both are read by deploy/probe. Under systemd it is told too (sd_notify(3)): ready with the first valid state, and alive
+`<run>/<name>.alive` names the process, and is touched while its loop runs, whether its state is valid or not.
+All are read by deploy/probe. Under systemd it is told too (sd_notify(3)): ready with the first valid state, and alive
 with every beat, so that a process whose loop stands still is started anew, and one whose board is off is not. That
 also holds before the first valid state: a start may take as long as it is said to go on.
 """
@@ -22,10 +23,13 @@ class Readiness:
     def __init__(self, run_dir: Path, name: str) -> None:
         self._file = run_dir / f"{name}.ready"
         self._problem_file = run_dir / f"{name}.problem"
+        self._alive_file = run_dir / f"{name}.alive"
+        self._process = own_process()  # which may become another program, and leave its beats to a child
         self._is_ready = False
         self._problem = ""  # as its file has it
         _remove(self._file)
         _remove(self._problem_file)
+        _remove(self._alive_file)
 
     @property
     def is_ready(self) -> bool:
@@ -50,16 +54,12 @@ class Readiness:
     def beat(self) -> None:
         """Call once a second, ready or not."""
         tell_alive()
-        if not self._is_ready:
-            return
-        try:
-            os.utime(self._file)
-        except FileNotFoundError:
-            self._write()
+        _touch(self._alive_file, self._process)
+        if self._is_ready:
+            _touch(self._file, str(os.getpid()))
 
     def _write(self) -> None:
-        self._file.parent.mkdir(parents=True, exist_ok=True)
-        self._file.write_text(f"{os.getpid()}\n", encoding="ascii")
+        _write(self._file, str(os.getpid()))
 
     def _tell(self, problem: str) -> None:
         """Brings the file of the problem up to date; no process ends because that cannot be written."""
@@ -71,6 +71,25 @@ class Readiness:
         with contextlib.suppress(OSError):
             self._problem_file.parent.mkdir(parents=True, exist_ok=True)
             self._problem_file.write_text(f"{problem}\n", encoding="utf-8")
+
+
+def own_process() -> str:
+    """The id of this process and, on Linux, when it started in ticks since boot (proc(5)): no other has both."""
+    with contextlib.suppress(OSError):
+        return f"{os.getpid()} {Path('/proc/self/stat').read_text().rpartition(')')[2].split()[19]}"
+    return str(os.getpid())
+
+
+def _touch(file: Path, content: str) -> None:
+    try:
+        os.utime(file)
+    except FileNotFoundError:
+        _write(file, content)
+
+
+def _write(file: Path, content: str) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(f"{content}\n", encoding="ascii")
 
 
 def _remove(file: Path) -> None:
