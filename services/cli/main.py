@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import atexit
 import os
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
+from typing import NoReturn
 
 from services.cli.commands import COMMANDS, GROUPS
 from services.cli.errors import CommandError, ExitCode, unknown, usage
 from services.cli.parser import Options, build
+from services.runtime.process.leaving import end_process
 
 ABOUT = "The twin's command line: move the arm, and see everything that is said about it."
 EPILOG = (
@@ -82,15 +82,9 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
         return ExitCode.OK
 
 
-def main() -> None:
-    """The console script. It ends without Python's own finalization, which aborts the process ("FATAL: exception not
-    rethrown") where a thread of a library or of a node calls into it at that moment, as after Ctrl-C."""
-    code = run()
-    atexit._run_exitfuncs()
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError):  # the reader has gone
-            stream.flush()
-    os._exit(code)
+def main() -> NoReturn:
+    """The console script."""
+    end_process(run())
 
 
 if __name__ == "__main__":

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from schemas.deployment import Deployment
 from schemas.errors import ConfigurationError
@@ -13,6 +13,7 @@ from services.runtime.deployment import load_deployment
 from services.runtime.errors import BusError, RequestRefused
 from services.runtime.node import Node
 from services.runtime.process.freed_memory import give_back_freed_memory
+from services.runtime.process.leaving import end_process
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.shutdown import ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
 
@@ -20,7 +21,7 @@ Run = Callable[[Node, Deployment], None]
 EXPECTED = (ConfigurationError, BusError, RequestRefused)  # a sentence says all; anything else shows where it happened
 
 
-def service(name: str, run: Run, arguments: Sequence[str] | None = None) -> None:
+def service(name: str, run: Run, arguments: Sequence[str] | None = None) -> NoReturn:
     """Opens the node `name`, runs `run(node, deployment)`, and ends the process: 0 when stopped, 1 for an error."""
     options = _parse(name, arguments)
     stop = ShutdownRequest()
@@ -28,8 +29,8 @@ def service(name: str, run: Run, arguments: Sequence[str] | None = None) -> None
     give_back_freed_memory()
     with stop_on_signals(stop):
         code = _run(name, run, options, stop)
-    end_soon(code)  # whatever threads a library has left behind
-    sys.exit(code)
+    end_soon(code)  # whatever an exit handler does
+    end_process(code)
 
 
 def _run(name: str, run: Run, options: argparse.Namespace, stop: ShutdownRequest) -> int:

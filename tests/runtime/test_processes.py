@@ -134,6 +134,25 @@ def test_a_callback_that_never_returns_does_not_keep_the_process(start: Start) -
     assert "in step" in errors
 
 
+def test_what_a_thread_still_holds_at_the_end_is_not_called_a_leak(start: Start) -> None:
+    """A thread of Zenoh or of an open link that has not ended in time has the gateway's generator of ruckig's."""
+    process = start(
+        """
+        import threading
+        from ruckig import Ruckig
+
+        def run(node, deployment):
+            threading.Thread(target=lambda held: time.sleep(60), args=(Ruckig(6, 0.01),), daemon=True).start()
+            print("spins", flush=True)
+            node.spin()
+
+        service("held", run)
+        """
+    )
+    await_line(process, "spins")
+    assert end(process) == (0, "")
+
+
 def test_a_callback_that_raises_ends_the_process_with_one_report(start: Start, router: RouterProcess) -> None:
     process = start(
         """
