@@ -13,9 +13,8 @@ from schemas.topics import TOPICS, Topic
 from services.cli.errors import unknown
 from services.cli.node import TIMEOUT, living
 from services.cli.session import CommandSession, connect
-from services.recordings.table import living_topic
+from services.recordings.living_topic import living_topic
 from services.runtime.deployment import load_deployment
-from services.runtime.endpoints import interfaces_request
 from services.runtime.errors import NoAnswer, RequestRefused
 
 KNOWN = {topic.key: topic for topic in TOPICS}
@@ -76,6 +75,8 @@ def other_topics(session: CommandSession) -> list[Topic[Any]]:
 
 
 def _interfaces(session: CommandSession, name: str) -> tuple[TopicInterface, ...]:
+    from services.runtime.endpoints import interfaces_request  # slow to load: all that a node has on the bus
+
     try:
         return session.node.call(interfaces_request(name), Empty(), timeout=TIMEOUT).topics
     except (NoAnswer, RequestRefused):  # it has just ended, or is older

@@ -18,7 +18,7 @@ from services.cli.parser import Choices, Options, Parser, json_option, positive_
 from services.cli.session import CommandSession, connect
 from services.cli.text_table import table
 from services.cli.topic_ends import Ends, ends
-from services.recordings.table import LivingTopic
+from services.recordings.living_topic import LivingTopic
 
 if TYPE_CHECKING:
     from gemelo import Robot

@@ -6,15 +6,16 @@ A reader that knows the request or action takes a class of the same name and fie
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any, cast
 
 import msgspec
 
 from schemas.actions import GoalRequest
 from schemas.message import Message, Vector
-from schemas.system import NodeRecord, TopicInterface
-from schemas.topics import ACTIONS, LATCHED, REQUESTS, TOPICS, Action, Delivery, Request, Topic
+from schemas.system import NodeRecord
+from schemas.topics import ACTIONS, LATCHED, REQUESTS, TOPICS, Action, Request, Topic
+from services.recordings.living_topic import LivingTopic, living_topic
 from services.runtime.actions import keys
 from services.runtime.requests.exchanges import exchange_topic
 
@@ -25,13 +26,6 @@ LISTS: dict[str, Any] = {
     **{f"list[{name}]": tuple[kind, ...] for name, kind in PLAIN.items()},  # type: ignore[valid-type]
     "Vector": Vector,
 }
-
-
-@dataclass(frozen=True)
-class LivingTopic(Topic[Any]):
-    """A topic of which only its node has the message's class."""
-
-    fields: dict[str, str] = field(default_factory=dict)  # their types by their names, as the class has them
 
 
 def recorded_topics() -> tuple[Topic[Any], ...]:
@@ -75,14 +69,6 @@ def topics_of_node(record: NodeRecord) -> tuple[Topic[Any], ...]:
     silent = {exchange_topic(keys.result_request(action)).key for action in actions}
     found = {**said, **asked, **inner}
     return tuple(found[key] for key in sorted(found.keys() - known - silent))
-
-
-def living_topic(told: TopicInterface) -> LivingTopic:
-    """With a message whose fields take whatever comes."""
-    fields = [(name, Any, None) for name, _ in told.fields]
-    kind = msgspec.defstruct(told.message, fields, bases=(Message,), frozen=True, kw_only=True)
-    delivery = Delivery(told.delivery) if told.delivery in {each.value for each in Delivery} else Delivery.EVERY
-    return LivingTopic(told.key, kind, delivery, told.rate, told.recorded, told.writer, told.about, dict(told.fields))
 
 
 def described(topic: Topic[Any]) -> type[Message]:

@@ -95,7 +95,10 @@ def test_a_robot_that_cannot_be_read_still_completes_the_commands(monkeypatch, c
     ("line", "absent"),
     [
         (["--help"], ("msgspec", "numpy", "zenoh", "services.cli.move", "services.cli.topic")),
-        (["topic", "list"], ("numpy", "zenoh", "services.arm.model.description", "services.cli.move")),
+        (
+            ["topic", "list"],
+            ("numpy", "zenoh", "services.arm.model.description", "services.cli.move", "services.runtime.actions"),
+        ),
         (["move", "--help"], ("numpy", "zenoh", "rich", "services.cli.jog")),
     ],
 )
