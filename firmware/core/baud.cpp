@@ -3,12 +3,13 @@
 namespace gemelo {
 namespace {
 
-// More than any frame's header and than a text line of six joints: so much is understood at the right rate.
+// More than any frame's header and than a text line of six joints: chosen so that at the right rate something is
+// understood.
 constexpr size_t kStrange = 128;
-constexpr uint64_t kTrialUs = 300000;
-// A sender that was understood is believed for so long: what disturbs the line must not lose it.
+constexpr uint64_t kTrialUs = 300000;  // chosen: three heartbeats of a host
+// A sender that was understood is believed for so long (chosen): what disturbs the line must not lose it.
 constexpr uint64_t kBeliefUs = 2000000;
-constexpr uint32_t kUsual[] = {kDefaultBaud, 115200, 57600, 9600};
+constexpr uint32_t kUsual[] = {kDefaultBaud, 115200, 57600, 9600};  // standard: what terminals and boards are set to
 
 }  // namespace
 

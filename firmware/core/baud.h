@@ -6,9 +6,9 @@
 
 namespace gemelo {
 
-constexpr uint32_t kDefaultBaud = 921600;
-constexpr uint32_t kLeastBaud = 9600;
-constexpr uint32_t kMostBaud = 3000000;
+constexpr uint32_t kDefaultBaud = 921600;  // standard: PROTOCOL.md
+constexpr uint32_t kLeastBaud = 9600;      // chosen: the slowest that terminals still have
+constexpr uint32_t kMostBaud = 3000000;    // standard: the fastest of common USB bridges (FT232R, CP2102N)
 
 // A decimal number of bauds; 0 for a text that is none, or out of bounds.
 uint32_t read_baud(const char* text);
@@ -24,7 +24,7 @@ class BaudSearch {
     bool hear(size_t bytes, uint32_t understood, uint64_t now_us);
 
   private:
-    static constexpr uint8_t kMostRates = 5;
+    static constexpr uint8_t kMostRates = 5;  // follows from kUsual: those, and the one that was set
 
     uint32_t rates_[kMostRates] = {};
     uint8_t count_ = 0;

@@ -11,7 +11,7 @@
 
 namespace gemelo {
 
-constexpr uint32_t kFullCeiling = 1u << 26;  // y = 1 in Q26
+constexpr uint32_t kFullCeiling = 1u << 26;  // y = 1 in Q26; chosen
 
 // Accelerations may go beyond the limit by 1/16, so that a path that brakes at the limit can be slowed at all.
 inline int64_t with_margin(int64_t acceleration) { return acceleration + acceleration / 16; }

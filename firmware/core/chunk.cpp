@@ -3,7 +3,8 @@
 namespace gemelo {
 namespace {
 
-constexpr int64_t kStartToleranceQ8 = 256;  // a pose told in whole steps lies within half a step of the path
+// One step; chosen: a pose told in whole steps lies within half a step of the path.
+constexpr int64_t kStartToleranceQ8 = 256;
 
 Verdict refusal(Code code, uint8_t joint, uint16_t k, int32_t value, int32_t limit) {
     return Verdict{code, joint, k, value, limit};

@@ -11,7 +11,7 @@
 
 namespace gemelo {
 
-constexpr size_t kChunkHeaderSize = 32;
+constexpr size_t kChunkHeaderSize = 32;  // standard: PROTOCOL.md
 
 // A view of a frame of at least kChunkHeaderSize bytes.
 class Chunk {

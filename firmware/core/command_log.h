@@ -28,7 +28,7 @@ class CommandLog {
         uint8_t command;
         Code code;
     };
-    static constexpr uint8_t kEntries = 16;
+    static constexpr uint8_t kEntries = 16;  // chosen
     Entry entry_[kEntries];
     uint8_t size_ = 0;
     uint8_t next_ = 0;

@@ -5,8 +5,8 @@
 namespace gemelo {
 namespace {
 
-constexpr uint8_t kMaxGroup = 15;
-constexpr uint32_t kMaxHomingMs = 600000;
+constexpr uint8_t kMaxGroup = 15;          // chosen
+constexpr uint32_t kMaxHomingMs = 600000;  // chosen: ten minutes
 
 bool is_same(const char* a, const char* b) {
     while (*a == *b && *a != 0) ++a, ++b;

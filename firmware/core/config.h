@@ -11,16 +11,16 @@
 namespace gemelo {
 
 constexpr uint8_t kMaxJoints = GEMELO_MAX_JOINTS;
-constexpr uint16_t kMaxKnots = 128;
-constexpr uint32_t kSlotUs = 1000;
-constexpr uint32_t kSlotHz = 1000;
-constexpr uint32_t kMaxTickHz = 100000;
-constexpr uint8_t kNameSize = 32;
-constexpr uint8_t kMaxInputs = 16;
-constexpr uint8_t kMaxOutputs = 8;
-constexpr uint8_t kMaxSensors = 8;
-constexpr uint8_t kMaxPin = 63;
-constexpr uint8_t kNone = 255;  // no pin, no joint, no input
+constexpr uint16_t kMaxKnots = 128;      // chosen: 2.56 s of a path at 20 ms a knot
+constexpr uint32_t kSlotUs = 1000;       // standard: the period of FreeRTOS's tick at 1 kHz
+constexpr uint32_t kSlotHz = 1000;       // follows from kSlotUs
+constexpr uint32_t kMaxTickHz = 100000;  // chosen: 50,000 steps/s
+constexpr uint8_t kNameSize = 32;        // chosen; with the 0 at its end
+constexpr uint8_t kMaxInputs = 16;       // follows from STATE: a bit each in 16
+constexpr uint8_t kMaxOutputs = 8;       // chosen
+constexpr uint8_t kMaxSensors = 8;       // chosen
+constexpr uint8_t kMaxPin = 63;          // follows from the masks of pins: 64 bits
+constexpr uint8_t kNone = 255;           // no pin, no joint, no input
 
 // How a joint finds its place: fast to its switch, off it, slowly to it again. Travels in Q24.8 steps.
 struct HomingConfig {
@@ -82,8 +82,8 @@ struct SensorConfig {
     int32_t offset_milli;
 };
 
-constexpr uint32_t kLeastServoUs = 500;
-constexpr uint32_t kMostServoUs = 2500;
+constexpr uint32_t kLeastServoUs = 500;  // standard: the shortest pulse of hobby servos
+constexpr uint32_t kMostServoUs = 2500;  // standard: the longest pulse of hobby servos
 
 // Pulse lengths in us; the pulse changes by speed_us_s, so that the horn can follow.
 struct ServoConfig {

@@ -8,8 +8,8 @@
 
 namespace gemelo {
 
-constexpr size_t kHeaderSize = 8;
-constexpr size_t kCrcSize = 4;
+constexpr size_t kHeaderSize = 8;  // standard: PROTOCOL.md
+constexpr size_t kCrcSize = 4;     // standard: CRC-32
 
 // A received frame whose magic, version and CRC are right. `size` counts all bytes but the CRC.
 struct Frame {

@@ -5,7 +5,7 @@
 namespace gemelo {
 namespace {
 
-// Slots from a ramp's last movement to the last pulse of it and the reading of the switch there.
+// Slots from a ramp's last movement to the last pulse of it and the reading of the switch there; chosen.
 constexpr uint8_t kSettled = 4;
 
 }  // namespace

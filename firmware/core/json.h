@@ -8,7 +8,7 @@ namespace gemelo {
 
 class JsonWriter {
   public:
-    static constexpr size_t kSize = 512;
+    static constexpr size_t kSize = 512;  // chosen
     JsonWriter() { put('{'); }
     void field(const char* key, const char* text);
     void field(const char* key, uint64_t number);

@@ -6,10 +6,10 @@ namespace gemelo {
 namespace {
 
 // A device without a configuration says how it is, too.
-constexpr uint32_t kStateHzInBoot = 50;
+constexpr uint32_t kStateHzInBoot = 50;  // standard: the rate of STATE
 
-constexpr uint64_t kLongestGapUs = 4 * kSlotUs;  // between two slots' starts: more than an over-run may make of it
-constexpr uint64_t kStatusPeriodUs = 10000000;   // a broker may have lost what it was told
+constexpr uint64_t kLongestGapUs = 4 * kSlotUs;  // chosen: more than an over-run may put between two slots' starts
+constexpr uint64_t kStatusPeriodUs = 10000000;   // chosen: a broker may have lost what it was told
 
 }  // namespace
 

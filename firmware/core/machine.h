@@ -164,8 +164,8 @@ class Machine {
     uint32_t speed_q30() const;
     uint16_t buffered_ms() const;
 
-    static constexpr size_t kCommandSize = 24;
-    static constexpr uint8_t kPoints = 4;  // before, finished, running, prepared
+    static constexpr size_t kCommandSize = 24;  // standard: PROTOCOL.md
+    static constexpr uint8_t kPoints = 4;       // follows from the slots: before, finished, running, prepared
 
     DeviceConfig* config_ = nullptr;
     Identity identity_{};

@@ -11,7 +11,7 @@
 
 namespace gemelo {
 
-constexpr size_t kMaxFrame = 8232;  // bytes
+constexpr size_t kMaxFrame = 8232;  // [bytes] chosen: a chunk of 128 knots of 8 joints fits
 
 class Packets {
   public:

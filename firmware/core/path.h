@@ -54,7 +54,7 @@ class Path {
     void move(uint64_t step);
     uint64_t segment_left() const { return (static_cast<uint64_t>(segment_.dt_us) << kTimeBits) - elapsed_; }
 
-    static constexpr uint8_t kTimeBits = 15;  // path time is counted in 2^-15 us
+    static constexpr uint8_t kTimeBits = 15;  // path time is counted in 2^-15 us; chosen
 
     uint8_t joints_ = 0;
     KnotQueue queue_;

@@ -87,8 +87,8 @@ enum class Command : uint8_t {
 constexpr uint16_t kFlagFirst = 1;
 constexpr uint16_t kFlagLast = 2;
 constexpr uint8_t kNoJoint = 255;
-constexpr uint32_t kMinDtUs = 1000;
-constexpr uint32_t kMaxDtUs = 250000;
+constexpr uint32_t kMinDtUs = 1000;    // standard: a slot
+constexpr uint32_t kMaxDtUs = 250000;  // chosen
 
 // Why a chunk was refused: which joint of which knot, its value and the limit it met.
 struct Verdict {

@@ -9,7 +9,7 @@
 namespace gemelo {
 namespace {
 
-constexpr size_t kLeastWifiPassword = 8;
+constexpr size_t kLeastWifiPassword = 8;  // standard: WPA2
 
 constexpr Field text(const char* key, size_t offset, size_t capacity) {
     return Field{key, Kind::Text, false, static_cast<uint16_t>(offset), static_cast<uint16_t>(capacity)};

@@ -5,7 +5,7 @@
 namespace gemelo {
 namespace {
 
-constexpr size_t kDetailSize = kNameSize + 48;
+constexpr size_t kDetailSize = kNameSize + 48;  // chosen: the words fit
 
 const char* sentence_of(FaultCode fault) {
     switch (fault) {

@@ -5,8 +5,9 @@
 namespace gemelo {
 namespace {
 
-constexpr uint32_t kMostMissed = 1024;     // heartbeats in a row, a minute and a half of them
-constexpr uint64_t kSilenceUs = 60000000;  // after which any newer counter counts: that many may be lost by then
+constexpr uint32_t kMostMissed = 1024;  // heartbeats in a row; chosen: a minute and a half of them
+// Chosen: after a minute any newer counter counts, as that many may be lost by then.
+constexpr uint64_t kSilenceUs = 60000000;
 
 }  // namespace
 

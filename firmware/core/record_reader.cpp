@@ -7,7 +7,7 @@
 namespace gemelo {
 namespace {
 
-constexpr size_t kKeySize = 32;
+constexpr size_t kKeySize = 32;  // chosen
 
 struct Range {
     int64_t lowest;

@@ -9,7 +9,7 @@ namespace gemelo {
 
 // The part it is about, empty for the whole, and a sentence; each is cut off where it would be too long.
 struct Refusal {
-    static constexpr size_t kReasonSize = 128;
+    static constexpr size_t kReasonSize = 128;  // chosen
     char part[kNameSize] = "";
     char reason[kReasonSize] = "";
 };

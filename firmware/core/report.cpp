@@ -7,8 +7,8 @@
 namespace gemelo {
 namespace {
 
-constexpr size_t kStateHeadSize = 60;
-constexpr size_t kStateServoSize = 4;
+constexpr size_t kStateHeadSize = 60;  // [bytes] standard: PROTOCOL.md
+constexpr size_t kStateServoSize = 4;  // [bytes] standard: PROTOCOL.md
 
 }  // namespace
 

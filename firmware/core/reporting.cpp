@@ -5,7 +5,7 @@
 namespace gemelo {
 namespace {
 
-// So often a reading is told if no other one comes: a sensor that is unplugged falls silent.
+// So often a reading is told if no other one comes (standard: PROTOCOL.md): a sensor that is unplugged falls silent.
 constexpr uint8_t kTellings = 3;
 
 int32_t saturate(int64_t value) {

@@ -5,7 +5,7 @@
 namespace gemelo {
 namespace {
 
-// Until so many slots after the start an input has had the readings it needs to be known.
+// Until so many slots after the start an input has had the readings it needs to be known (follows from InputWatch).
 constexpr uint32_t kSlotsToKnowInputs = 1;
 
 }  // namespace

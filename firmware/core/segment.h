@@ -7,8 +7,8 @@
 
 namespace gemelo {
 
-constexpr uint8_t kUnitBits = 24;  // the parameter u in [0, 1] is Q24
-constexpr uint8_t kFineBits = 20;  // positions on the path are Q20 steps in 64 bits
+constexpr uint8_t kUnitBits = 24;  // the parameter u in [0, 1] is Q24; chosen
+constexpr uint8_t kFineBits = 20;  // positions on the path are Q20 steps in 64 bits; chosen
 constexpr int64_t kFineStep = 1ll << kFineBits;
 
 // Steps from Q24.8 to Q20, exactly, and to the nearest Q24.8.

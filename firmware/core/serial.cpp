@@ -6,8 +6,8 @@
 namespace gemelo {
 namespace {
 
-constexpr uint64_t kStrangerUs = 2000000;
-constexpr uint64_t kPauseUs = 1000000;
+constexpr uint64_t kStrangerUs = 2000000;  // standard: PROTOCOL.md
+constexpr uint64_t kPauseUs = 1000000;     // chosen: ten heartbeats; what was begun before is no frame any more
 
 bool is_sign_of_life(FrameType type) {
     return type == FrameType::Traj || type == FrameType::Cmd || type == FrameType::Heartbeat;

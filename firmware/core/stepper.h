@@ -104,7 +104,7 @@ class Stepper {
     void turn(Axis& axis, uint32_t bit, uint8_t wait);
     uint32_t now() const { return slot_tick_ + ticks_per_slot_ - left_; }
 
-    static constexpr uint8_t kMaxMissed = 3;            // slots
+    static constexpr uint8_t kMaxMissed = 3;            // slots; standard: PROTOCOL.md, TICK_OVERRUN
     static constexpr uint32_t kNever = UINT32_MAX / 2;  // ticks
 
     // What every tick needs stands first.

@@ -24,7 +24,7 @@ class StreamLog {
     }
 
   private:
-    static constexpr uint8_t kPast = 8;
+    static constexpr uint8_t kPast = 8;  // chosen: a late chunk is of a stream that has just ended
     uint32_t past_[kPast] = {};
     uint8_t next_past_ = 0;
     uint32_t stream_ = 0;

@@ -3,8 +3,8 @@
 namespace gemelo {
 namespace {
 
-constexpr uint8_t kDecimals = 9;      // a number is counted in 1e-9 rad or m
-constexpr uint8_t kRestDecimals = 2;  // beyond the 1e-7 rad or m of text_scale_q32
+constexpr uint8_t kDecimals = 9;      // a number is counted in 1e-9 rad or m; chosen
+constexpr uint8_t kRestDecimals = 2;  // follows from the 1e-7 rad or m of text_scale_q32
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 

@@ -9,7 +9,7 @@
 
 namespace gemelo {
 
-constexpr size_t kMaxTextLine = 255;  // bytes, without the end of the line
+constexpr size_t kMaxTextLine = 255;  // bytes, without the end of the line; standard: PROTOCOL.md
 
 struct TextLine {
     bool is_line = false;  // false: cut off, or two lines in one; nothing else is set then

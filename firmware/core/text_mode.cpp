@@ -5,7 +5,7 @@
 namespace gemelo {
 namespace {
 
-constexpr uint64_t kSilenceUs = 1000000;
+constexpr uint64_t kSilenceUs = 1000000;  // chosen
 
 const char* name_of(Code code) {
     constexpr const char* kNames[] = {"OK",

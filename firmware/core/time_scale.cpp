@@ -5,9 +5,9 @@
 namespace gemelo {
 namespace {
 
-constexpr uint32_t kFastestChange = kFullScale / 4;
-constexpr int32_t kSlowJoint = 256;  // 1 step/s; slower ones count as this fast
-constexpr uint32_t kSlowest = 256;   // creeps on to the last knot instead of never reaching it
+constexpr uint32_t kFastestChange = kFullScale / 4;  // a slot; chosen: to rest within 4 slots where no joint swings
+constexpr int32_t kSlowJoint = 256;                  // 1 step/s; chosen: slower ones count as this fast
+constexpr uint32_t kSlowest = 256;                   // chosen: creeps on to the last knot instead of never reaching it
 
 uint32_t wide_root(uint64_t value) {
     uint64_t rest = value, result = 0;

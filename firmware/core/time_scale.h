@@ -8,7 +8,7 @@
 
 namespace gemelo {
 
-constexpr uint32_t kFullScale = 1u << 30;  // s = 1 in Q30
+constexpr uint32_t kFullScale = 1u << 30;  // s = 1 in Q30; chosen
 
 // Square root, rounded down.
 uint32_t root(uint64_t value);

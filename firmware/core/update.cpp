@@ -8,7 +8,7 @@
 namespace gemelo {
 namespace {
 
-constexpr size_t kContent = kHeaderSize + 12;                       // where a step's own bytes begin
+constexpr size_t kContent = kHeaderSize + 12;  // where a step's own bytes begin; standard: PROTOCOL.md
 constexpr size_t kLeastBegin = sizeof(uint32_t) + kDigestSize + 8;  // the shortest signature has 8 bytes
 
 bool refuse(Refusal* refusal, const char* reason) {

@@ -10,13 +10,13 @@
 
 namespace gemelo {
 
-constexpr size_t kDigestSize = 32;         // [bytes] SHA-256
-constexpr size_t kMaxSignature = 72;       // [bytes] ECDSA with P-256, DER
-constexpr size_t kMaxUpdatePiece = 4096;   // [bytes] one sector of the flash
-constexpr size_t kImageHeaderSize = 24;    // [bytes] esp_image_header_t of ESP-IDF
-constexpr uint8_t kImageMagic = 0xE9;      // its first byte
-constexpr size_t kImageChipOffset = 12;    // of the chip's id, u16
-constexpr uint16_t kVirtualChip = 0xFFFE;  // of a virtual device; ESP-IDF's invalid id is 0xFFFF
+constexpr size_t kDigestSize = 32;         // [bytes] standard: SHA-256
+constexpr size_t kMaxSignature = 72;       // [bytes] standard: ECDSA with P-256, DER
+constexpr size_t kMaxUpdatePiece = 4096;   // [bytes] standard: one sector of the flash
+constexpr size_t kImageHeaderSize = 24;    // [bytes] standard: esp_image_header_t of ESP-IDF
+constexpr uint8_t kImageMagic = 0xE9;      // standard: its first byte
+constexpr size_t kImageChipOffset = 12;    // standard: of the chip's id, u16
+constexpr uint16_t kVirtualChip = 0xFFFE;  // chosen: of a virtual device; ESP-IDF's invalid id is 0xFFFF
 
 enum class UpdateStep : uint8_t { Begin = 1, Data, End, Abort };
 

@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 ROOMS = ("docs", "examples", "firmware", "gemelo", "schemas", "services", "tests")
 TUNED = ("services/planner/", "services/stepper_gateway/")  # whose constants say where their values come from
-ORIGIN = re.compile(r"\b(?:[Cc]hosen|[Mm]easured|[Ss]tandard|rounding|rounded)\b")
+ORIGIN = re.compile(r"\b(?:[Cc]hosen|[Mm]easured|[Ss]tandard|[Rr]ounding|rounded)\b")
 REASON = 3  # words of a comment, besides units, that can say why
 FRAGMENT = 40  # lines: a shorter file with one importer is a part of it
 NUMBERS = {"float", "Array", "NDArray"}
@@ -185,6 +185,26 @@ def without_origin(module: Module) -> Iterator[str]:
             words = re.findall(r"[A-Za-z]{2,}", re.sub(r"\[[^\]]*\]", "", said))
             if len(words) < REASON or not ORIGIN.search(said + heading):
                 yield f"{module.name}: {ast.unparse(node)}"
+
+
+CONSTANT = re.compile(r"^(?:    static )?constexpr (?:u?int\d*_t|size_t|bool|double) (k\w+)(?:\[\])? = ([^;]*);(.*)$")
+IN_WORDS = re.compile(r"\bfollows from\b")  # C++ alone: of other constants, a mask or a layout
+# Names of values.
+NAMES = re.compile(r"^k(?:Flag\w+|None|NoJoint|Never|Micro|Required|Optional|Magic|ProtocolVersion)$")
+
+
+def without_origin_in_core(text: str) -> Iterator[str]:
+    """Numbers that are constants of a file of the firmware core without a comment, on the line or above it, that says
+    where they come from: chosen, measured, standard, or what they follow from. Those made of others alone need none."""
+    above = ""
+    for line in text.splitlines():
+        found = CONSTANT.match(line)
+        if found and not NAMES.match(found[1]) and re.search(r"(?<![\w.])\d", found[2]) and "sizeof" not in found[2]:
+            said = above + found[3]
+            is_made = re.search(r"\bk[A-Z]\w+", found[2]) and not re.search(r"(?<![\w.])(?!1(?:u|ll|\b))\d", found[2])
+            if not is_made and not ORIGIN.search(said) and not IN_WORDS.search(said):
+                yield found[1]
+        above = above + line if line.lstrip().startswith("//") else ""
 
 
 def _is_number(value: ast.expr) -> bool:

@@ -18,6 +18,7 @@ from tests.house.counts import (
     modules,
     without_excuse,
     without_origin,
+    without_origin_in_core,
     without_unit,
 )
 
@@ -81,6 +82,29 @@ def test_every_tuning_constant_says_where_its_value_comes_from(house):
     """Measured (by what), standard, or chosen (with the reason)."""
     tuned = [each for each in house.values() if str(each.path).startswith(TUNED)]
     assert [found for each in tuned for found in without_origin(each)] == []
+
+
+def test_every_constant_of_the_firmware_core_says_where_its_value_comes_from():
+    files = [each for each in sorted((ROOT / "firmware/core").iterdir()) if each.suffix in {".h", ".cpp"}]
+    assert len(files) > 60
+    assert [f"{each.name}: {name}" for each in files for name in without_origin_in_core(each.read_text())] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("constexpr size_t kSize = 512;", ["kSize"]),
+        ("constexpr size_t kSize = 512;  // bytes", ["kSize"]),
+        ("constexpr size_t kSize = 512;  // chosen", []),
+        ("// Standard: RFC 1.\nconstexpr size_t kSize = 512;", []),
+        ("// Standard: RFC 1.\nint a;\nconstexpr size_t kSize = 512;", ["kSize"]),
+        ("    static constexpr uint8_t kPast = 8;", ["kPast"]),
+        ("constexpr int64_t kFineStep = 1ll << kFineBits;", []),
+        ("constexpr uint64_t kLongest = 4 * kSlotUs;", ["kLongest"]),
+    ],
+)
+def test_a_constant_of_the_core_without_an_origin_is_seen(text, found):
+    assert list(without_origin_in_core(text)) == found
 
 
 def module(name: str, *lines: str) -> tuple[str, Module]:
