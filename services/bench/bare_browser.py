@@ -5,6 +5,7 @@ What it measures is the page's own: a real browser without a graphics card takes
 
 from __future__ import annotations
 
+import html
 import re
 import threading
 import time
@@ -27,7 +28,9 @@ CAMERA = {
     "far": 100.0, "image_height": 720, "image_width": 840, "look_at": (0.0, 0.0, 0.0), "up_direction": (0.0, 0.0, 1.0),
 }  # fmt: skip
 LENGTHS = 16  # [bytes] before the compressed part of a frame: its length decompressed, and compressed
+TAG = re.compile(r"<[^>]*>")
 MARK = re.compile(r'data-gemelo-sent="(\d+)"')
+PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 Said = dict[str, Any]  # one message of viser's, as its fields by name; "type" is its class
 PATIENCE = 30.0  # [s]
 
@@ -41,6 +44,7 @@ class BareBrowser:
         self._labels: dict[str, str] = {}  # of buttons, by their number
         self._sliders: dict[str, str] = {}  # labels of sliders, by their number
         self._choices: dict[str, str] = {}  # labels of drop-downs and checkboxes, by their number
+        self._texts: dict[str, str] = {}  # HTML, by its number
         self._channel, self._answered = "", ""  # the number of the hidden field, and the newest mark that was answered
         self.frames = 0
         socket.send(msgspec.msgpack.encode(CAMERA))  # with its first camera a browser is there
@@ -51,6 +55,13 @@ class BareBrowser:
         """Of all buttons."""
         with self._news:
             return set(self._labels.values())
+
+    @property
+    def texts(self) -> list[str]:
+        """All lines of the page that say something: how the arm is first, then the newest problem, if there is one."""
+        with self._news:
+            plain = [" ".join(TAG.sub(" ", text).split()) for text in self._texts.values()]
+        return [html.unescape(text) for text in plain if text]
 
     def wait_for(self, label: str) -> None:
         """Returns once the page has a button whose label begins so; raises TimeoutError if it has none."""
@@ -100,15 +111,12 @@ class BareBrowser:
             return found()
 
     def _hear(self) -> None:
-        unpacker = zstandard.ZstdDecompressor()
         with suppress(ConnectionClosed):
             for frame in self._socket:
                 now = time.monotonic()
                 assert isinstance(frame, bytes)
-                length, packed = (int.from_bytes(frame[at : at + 8], "little") for at in (0, 8))
-                text = unpacker.decompress(frame[LENGTHS : LENGTHS + packed], max_output_size=length)
                 self.frames += 1
-                for said in msgspec.msgpack.decode(text)["messages"]:
+                for said in messages_in(frame):
                     self._note(said)
                     self._on_said(said, now)
 
@@ -124,15 +132,28 @@ class BareBrowser:
                 self._news.notify_all()
         elif said["type"] == "GuiTextMessage" and said["value"].startswith(CHANNEL):
             self._channel = said["uuid"]
-        found = MARK.search(str((said.get("props") or said.get("updates") or {}).get("content", "")))
+        content = (said.get("props") or said.get("updates") or {}).get("content")
+        if said["type"] == "GuiRemoveMessage":
+            self._texts.pop(said["uuid"], None)
+        elif content is not None and "uuid" in said:
+            with self._news:
+                self._texts[said["uuid"]] = str(content)
+        found = MARK.search(str(content))
         if found and self._channel and found[1] != self._answered:
             self._answered = found[1]
             self._set(self._channel, f'{CHANNEL} {{"sent": {found[1]}, "language": "en", "rate": 60.0}}')
 
 
+def messages_in(frame: bytes) -> list[Said]:
+    """What viser has sent with one frame, without the arrays that follow it."""
+    length, packed = (int.from_bytes(frame[at : at + 8], "little") for at in (0, 8))
+    text = zstandard.ZstdDecompressor().decompress(frame[LENGTHS : LENGTHS + packed], max_output_size=length)
+    messages: list[Said] = msgspec.msgpack.decode(text)["messages"]
+    return messages
+
+
 @contextmanager
 def bare_browser(address: str, on_said: Callable[[Said, float], object]) -> Iterator[BareBrowser]:
     """One at the page at `address`, host and port; `on_said` gets each message and its arrival [s] monotonic."""
-    protocol = Subprotocol(f"viser-v{viser.__version__}")
-    with connect(f"ws://{address}", subprotocols=[protocol], max_size=None) as socket:
+    with connect(f"ws://{address}", subprotocols=[PROTOCOL], max_size=None) as socket:
         yield BareBrowser(socket, on_said)

@@ -189,10 +189,15 @@ def place_in_image(page: Page, camera: str, x: float, y: float) -> tuple[float, 
     return left + x * width, top + y * height
 
 
-def until(look: Callable[[], T], is_so: Callable[[T], bool], patience: float = PATIENCE / 1000.0) -> T:
-    """What `look` gives once it is so; AssertionError after `patience` [s]."""
+def until(
+    look: Callable[[], T],
+    is_so: Callable[[T], bool],
+    patience: float = PATIENCE / 1000.0,
+    said: Callable[[], object] = str,
+) -> T:
+    """What `look` gives once it is so; AssertionError after `patience` [s], with what `said` gives, as the page's."""
     end = time.monotonic() + patience
     while not is_so(seen := look()):
-        assert time.monotonic() < end, f"still {seen}"
+        assert time.monotonic() < end, f"still {seen}; {said()}"
         time.sleep(0.01)
     return seen

@@ -49,6 +49,12 @@ class Served:
         """What is drawn."""
         return self.panel._world
 
+    @property
+    def said(self) -> tuple[object, ...]:
+        """All that it shows, and what the run and the arm are at."""
+        arm, state = self.operator.arm, self.operator.teaching.state
+        return self.browser.texts, self.operator.newest_problem, state, arm.device.mode, arm.joints, arm.velocities
+
     def press(self, key: str) -> None:
         """The newest button of that word."""
         if key == "stop":

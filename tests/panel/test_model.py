@@ -26,6 +26,7 @@ from services.panel.model.goal import GoalSolver
 from services.panel.model.problems import Problem, problem_of
 from services.panel.model.teaching import deleted, inserted, shifted
 from services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, ToolTurns, tool_turns
+from services.panel.model.units import in_degrees
 from services.panel.view.browser import CHANNEL, Browser, read_browser, script_html
 from services.panel.view.obstacles import nearest_hit
 from services.panel.words.en import ENGLISH
@@ -356,3 +357,33 @@ def test_a_ray_meets_the_triangle_that_it_is_aimed_at(at: tuple[float, float], o
     distance = float(np.linalg.norm(aim))
     assert nearest_hit(np.array(origin), aim / distance, corners) == pytest.approx(distance)
     assert nearest_hit(np.array(origin), -aim / distance, corners) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("joint a at -1.5708 rad, limit 3.14159 rad", "joint a at -90.00 °, limit 180.00 °"),
+        ("faster than 0.5 rad/s", "faster than 28.65 °/s"),
+        ("between 0 and 1 rad of 2 m", "between 0.00 and 57.30 ° of 2 m"),
+        ("3 radios, 1 m", "3 radios, 1 m"),
+    ],
+)
+def test_a_line_of_the_log_has_its_angles_in_degrees(text: str, told: str) -> None:
+    assert in_degrees(text) == told
+
+
+@pytest.mark.parametrize(
+    ("place", "language", "told"),
+    [
+        ("at 0.1204 m of 0.3000 m along the path", "en", "At 120 mm of 300 mm of the path: arm and crate"),
+        ("at 0.1204 m of 0.3000 m along the path", "es", "A los 120 mm de los 300 mm del camino: arm y crate"),
+        ("at 40.2% of the turn along the path", "en", "At 40 % of the turn: arm and crate"),
+        ("at 40.2% of the turn along the path", "es", "Al 40 % del giro: arm y crate"),
+        ("no way", "es", "arm y crate"),
+    ],
+)
+def test_a_refused_line_says_where_on_its_way_it_would_end(place: str, language: str, told: str) -> None:
+    reason = f"{place}, arm with crate would be nearer than 5 mm"
+    text = f"refused (collision): {reason}"
+    problem = Problem(text, "collision", subject="arm / crate", value=-0.01, limit=0.005, reason=reason)
+    assert Words(language).problem(problem)[1].startswith(told)

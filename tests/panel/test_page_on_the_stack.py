@@ -93,6 +93,7 @@ def test_a_point_is_gone_to_overwritten_renamed_and_removed(served: Served, arm:
     until(lambda: tab._chosen.value, lambda chosen: chosen == "by the wall")
     until(lambda: served.page._problem.content, lambda content: content == "")
     served.browser.press_exactly(ENGLISH["remove"], 0)  # the tab of the scene has one too
+    served.browser.press(ENGLISH["remove_point"])  # it asks first
     until(lambda: list(teaching.points), lambda names: names == ["P0", "P1"])
     until(lambda: tab._chosen.value, lambda chosen: chosen == ENGLISH["none"])
     served.press("go_there")

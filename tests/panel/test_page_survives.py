@@ -24,7 +24,7 @@ def test_the_page_goes_on_when_a_process_is_killed_in_the_middle_of_its_move(
     with bare_browser(f"127.0.0.1:{twin.deployment['GEMELO_PANEL_PORT']}", lambda said, at: None) as browser:
         browser.slide(ARM, 120.0)
         browser.press("Plan and execute")
-        until(lambda: abs(arm.velocities[ARM]), lambda speed: speed > 0.1)
+        until(lambda: abs(arm.velocities[ARM]), lambda speed: speed > 0.1, said=lambda: browser.texts)
         twin.kill(victim)
         until(lambda: victim in twin.pids(), bool)
         twin.wait_ready(30.0)
@@ -32,6 +32,6 @@ def test_the_page_goes_on_when_a_process_is_killed_in_the_middle_of_its_move(
         make_ready(arm)
         browser.slide(ARM, -20.0)
         browser.press("Plan and execute")
-        until(lambda: degrees(arm.joints[ARM]), lambda now: abs(now + 20.0) < 0.06)
+        until(lambda: degrees(arm.joints[ARM]), lambda now: abs(now + 20.0) < 0.06, said=lambda: browser.texts)
     assert twin.pids()["panel"] == page
     assert "Traceback" not in twin.logs("panel")

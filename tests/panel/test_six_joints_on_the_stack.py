@@ -94,6 +94,7 @@ def test_a_jog_turns_the_tool_where_it_is_and_a_program_of_points_and_lines_runs
     arm.move(named="home")
     teaching._edit(Program("six", (Go(point=name), Line(offset=(0.0, 0.0, 0.03)))), is_saved=True)
     served.press("run_from")
-    until(lambda: served.page._programs._state.content, lambda content: ENGLISH["run_done"] in content)
+    state = served.page._programs._state
+    until(lambda: state.content, lambda content: ENGLISH["run_done"] in content, said=lambda: served.said)
     x, y, z = arm.fk(teaching.points[name].joints).position
     assert arm.pose().position == pytest.approx((x, y, z + 0.03), abs=2e-3)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from math import degrees, inf, pi, radians
 
 from services.arm.model.description import Joint
 
 SHOWN = {"rad": "°", "m": "mm"}
 STEP = {"rad": 0.1, "m": 0.1}  # [deg] or [mm] of a slider
+NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+ANGLES = re.compile(rf"({NUMBER}(?:(?:, | to | and | \.\. ){NUMBER})*) rad\b")  # also of a speed, as "0.5 rad/s"
 TURNS = 360.0  # [deg] both ways, that the slider of a joint without limits offers
 
 
@@ -38,6 +41,15 @@ def slider_value(joint: Joint, value: float) -> float:
 def text_of(joint: Joint, value: float) -> str:
     """The value with its unit."""
     return f"{shown(joint, value):.2f} {SHOWN[joint.unit]}"
+
+
+def in_degrees(text: str) -> str:
+    """A sentence of another part with its angles in degrees."""
+
+    def turned(found: re.Match[str]) -> str:
+        return re.sub(NUMBER, lambda number: f"{degrees(float(number[0])):.2f}", found[1]) + " °"
+
+    return ANGLES.sub(turned, text)
 
 
 def jog_speed(joint: Joint, share: float) -> float:

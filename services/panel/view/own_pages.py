@@ -17,14 +17,17 @@ from websockets.asyncio import server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
+from services.panel.view.own_pace import PacedConnection
+
 Handler = Callable[[ServerConnection, Request], Response | None]
 
 
 @contextmanager
 def own_pages_only(host: str) -> Iterator[None]:
-    """A server that viser starts meanwhile refuses the pages of other sites; `host` is the name that it listens on.
+    """A server that viser starts meanwhile refuses the pages of other sites, and sends none more than it reads; `host`
+    is the name that it listens on.
 
-    viser has no option for it, so the function that opens its port is wrapped.
+    viser has no option for either, so the function that opens its port is wrapped.
     """
     serve, names = server.serve, own_names(host)
 
@@ -35,7 +38,7 @@ def own_pages_only(host: str) -> Iterator[None]:
                 return connection.respond(HTTPStatus.FORBIDDEN, f"{reason}\n")
             return None if process_request is None else process_request(connection, request)
 
-        return serve(*arguments, process_request=answer, **options)
+        return serve(*arguments, process_request=answer, create_connection=PacedConnection, **options)
 
     server.serve = guarded  # type: ignore[assignment,misc]
     try:

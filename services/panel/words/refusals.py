@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 
 from services.arm.model.description import Joint
@@ -11,6 +12,8 @@ from services.panel.model.units import text_of
 
 Joints = Mapping[str, Joint]  # by name
 Show = Callable[[Problem, Joints, float], str]
+ON_LINE = re.compile(r"at ([\d.]+) m of ([\d.]+) m along the path")
+ON_TURN = re.compile(r"at ([\d.]+)% of the turn along the path")
 
 
 def sentence_of(problem: Problem, joints: Joints, templates: Mapping[str, str]) -> str | None:
@@ -32,6 +35,17 @@ def sentence_of(problem: Problem, joints: Joints, templates: Mapping[str, str]) 
     }
     first, _, second = problem.subject.partition(" / ")
     return template.format(subject=problem.subject, first=first, second=second, **values)
+
+
+def place_of(problem: Problem) -> tuple[str, dict[str, str]] | None:
+    """Where on its path a motion of the tool would end, as the key of a template and its values; None where it is no
+    such motion."""
+    if found := ON_LINE.search(problem.reason):
+        gone, whole = (f"{1000.0 * float(metres):.0f}" for metres in found.groups())
+        return "place_on_line", {"gone": gone, "whole": whole}
+    if found := ON_TURN.search(problem.reason):
+        return "place_on_turn", {"share": f"{float(found[1]):.0f}"}
+    return None
 
 
 def key_of(check: str) -> str:

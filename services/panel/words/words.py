@@ -16,7 +16,7 @@ from services.panel.words.es_goals import GOALS
 from services.panel.words.es_programs import PROGRAMS
 from services.panel.words.es_refusals import REFUSALS
 from services.panel.words.es_work import WORK
-from services.panel.words.refusals import Joints, key_of, sentence_of
+from services.panel.words.refusals import Joints, key_of, place_of, sentence_of
 from services.panel.words.sentences import Sentences
 
 TABLES = {"en": ENGLISH, "es": SPANISH}
@@ -59,7 +59,9 @@ class Words:
         """A heading for the check, and a sentence; where this language has none, that of the part that refused."""
         heading = self.check(problem.check) or self("check_other" if problem.is_refusal else "check_ended")
         known = self._table.get(f"text_{problem.text.replace(' ', '_')}")
-        known = known or sentence_of(problem, self._joints, REFUSED[self.language])
+        if known is None and (template := sentence_of(problem, self._joints, REFUSED[self.language])) is not None:
+            place = place_of(problem)
+            known = template if place is None else f"{self(place[0], **place[1])} {template}"
         return heading, known or self._told(problem)
 
     def said(self, text: str) -> str:

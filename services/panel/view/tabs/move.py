@@ -80,8 +80,8 @@ class MoveTab:
         slider = self._kit.gui.add_slider(label, lower, upper, STEP[joint.unit], at)
 
         @slider.on_update
-        def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
-            if event.client_id is not None:
+        async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:  # in viser's loop: before a press
+            if event.client_id is not None:  # that follows it
                 self._touched = time.monotonic()
                 self._operator.set_goal({joint.name: meant(joint, event.target.value)}, self._client)
 

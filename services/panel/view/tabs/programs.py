@@ -66,13 +66,13 @@ class ProgramsTab:
         """The steps with what their check and the run say of them."""
         teaching, words = self._teaching, self._kit.words
         self._form.refresh()
-        state = teaching.state
+        version, state = teaching.version, teaching.state  # in this order: what changes meanwhile is shown next time
         set_if_new(self._pause, "visible", state is not None and state.status is RunStatus.RUNNING)
         set_if_new(self._resume, "visible", state is not None and state.status is RunStatus.PAUSED)
         files = tuple(teaching.programs)  # also those that an editor or the command line has written
-        if (teaching.version, files) == (self._version, self._files):
+        if (version, files) == (self._version, self._files):
             return
-        self._version, self._files = teaching.version, files
+        self._version, self._files = version, files
         if tuple(self._file.options) != (words("none"), *files):
             self._file.options = (words("none"), *files)
         self._show_open()

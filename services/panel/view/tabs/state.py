@@ -9,7 +9,7 @@ from viser.transforms import SO3
 
 from schemas.ledger import StepLedger
 from services.panel.model.readings import Readings
-from services.panel.model.units import text_of
+from services.panel.model.units import in_degrees, text_of
 from services.panel.view.browser import Browser
 from services.panel.view.kit import Kit, esc, note, set_if_new, table
 
@@ -40,7 +40,7 @@ class StateTab:
         ]
         set_if_new(self._joints, "content", table(rows, header) + self._steps(readings))
         set_if_new(self._tool, "content", table(self._numbers(readings, browser, lag, tool)))
-        lines = [f"{esc(line.node)}: {esc(line.text)}" for line in self._operator.bus.log[-LOG_LINES:]]
+        lines = [f"{esc(line.node)}: {esc(in_degrees(line.text))}" for line in self._operator.bus.log[-LOG_LINES:]]
         set_if_new(self._log, "content", note("<br>".join(lines)))
 
     def _steps(self, readings: Readings) -> str:

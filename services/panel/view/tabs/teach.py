@@ -40,7 +40,7 @@ class TeachTab:
         kit.button(
             words("rename"), lambda: self._teaching.rename_point(self._require(), self._name.value), color="gray"
         )
-        kit.button(words("remove"), lambda: self._teaching.remove_point(self._require()), color="red")
+        kit.button(words("remove"), self._remove, color="red")
         kit.reasons(move=words("go_there"))
 
     def refresh(self, readings: Readings) -> None:
@@ -48,10 +48,14 @@ class TeachTab:
         if self._teaching.version == self._version:
             return
         is_first, self._version = self._version < 0, self._teaching.version
+        self._list(chooses_new=not is_first)
+
+    def _list(self, chooses_new: bool) -> None:
+        """All points to choose from, and what is known of the chosen one."""
         names = tuple(self._teaching.points)
         if names != self._names:
             fresh = [name for name in names if name not in self._names]
-            chosen = fresh[-1] if fresh and not is_first else self._chosen.value
+            chosen = fresh[-1] if fresh and chooses_new else self._chosen.value
             self._names = names
             self._chosen.options = (self._kit.words("none"), *names)
             set_if_new(self._chosen, "value", chosen if chosen in names else self._kit.words("none"))
@@ -60,6 +64,7 @@ class TeachTab:
 
     def _remember(self) -> None:
         self._take()
+        self._list(chooses_new=True)  # at once: what is pressed next is meant for it
         set_if_new(self._name, "value", self._free_name())
 
     def _free_name(self) -> str:
@@ -84,6 +89,19 @@ class TeachTab:
         if self._chosen.value not in self._names:
             raise gemelo.BadArgument(self._kit.words("choose_point"))
         return str(self._chosen.value)
+
+    def _remove(self) -> None:
+        """Asks first: what is forgotten cannot be had back."""
+        name, words = self._require(), self._kit.words
+        with self._kit.gui.add_modal(words("remove")) as modal:
+            self._kit.line(note(esc(words("remove_question", name=name))))
+
+            def remove() -> None:
+                modal.close()
+                self._operator.guarded(lambda: self._teaching.remove_point(name))
+
+            self._kit.button(words("remove_point"), remove, color="red")
+            self._kit.button(words("cancel"), modal.close, color="gray")
 
     def _as_goal(self) -> None:
         self._operator.set_goal(self._teaching.points[self._require()].joints)

@@ -1,0 +1,72 @@
+"""What a person has just done, and what has just ended, is what the page shows; a point is removed after a question."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import pytest
+
+from gemelo.programs.run import RunState, RunStatus
+from services.panel.view.page import Page
+from services.panel.words.en import ENGLISH
+from tests.panel.memory_page import MemoryPage, memory_page
+from tests.runtime.support import until
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MemoryPage]:
+    with memory_page("rm1", tmp_path_factory.mktemp("page")) as page:
+        page.draw(2)
+        yield page
+
+
+def shown(page: MemoryPage) -> Page:
+    [only] = page.panel.pages()
+    return only
+
+
+def test_a_program_that_ends_while_the_page_is_looking_is_not_shown_as_running(
+    page: MemoryPage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    teaching, tab = page.panel.operator.teaching, shown(page)._programs
+    monkeypatch.setattr(teaching, "_run", SimpleNamespace(state=RunState("one", RunStatus.RUNNING), stop=lambda: None))
+    teaching._changed()
+    page.draw()
+    assert ENGLISH["run_running"] in tab._state.content
+    folder = teaching.programs
+
+    class Slow:
+        """The folder of programs, which takes so long to read that the run ends meanwhile."""
+
+        def __iter__(self) -> Iterator[str]:
+            monkeypatch.setattr(teaching, "programs", folder)
+            teaching._run.state = RunState("one", RunStatus.DONE)
+            teaching._changed()
+            return iter(folder)
+
+    monkeypatch.setattr(teaching, "programs", Slow())
+    page.draw(2)
+    assert ENGLISH["run_done"] in tab._state.content
+
+
+def test_the_point_that_was_taught_is_chosen_at_once(page: MemoryPage) -> None:
+    tab = shown(page)._teach
+    tab._drawn = lambda: None  # type: ignore[method-assign]
+    tab._name.value = "new"
+    tab._remember()
+    assert tab._chosen.value == "new"
+
+
+def test_a_point_is_removed_once_a_person_has_said_so(page: MemoryPage) -> None:
+    assert page.browser is not None
+    teaching, tab = page.panel.operator.teaching, shown(page)._teach
+    teaching.remember("old")
+    page.draw()
+    assert tab._chosen.value == "old"
+    for answer in ("cancel", "remove_point"):
+        tab._remove()
+        page.sent()  # the browser has the question
+        assert "old" in teaching.points
+        page.browser.press(ENGLISH[answer])
+    assert until(lambda: "old" not in teaching.points)
