@@ -32,7 +32,7 @@ def test_a_program_that_ends_while_the_page_is_looking_is_not_shown_as_running(
     teaching, tab = page.panel.operator.teaching, shown(page)._programs
     monkeypatch.setattr(teaching, "_run", SimpleNamespace(state=RunState("one", RunStatus.RUNNING), stop=lambda: None))
     teaching._changed()
-    page.draw()
+    page.draw(2)
     assert ENGLISH["run_running"] in tab._state.content
     folder = teaching.programs
 
@@ -62,7 +62,7 @@ def test_a_point_is_removed_once_a_person_has_said_so(page: MemoryPage) -> None:
     assert page.browser is not None
     teaching, tab = page.panel.operator.teaching, shown(page)._teach
     teaching.remember("old")
-    page.draw()
+    page.draw(2)
     assert tab._chosen.value == "old"
     for answer in ("cancel", "remove_point"):
         tab._remove()
