@@ -89,6 +89,27 @@ def test_a_press_of_something_else_is_not_done_by_a_reboot() -> None:
     assert not rig.pressed[1].accepted
 
 
+def last_will(rig: VirtualArm, boot_id: int = 77) -> None:
+    rig.receive(Kind.STATUS, json.dumps({"online": False, "device": "rm1", "boot_id": boot_id}).encode())
+
+
+def test_a_device_that_vanishes_before_its_answer_has_left_is_offline_as_was_asked() -> None:
+    rig = virtual(VirtualArm())
+    rig.press(InjectRequest(kind=InjectKind.OFFLINE, value=1.0), 1)
+    last_will(rig)
+    assert rig.pressed[1].accepted
+
+
+@pytest.mark.parametrize(("kind", "boot_id"), [(InjectKind.ESTOP, 77), (InjectKind.OFFLINE, 76)])
+def test_no_last_will_is_the_answer_to_another_press_or_of_another_boot(kind: InjectKind, boot_id: int) -> None:
+    rig = virtual(VirtualArm())
+    rig.press(InjectRequest(kind=kind), 1)
+    last_will(rig, boot_id)
+    assert 1 not in rig.pressed
+    rig.run(2.5)
+    assert not rig.pressed[1].accepted
+
+
 def test_an_absent_device_is_not_pressed() -> None:
     rig = virtual(VirtualArm())
     rig.wire.is_cut = True

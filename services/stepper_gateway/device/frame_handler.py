@@ -87,6 +87,8 @@ class FrameHandler:
         device = self._device
         before = device.configuration.device_crc32
         device.session.on_status(status)
+        if not status.online and status.boot_id == device.session.boot_id:
+            self._components.injections.on_last_will()
         device.configuration.on_status()
         if before and device.configuration.device_crc32 != before:
             self._components.start_over("the device has another configuration", moment)

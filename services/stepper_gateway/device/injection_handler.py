@@ -63,14 +63,22 @@ class InjectionHandler:
             self._conclude(done, "" if done else event.detail)
 
     def on_reboot(self) -> None:
-        """The device has started anew: where that was asked for it is done, even if its answer never left."""
-        if self._waiting and self._waiting[0].request.kind is InjectKind.REBOOT:
-            self._conclude(True, "")
+        """The device has started anew."""
+        self._conclude_if_asked(InjectKind.REBOOT)
+
+    def on_last_will(self) -> None:
+        """The device's broker says that it has vanished."""
+        self._conclude_if_asked(InjectKind.OFFLINE)
 
     def step(self, moment: Moment) -> None:
         """Give up what was not answered in time."""
         while self._waiting and moment.monotonic >= self._waiting[0].deadline:
             self._conclude(False, f"the device has not answered {self._waiting[0].request.kind} in time")
+
+    def _conclude_if_asked(self, kind: InjectKind) -> None:
+        """What cuts the device's link may take its answer along: where it was asked for, it is done."""
+        if self._waiting and self._waiting[0].request.kind is kind:
+            self._conclude(True, "")
 
     def _conclude(self, accepted: bool, reason: str) -> None:
         """Answers the oldest one, if there is one, and sends the next."""
