@@ -61,7 +61,7 @@ class TopReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Figures(NamedTuple):
-    """The last two reports of a node, a second apart."""
+    """The last two reports of one process of a node, a second apart."""
 
     before: NodeStatistics
     now: NodeStatistics
@@ -78,14 +78,17 @@ class Figures(NamedTuple):
 
 
 def figures_by_node(session: CommandSession) -> dict[str, Figures]:
-    """Fills, as the nodes speak, with those that have spoken twice."""
+    """Fills, as the nodes speak, with those that have spoken twice; one that was started again begins anew."""
     newest: dict[str, NodeStatistics] = {}
     figures: dict[str, Figures] = {}
 
     def on_statistics(message: NodeStatistics) -> None:
-        if message.node in newest:
-            figures[message.node] = Figures(newest[message.node], message)
+        before = newest.get(message.node)
         newest[message.node] = message
+        if before is not None and before.started == message.started:
+            figures[message.node] = Figures(before, message)
+        else:
+            figures.pop(message.node, None)
 
     session.node.subscribe(STATISTICS, on_statistics)
     return figures
@@ -114,6 +117,7 @@ def form_of_reports(options: Options) -> Form:
 def watch(session: CommandSession, count: int | None, form: Form = str) -> ExitCode:
     """Prints `count` reports."""
     infos: dict[str, NodeInfo | None] = {}
+    asked: dict[str, int] = {}  # [ns] UNIX start of the process whose information it is
     node, printed, last = session.node, 0, session.node.monotonic() + FIRST - EVERY
     heard = figures_by_node(session)
 
@@ -124,9 +128,9 @@ def watch(session: CommandSession, count: int | None, form: Form = str) -> ExitC
         last = node.monotonic()
         alive = {name for name in node.alive() if not name.startswith("cli-")}
         figures = {name: each for name, each in sorted(heard.items()) if name in alive}
-        for name in figures:
-            if name not in infos:
-                infos[name] = told_information_of(session, name)
+        for name, each in figures.items():
+            if asked.get(name) != each.now.started:
+                infos[name], asked[name] = told_information_of(session, name), each.now.started
         print(form(report(figures, infos)), flush=True)
         printed += 1
         if printed == count:

@@ -45,11 +45,12 @@ class BlackBox:
         self._entries.append(Entry(topic, message, now))
         self._take(self._watch.on_message(topic, message, now))
 
-    def step(self, now: int) -> tuple[Incident, tuple[Entry, ...]] | None:
-        """An incident that is to be saved now, with its messages; `now` in [ns] UNIX."""
+    def step(self, now: int, router: str = "") -> tuple[Incident, tuple[Entry, ...]] | None:
+        """An incident that is to be saved now, with its messages; `now` in [ns] UNIX, with the `router` of now."""
         horizon = now - int(self.seconds * SECOND)
         while self._entries and self._entries[0].arrival < horizon:
             self._forget_oldest()
+        self._take(self._watch.on_router(router, now))
         self._take(self._watch.step(now))
         return self._tell(now) if self._pending is not None and now >= self._due else None
 

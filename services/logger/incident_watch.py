@@ -9,17 +9,18 @@ from schemas.actions import GoalStatusCode
 from schemas.device import DeviceEvent, DeviceFault, DeviceMode, DeviceState
 from schemas.device_faults import fault_text
 from schemas.message import Message
+from schemas.roles import SERVICES
 from schemas.system import NodeStatistics
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY, REQUESTS, TOPICS, Topic
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY, Topic
 from services.recordings.incidents import IncidentKind
 from services.runtime.actions import keys
 
 STOPPED = (DeviceMode.FAULT, DeviceMode.ESTOP)
 ENDED = keys.ended_topic(FOLLOW_JOINT_TRAJECTORY).key
 SILENT_AFTER = 4_000_000_000  # [ns] without statistics, which come every second
-HEARD_LATELY = 1_500_000_000  # [ns] in which another node must have spoken: else it is we who did not listen
+HEARD_LATELY = 2_000_000_000  # [ns] in which another node must have spoken: else it is we who did not listen
 LONG_AGO = 30_000_000_000  # [ns] a start of before that was by another clock than ours
-SERVICES = frozenset({row.writer for row in TOPICS} | {row.server for row in REQUESTS}) - {"any"}
+WATCHED = frozenset(SERVICES) - {"logger"}  # whose own statistics are heard whatever has happened to all others
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,9 @@ class IncidentWatch:
     _heard: dict[str, int] = field(default_factory=dict, init=False)  # [ns] arrival of each service's statistics
     _started: dict[str, int] = field(default_factory=dict, init=False)  # [ns] UNIX start of each service
     _newest: int = field(default=0, init=False)  # [ns] arrival of anybody's
+    _router: str = field(default="", init=False)  # that was connected last
+    _routed: int = field(default=0, init=False)  # [ns] when it was seen last
+    _unlinked: Trigger | None = field(default=None, init=False)  # the gateway has no link to the device
 
     def on_message(self, topic: Topic[Any], message: Message, now: int) -> Trigger | None:
         """The trigger that `message` is, which came at `now` [ns] UNIX."""
@@ -48,17 +52,35 @@ class IncidentWatch:
                 return self._on_state(message, now)
             case DeviceEvent(event="rebooted"):
                 return Trigger(IncidentKind.REBOOT, now, f"the device has rebooted: {message.detail}")
-            case NodeStatistics():
-                self._newest = now
-                return self._on_statistics(message, now) if message.node in SERVICES else None
-        if topic.key == ENDED:
-            return _on_ended(message, now)
+            case DeviceEvent(event="disconnected"):
+                what = f"stepper_gateway has lost its link to the device: {message.detail}"
+                self._unlinked = Trigger(IncidentKind.LOST, now, what)
+            case DeviceEvent(event="connected"):
+                return self._take_unlinked()
+            case NodeStatistics(node=node) if node != "logger":
+                self._on_anybody(now)
+                return self._on_statistics(message, now) if node in WATCHED else None
+        if topic.key == ENDED and (aborted := _on_ended(message, now)) is not None:
+            self._unlinked = None  # the abort says it
+            return aborted
         return None
+
+    def on_router(self, router: str, now: int) -> Trigger | None:
+        """The trigger where the router was started again: all were silent, and none of them has failed."""
+        if not router:
+            return None
+        before, since, self._router, self._routed = self._router, self._routed, router, now
+        if before in ("", router):
+            return None
+        what = f"the router had ended, and was started again: nothing was heard for up to {(now - since) / 1e9:.1f} s"
+        return Trigger(IncidentKind.LOST, max(since, now - LONG_AGO), what)
 
     def step(self, now: int) -> Trigger | None:
         """The trigger that a silence is; `now` in [ns] UNIX."""
         if now - self._newest > HEARD_LATELY:
             return None
+        if self._unlinked is not None and now - self._unlinked.stamp > SILENT_AFTER:
+            return self._take_unlinked()
         for node, heard in self._heard.items():
             if now - heard > SILENT_AFTER:
                 del self._heard[node]
@@ -66,6 +88,17 @@ class IncidentWatch:
                 what = f"{node} has not been heard for {seconds:.1f} s: it has ended, hangs, or its host is cut off"
                 return Trigger(IncidentKind.LOST, now, what)
         return None
+
+    def _take_unlinked(self) -> Trigger | None:
+        """A link that was lost: told when it is back, or stays away, but not where the whole twin ends."""
+        trigger, self._unlinked = self._unlinked, None
+        return trigger
+
+    def _on_anybody(self, now: int) -> None:
+        """After a time in which nobody was heard each has its time anew to be back."""
+        if now - self._newest > HEARD_LATELY:
+            self._heard = dict.fromkeys(self._heard, now)
+        self._newest = now
 
     def _on_statistics(self, message: NodeStatistics, now: int) -> Trigger | None:
         """The trigger where a service was started again before its silence was noticed."""

@@ -61,7 +61,7 @@ def run(node: Node, deployment: Deployment) -> None:
 
     def step(now: int) -> None:
         write(now, logger.step(now))
-        save(black_box.step(now))
+        save(black_box.step(now, node.router))
         node.set_ready(not disk.problem, disk.problem)
 
     node.spin(step, rate=WRITE_RATE)

@@ -19,6 +19,7 @@ from services.runtime.parameters import parameters_request
 from services.runtime.requests.client import PendingCall
 
 PERIOD = 5.0  # [s] between two questions to a node: it may have got a new topic
+GONE = 3.0 * PERIOD  # [s] without a word of a node, after which its place is another's
 TIMEOUT = 2.0  # [s]
 MAX_NODES = 256  # that are asked; more would be no robot's
 
@@ -50,17 +51,26 @@ class Census:
     def __init__(self, node: Node, on_record: Callable[[NodeRecord], None]) -> None:
         self._node, self._on_record = node, on_record
         self._asked_at: dict[str, float] = {}  # [s] monotonic
+        self._started: dict[str, int] = {}  # [ns] UNIX start of the process that was asked
         self._known: dict[str, NodeRecord] = {}
         node.subscribe(STATISTICS, self._on_statistics)
 
     def _on_statistics(self, message: NodeStatistics) -> None:
         now = self._node.monotonic()
-        is_new = message.node not in self._asked_at
-        if is_new and len(self._asked_at) >= MAX_NODES:
+        is_new = self._started.get(message.node) != message.started
+        if message.node not in self._asked_at and not self._has_place(now):
             return
         if is_new or now - self._asked_at[message.node] > PERIOD:
-            self._asked_at[message.node] = now
+            self._asked_at[message.node], self._started[message.node] = now, message.started
             self._ask(_Asked(message.node, self._node.now()))
+
+    def _has_place(self, now: float) -> bool:
+        """True if one more node can be asked; those of commands that have ended long ago make place."""
+        if len(self._asked_at) >= MAX_NODES:
+            for name in [name for name, at in self._asked_at.items() if now - at > GONE]:
+                del self._asked_at[name], self._started[name]
+                self._known.pop(name, None)
+        return len(self._asked_at) < MAX_NODES
 
     def _ask(self, asked: _Asked) -> None:
         try:

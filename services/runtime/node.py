@@ -249,6 +249,11 @@ class Node:
         """True if the router is connected."""
         return self._bus.is_connected
 
+    @property
+    def router(self) -> str:
+        """The router of now, which has another name whenever it was started anew; empty without one."""
+        return self._bus.router
+
     def alive(self) -> set[str]:
         """The names of all living nodes of the robot, this one too."""
         return identity.alive(self._bus)

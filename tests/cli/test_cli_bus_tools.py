@@ -62,7 +62,7 @@ from services.cli.session import CommandSession
 from services.recordings.table import exchanges_of
 from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
-from tests.runtime.support import spinning
+from tests.runtime.support import hear, spinning
 
 WHOLE = FieldPath(FrameTransform, "")
 STATE = JointState(stamp=5, name=("a", "b"), position=(0.5, -2.0))
@@ -406,6 +406,25 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, text: bytes):
     (tmp_path / "knobs.toml").write_bytes(text)
     with pytest.raises(CommandError, match=r"knobs\.toml"):
         node_parameters.read(str(tmp_path / "knobs.toml"))
+
+
+def test_the_figures_of_a_node_that_was_started_again_begin_anew(session, deployment, network):
+    figures = top.figures_by_node(session)
+
+    def say(started: int, seconds: int, received: int) -> None:
+        topics = (TopicStatistics(key="joint_states", received=received),)
+        statistics.put(NodeStatistics(stamp=seconds * 10**9, node="planner", started=started, topics=topics))
+
+    with Node("diver", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        statistics = node.publisher(STATISTICS)
+        say(1, 7, 9_000)
+        say(1, 8, 9_050)
+        assert hear(session.node, lambda: "planner" in figures)
+        say(2, 9, 10)
+        assert hear(session.node, lambda: "planner" not in figures)
+        say(2, 10, 60)
+        assert hear(session.node, lambda: "planner" in figures)
+    assert figures["planner"].received() == {"joint_states": 50.0}
 
 
 def test_top_has_every_node_with_its_figures(session, stack, capsys):

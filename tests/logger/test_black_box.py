@@ -27,6 +27,7 @@ from schemas.ledger import StepLedger, StoppingDistance
 from schemas.message import Message
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryResult
 from schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Refusal
+from schemas.roles import SERVICES
 from schemas.system import (
     Failure,
     LogLevel,
@@ -73,6 +74,7 @@ class Rig:
     def __init__(self, seconds: float = 60.0) -> None:
         self.box = BlackBox(seconds)
         self.now = START
+        self.router = ""
         self.saved: list[tuple[Incident, tuple]] = []
 
     def say(self, topic, *messages: Message) -> None:
@@ -87,7 +89,7 @@ class Rig:
         end = self.now + int(seconds * SECOND)
         while self.now < end:
             self.now = min(self.now + SECOND // 2, end)
-            told = self.box.step(self.now)
+            told = self.box.step(self.now, self.router)
             self.saved += [told] if told else []
 
     def exchange(self, request, question, answer, **fields) -> None:
@@ -263,6 +265,67 @@ def test_a_service_whose_silence_was_told_is_not_told_again_when_it_is_back(rig)
         rig.say(STATISTICS, NodeStatistics(node="planner", started=again))
         beat(rig, 1, "stepper_gateway")
     assert len(rig.saved) == 1
+
+
+@pytest.mark.parametrize("node", sorted(set(SERVICES) - {"logger", "stepper_gateway"}))
+def test_every_service_is_missed_and_the_loggers_own_voice_hides_nobody_and_nothing(rig, node):
+    beat(rig, 5, "logger", "stepper_gateway", node)
+    beat(rig, 8, "logger")  # the router is away: it hears itself alone
+    assert not rig.saved
+    beat(rig, 8, "logger", "stepper_gateway")
+    assert f"{node} has not been heard for 4." in rig.incident.sentence
+
+
+def test_whoever_is_back_first_after_a_silence_of_everybody_accuses_nobody(rig):
+    beat(rig, 5, "planner", "stepper_gateway")
+    rig.wait(6.0)
+    beat(rig, 3, "stepper_gateway")
+    beat(rig, 9, "planner", "stepper_gateway")
+    assert not rig.saved
+
+
+def test_a_router_that_is_started_again_is_one_and_none_of_its_nodes(rig):
+    rig.router = "first"
+    beat(rig, 5, "planner", "stepper_gateway")
+    rig.router = ""
+    beat(rig, 6, "logger")
+    rig.router = "second"
+    beat(rig, 9, "planner", "stepper_gateway", "logger")
+    assert rig.incident.kind is IncidentKind.LOST
+    assert rig.incident.stamp == START + 5 * SECOND
+    assert "the router had ended, and was started again: nothing was heard for up to 6.5 s" in rig.incident.sentence
+
+
+def test_a_router_that_was_out_of_reach_has_not_failed(rig):
+    rig.router = "first"
+    beat(rig, 5, "planner")
+    rig.router = ""
+    rig.wait(6.0)
+    rig.router = "first"
+    beat(rig, 9, "planner")
+    assert not rig.saved
+
+
+@pytest.mark.parametrize("away", [1, 9])
+def test_a_link_to_the_device_that_is_lost_at_rest_is_one_also_where_it_is_back_at_once(rig, away):
+    beat(rig, 2, "stepper_gateway")
+    rig.say(DEVICE_EVENTS, DeviceEvent(event="disconnected", detail="the MQTT broker is gone"))
+    beat(rig, away, "stepper_gateway")
+    rig.say(DEVICE_EVENTS, DeviceEvent(event="connected"))
+    beat(rig, 20, "stepper_gateway")
+    assert rig.incident.stamp == START + 2 * SECOND
+    assert "has lost its link to the device: the MQTT broker is gone" in rig.incident.sentence
+
+
+def test_a_link_that_is_lost_while_the_twin_ends_or_takes_a_goal_along_is_no_second_one(rig):
+    beat(rig, 2, "stepper_gateway")
+    rig.say(DEVICE_EVENTS, DeviceEvent(event="disconnected", detail="the MQTT broker is gone"))
+    rig.wait(20.0)
+    assert not rig.saved
+    rig.goal("123456789")
+    rig.end("123456789", GoalStatusCode.ABORTED, "no link to the device")
+    beat(rig, 20, "stepper_gateway")
+    assert rig.incident.kind is IncidentKind.ABORT
 
 
 def test_what_follows_within_3_s_is_of_the_same_story_and_files_are_10_s_apart(rig):

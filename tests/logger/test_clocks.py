@@ -9,7 +9,8 @@ import pytest
 from msgspec.structs import replace
 
 from schemas.deployment import Deployment, PathsSection
-from schemas.system import NodeInfo, NodeRecord, Parameter
+from schemas.system import NodeInfo, NodeRecord, NodeStatistics, Parameter
+from schemas.topics import STATISTICS
 from services.cli.bag import information
 from services.recordings.census import Census, is_news
 from services.recordings.channels import Entry
@@ -40,6 +41,28 @@ def test_the_clock_of_every_node_is_in_its_record(tmp_path: Path, ahead: float) 
     assert record.clock_offset is not None
     assert abs(record.clock_offset - ahead) <= record.clock_bound + 1e-3
     assert record.info.clock == 0  # the moment of the answer is nothing of the node
+
+
+def test_a_node_that_was_started_again_is_asked_at_once_and_one_of_long_ago_makes_place(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("services.recordings.census.MAX_NODES", 1)
+    deployment = Deployment(paths=PathsSection(run=str(tmp_path / "run"), out=str(tmp_path / "out")))
+    network, records = MemoryNetwork(), []
+    asked: list[tuple[str, int]] = []
+    monkeypatch.setattr(Census, "_ask", lambda census, one: asked.append((one.name, one.at)))
+    with (
+        Node("diver", deployment, robot="rm1", bus=MemoryBus(network)) as diver,
+        Node("logger", deployment, robot="rm1", bus=MemoryBus(network)) as logger,
+    ):
+        Census(logger, records.append)
+        at, heard = 0, list[NodeStatistics]()
+        logger.now, logger.monotonic = lambda: at, lambda: float(at)
+        logger.subscribe(STATISTICS, heard.append)
+        said = ((100, "planner", 1), (101, "planner", 1), (102, "planner", 2), (103, "cli-7", 3), (200, "cli-8", 4))
+        for count, (now, node, started) in enumerate(said, 1):
+            at = now
+            diver.publisher(STATISTICS).put(NodeStatistics(node=node, started=started))
+            assert hear(logger, lambda count=count: len(heard) == count)
+    assert asked == [("planner", 100), ("planner", 102), ("cli-8", 200)]
 
 
 @pytest.mark.parametrize(

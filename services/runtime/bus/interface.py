@@ -85,6 +85,11 @@ class Bus(Protocol):
         ...
 
     @property
+    def router(self) -> str:
+        """The router of now, which has another name whenever it was started anew; empty without one."""
+        ...
+
+    @property
     def certificate(self) -> str:
         """The file that tells the router the role of this process; empty where it asks for none."""
         ...

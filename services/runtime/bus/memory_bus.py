@@ -33,6 +33,10 @@ class MemoryBus:
         return self.network.is_connected
 
     @property
+    def router(self) -> str:
+        return "memory" if self.is_connected else ""
+
+    @property
     def certificate(self) -> str:
         return ""
 

@@ -86,6 +86,10 @@ class ZenohBus:
         return all(session.info.routers_zid() for session in self._sessions)
 
     @property
+    def router(self) -> str:
+        return next(map(str, self._session.info.routers_zid()), "")
+
+    @property
     def _sessions(self) -> list[zenoh.Session]:
         return [self._session] if self._urgent_session is None else [self._session, self._urgent_session]
 
