@@ -1,7 +1,9 @@
 """`gemelo soak`: moves for hours on a stack of its own, and whether any process grows meanwhile.
 
 Leaves out/soak/report.json. Exit code 0 only if every move succeeded and, after the warm-up, no process's memory grew
-by more than 1 MB an hour, nor its number of files, sockets and threads by more than a few.
+by more than 1 MB an hour, nor its number of files, sockets and threads by more than a few. Memory is what belongs to
+no file (`Anonymous` of proc(5)'s smaps_rollup): pages of libraries come and go with the kernel's cache, and are
+shared. Where the system does not tell it, it is the resident memory.
 """
 
 from __future__ import annotations
@@ -35,7 +37,7 @@ TOLD_EVERY = 300.0  # [s] between two lines about how far it is
 WARM_UP = 0.4  # of the time: caches fill, allocators settle; measured: of an hour 22 minutes, in stepper_gateway
 FILES = 10  # of a recording, in a soak
 TO_SET = 5.0  # [s] for the logger to take a parameter
-STEEPEST = 1.0  # [MB/h] of resident memory
+STEEPEST = 1.0  # [MB/h] of memory
 FEW = 4  # files, sockets or threads that come and go
 TO_END = 10.0  # [s] beyond a move's own time
 FEWEST = 20  # samples after the warm-up below which a slope says nothing
@@ -46,7 +48,8 @@ class ProcessSample(msgspec.Struct, frozen=True):
     """One process with its children at one time."""
 
     at: float  # [s] since the beginning
-    memory: float  # [MB] resident
+    memory: float  # [MB] of no file
+    resident: float  # [MB] with the pages of files
     cpu: float  # [s] since the process began
     files: int
     sockets: int
@@ -138,12 +141,23 @@ def sample_of(pid: int, at: float) -> ProcessSample:
     times = [each.cpu_times() for each in family]
     return ProcessSample(
         at=at,
-        memory=sum(each.memory_info().rss for each in family) / MB,
+        memory=sum(map(anonymous, family)) / MB,
+        resident=sum(each.memory_info().rss for each in family) / MB,
         cpu=sum(each.user + each.system for each in times),
         files=sum(each.num_fds() for each in family),
         sockets=sum(len(each.net_connections()) for each in family),
         threads=sum(each.num_threads() for each in family),
     )
+
+
+def anonymous(process: psutil.Process) -> int:
+    """[B] in memory of no file; all that is in memory where the system does not tell them apart."""
+    with suppress(OSError), open(f"/proc/{process.pid}/smaps_rollup", encoding="ascii") as file:
+        for line in file:
+            if line.startswith("Anonymous:"):
+                return 1024 * int(line.split()[1])
+    resident: int = process.memory_info().rss
+    return resident
 
 
 def growth_of(name: str, samples: Sequence[ProcessSample]) -> Growth:

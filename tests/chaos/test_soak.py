@@ -29,7 +29,11 @@ def samples(memory: Sequence[float], **at_the_end: int) -> list[ProcessSample]:
     counts = {"files": 7, "sockets": 3, "threads": 5}
     return [
         ProcessSample(
-            at=EVERY * k, memory=each, cpu=0.1 * EVERY * k, **(counts | (at_the_end if k == len(memory) - 1 else {}))
+            at=EVERY * k,
+            memory=each,
+            resident=2.0 * each,
+            cpu=0.1 * EVERY * k,
+            **(counts | (at_the_end if k == len(memory) - 1 else {})),
         )
         for k, each in enumerate(memory)
     ]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 HOLES = """
 import resource, time
 from services.runtime.process.freed_memory import give_back_freed_memory
@@ -27,3 +29,34 @@ while resident() > full - 10_000_000:
 
 def test_holes_of_the_heap_are_given_back_while_the_process_goes_on() -> None:
     subprocess.run([sys.executable, "-c", HOLES], check=True, timeout=60.0)
+
+
+HEAPS = """
+import ctypes, sys, threading
+from services.runtime.process.freed_memory import give_back_freed_memory
+
+if "shared" in sys.argv:
+    give_back_freed_memory()
+together = threading.Barrier(8)
+
+def work():
+    kept = [bytes(20_000) for _ in range(100)]
+    together.wait()  # a thread that has ended leaves its heap to the next one
+
+threads = [threading.Thread(target=work) for _ in range(8)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+library = ctypes.CDLL(None)
+library.malloc_info(0, ctypes.c_void_p.in_dll(library, "stdout"))
+library.fflush(None)
+"""
+
+
+@pytest.mark.parametrize("word", ["shared", ""])
+def test_the_threads_of_a_process_share_one_heap(word: str) -> None:
+    told = subprocess.run(
+        [sys.executable, "-c", HEAPS, word], check=True, timeout=60.0, capture_output=True, text=True
+    ).stdout
+    assert (told.count("<heap ") == 1) is bool(word), told  # without it glibc makes them several
