@@ -48,8 +48,10 @@ def test_everything_works_again_after_the_router_was_killed(own_router: RouterPr
         log.put(LogRecord(stamp=1))
         with spinning(writer), spinning(client):
             assert client.call(PLAN, PlanRequest()).code is PlanCode.SUCCESS
+            router = client.router
             own_router.kill()
             assert until(lambda: not client.is_connected)
+            assert not client.router
             for stamp in range(2, 300):
                 log.put(LogRecord(stamp=stamp))
             description.put(RobotDescription(urdf="while away"))
@@ -64,6 +66,7 @@ def test_everything_works_again_after_the_router_was_killed(own_router: RouterPr
             assert until(lambda: descriptions == ["while away"], RECOVERY)
             writer.publisher(JOINT_STATES).put(JointState(stamp=9))
             assert until(lambda: states.message == JointState(stamp=9), RECOVERY)
+            assert client.router not in ("", router)
             assert time.monotonic() - back < RECOVERY
             with open_node(own_router, "late") as late:
                 newest = late.latest(DESCRIPTION)
