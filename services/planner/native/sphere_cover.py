@@ -57,11 +57,11 @@ class CompiledPolytope:
         return self.polytope.half
 
     def depth(self, points: Array) -> Array:
-        """As `Polytope.depth`."""
+        """(...) [m] at `points` (..., 3), as `Polytope.depth`."""
         return motion.depths(self._sides, _rows(points)).reshape(points.shape[:-1])
 
     def nearest(self, points: Array) -> Array:
-        """As `Polytope.nearest`."""
+        """(..., 3) [m] for `points` (..., 3), as `Polytope.nearest`."""
         return motion.projected(self._sides, _rows(points), PROJECTIONS).reshape(points.shape)
 
     @cached_property

@@ -67,7 +67,7 @@ def look(states: States) -> Look:
 
 
 def aside_in_python(line: Array, rows: Array) -> float:
-    """`aside`, where the core is not built."""
+    """`aside` [rad] or [m] of `line` (2, n) and `rows` (m, n), where the core is not built."""
     way = line[1] - line[0]
     squared = float(way @ way)
     shares = np.clip((rows - line[0]) @ way / squared, 0.0, 1.0) if squared > 0.0 else np.zeros(len(rows))
