@@ -128,12 +128,16 @@ def run_keys(options: Options) -> ExitCode:
 def run_install(options: Options) -> ExitCode:
     """Gives a host its folder over ssh, and starts what does not run there yet."""
     from services.hosts import install  # slow to load, as is all of services.hosts
+    from services.hosts.render import outdated
 
     site = site_named(options.site)
     if options.host not in site.hosts:
         raise unknown("host", options.host, site.hosts)
     try:
         commands = install.commands(site, options.host, site_folder(site) / options.host)
+        if old := outdated(site, options.host, site_folder(site) / options.host):
+            file = said_folder(site, options.host) / old
+            raise CommandError(f"{file} is not what the site's file says now: `gemelo deploy render {options.site}`")
         for command in commands:
             print(shlex.join(command), flush=True)
         if not options.dry_run:

@@ -49,6 +49,14 @@ def write(site: Site, host: str, folder: Path) -> tuple[Path, ...]:
     return tuple(written)
 
 
+def outdated(site: Site, host: str, folder: Path) -> str:
+    """The first file in the folder of a host that is not what the site's file says now; empty where all are."""
+    for name, text in rendered(site, host).items():
+        if not (folder / name).is_file() or (folder / name).read_text(encoding="utf-8") != text:
+            return name
+    return ""
+
+
 def _is_deployment(file: Path) -> bool:
     """True for a robot's file of a former render, and false for any that a person has put there."""
     return file.suffix == ".toml" and file.read_text(encoding="utf-8").startswith(deployments.WRITTEN)

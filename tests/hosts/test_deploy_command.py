@@ -12,7 +12,7 @@ import pytest
 from services.cli.main import run
 from services.hosts.install import commands
 from services.runtime.deployment import project_root
-from tests.hosts.sites import EXAMPLE, site
+from tests.hosts.sites import EXAMPLE, changed, site
 
 RECORDER = """#!{python}
 import json, sys
@@ -114,6 +114,20 @@ def test_an_install_stops_at_the_first_command_that_fails(out, tmp_path, capsys,
     assert gemelo("deploy", "install", "example", "brain") == 1
     assert "ended with 23: rsync" in capsys.readouterr().err
     assert len(log.read_text().splitlines()) == 3
+
+
+def test_files_of_a_site_that_has_changed_since_are_not_installed(out, tmp_path, capsys, monkeypatch):
+    """The address of the router's host stands in the files of all the others."""
+    log, file = recording(tmp_path, monkeypatch), changed(tmp_path)
+    for word in ("render", "keys"):
+        assert gemelo("deploy", word, str(file)) == 0
+    file.write_text(file.read_text().replace("10.0.0.12", "10.0.0.22"))
+    assert gemelo("deploy", "install", str(file), "cell") == 1
+    said = f"cell/rm1.toml is not what the site's file says now: `gemelo deploy render {file}`"
+    assert said in capsys.readouterr().err
+    assert not log.exists()
+    assert gemelo("deploy", "render", str(file)) == 0
+    assert gemelo("deploy", "install", str(file), "cell") == 0
 
 
 def test_a_path_with_quotes_stays_one_word_of_the_other_hosts_shell(tmp_path):

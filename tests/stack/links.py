@@ -7,6 +7,8 @@ prints the table of what came of them; tests/stack/test_links.py takes a few.
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -156,6 +158,32 @@ class Links:
             faults=tuple(faults),
         )  # fmt: skip
 
+    def frozen(self, host: str, service: str) -> tuple[float, dict[str, object], list[str]]:
+        """One move in whose middle a process of rm1 is stopped (SIGSTOP), and one after it.
+
+        [s] until another process says that it is ready, what the desk says of the second move, and what must not be.
+        """
+        first = max(self._slots.size - ROW.size, 0)
+        alive = Path(self.lab.sites[host].state, "rm1", "run", f"{service}.alive")
+        self._say("move")
+        assert self._hear() == "moving\n", self.logs()
+        before = _first_word(alive)
+        os.kill(int(before), signal.SIGSTOP)
+        began = time.monotonic()
+        while _first_word(alive) in ("", before):
+            assert time.monotonic() - began < READY, f"{service} is not started anew\n{self.logs()}"
+            time.sleep(0.1)
+        ready = self._wait_ready() - began
+        self._hear()
+        self._wait_rest()
+        faults = violations(self._config, self._slots.rows(first))
+        stood = self._slots.size
+        time.sleep(WATCHED)
+        if steps_in(self._slots.rows(stood)):
+            faults.append("it moved by itself")
+        self._say("again")
+        return ready, json.loads(self._hear()), faults
+
     def watched(self, word: str) -> tuple[dict[str, object], list[str]]:
         """What the desk says of a move, with what the judge of slots finds in it."""
         first = max(self._slots.size - ROW.size, 0)
@@ -209,6 +237,11 @@ class Links:
             return self._said.get(timeout=TO_TELL)
         except Empty:
             raise AssertionError(f"the desk says nothing for {TO_TELL:g} s\n{self.lab.logs()}") from None
+
+
+def _first_word(file: Path) -> str:
+    """Empty without the file, or while it is written."""
+    return next(iter(file.read_text().split()), "") if file.exists() else ""
 
 
 def _let_record(file: Path, record: Path) -> None:

@@ -30,6 +30,16 @@ def test_an_arm_whose_link_fails_keeps_to_its_limits_and_its_client_hears_how_it
     assert came.ready_after < float("inf"), links.logs()
 
 
+def test_a_gateway_that_freezes_is_started_anew_without_a_hand_and_the_arm_does_not_move_by_itself(links, capsys):
+    """By deploy/probe: 5 s of standing still, 2 s of certainty, 1 s of backoff."""
+    ready, again, faults = links.frozen("cell", "stepper_gateway")
+    with capsys.disabled():
+        print(f" ready {ready:.1f} s after it froze", end="")
+    assert faults == []
+    assert again["again"] == "SUCCEEDED", again
+    assert ready < float("inf"), links.logs()
+
+
 def test_every_link_is_cut_in_both_ways_and_each_and_slowed():
     assert len({case.name for case in CASES}) == len(CASES) == 4 * 9 + 4 * 2 + 9
     assert len(CHOSEN) == len(FEW)
