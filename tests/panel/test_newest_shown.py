@@ -1,4 +1,4 @@
-"""What a person has just done, and what has just ended, is what the page shows; a point is removed after a question."""
+"""The newest of a run and of the taught points, as the page shows it; and the question before a point is removed."""
 
 from __future__ import annotations
 
