@@ -8,6 +8,7 @@ own_binary=$state/bin/process-compose
 tags=nomsgpack
 # The compilation takes two thirds of the time without what is stripped from the program anyway, and with only Go's own
 # library optimized: process-compose starts, asks and stops processes, and passes their lines on.
+# Measured, in CPU time of the whole build: 130 s, and 104 s where the compiler collects no garbage before it has a GiB.
 compile_flags=('-gcflags=all=-dwarf=false -N -l' -gcflags=std=-dwarf=false)
 chosen=$state/process-compose # a link to it, or to the one on PATH
 
@@ -50,7 +51,7 @@ build_by() {
     local config=$module/src/config
     mkdir -p "$state/bin"
     say "building process-compose $pinned_version from deploy/tools/go.mod: about a minute the first time"
-    CGO_ENABLED=0 GOWORK=off run "$1" -C "$tools" build -v -tags "$tags" -trimpath -mod=readonly \
+    CGO_ENABLED=0 GOWORK=off GOGC=off GOMEMLIMIT=1GiB run "$1" -C "$tools" build -v -tags "$tags" -trimpath -mod=readonly \
         "${compile_flags[@]}" -o "$own_binary" \
         -ldflags "-s -w -X $config.Version=$pinned_version" "$module" 2>&1 | counted
 }
