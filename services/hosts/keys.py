@@ -75,14 +75,24 @@ def _broker(site: Site, folder: Path, project: Path, authority: Authority, renew
     names = tuple(addresses(site, site.broker.host))
     certificate, key = home / secure_folder.CERTIFICATE, home / secure_folder.KEY
     is_new = _is_due(authority, certificate, key, names, renew_within)
+    _forget(home, {GATEWAY, *devices.values()})  # a robot that has left must not come in with the password that it had
     secure_folder.make(home, names, devices.values(), authority, site.certificate_days, is_new)
     (home / AUTHORITY).write_text(authority.trusted)
-    for host in site.hosts:
-        for process in processes(site, host):
-            user = {"stepper_gateway": GATEWAY, "virtual_esp32": devices.get(process.robot)}.get(process.service.name)
-            if host != site.broker.host and user:
-                _give(home, _private(folder / host / "broker"), user)
+    for host in site.hosts.keys() - {site.broker.host}:
+        on_wire = [(process.service.name, devices.get(process.robot, "")) for process in processes(site, host)]
+        users = {GATEWAY for service, _ in on_wire if service == "stepper_gateway"}
+        users |= {device for service, device in on_wire if service == "virtual_esp32"}
+        _forget(folder / host / "broker", users)
+        for user in users:
+            _give(home, _private(folder / host / "broker"), user)
     return Certificate(site.broker.host, "broker", expiry(certificate), is_new)
+
+
+def _forget(folder: Path, users: set[str]) -> None:
+    """Takes the passwords of all but `users` from a folder."""
+    for file in folder.glob("*.password"):
+        if file.stem not in users:
+            file.unlink()
 
 
 def _give(home: Path, folder: Path, user: str) -> None:

@@ -9,9 +9,10 @@ import pytest
 from schemas.roles import ROLES
 from services.credentials.authority import Authority, openssl
 from services.credentials.expiry import expiry
+from services.hosts.checks import load_site
 from services.hosts.keys import make_keys
 from services.runtime.deployment import project_root
-from tests.hosts.sites import site
+from tests.hosts.sites import EXAMPLE, site
 
 DAY = 86_400.0
 
@@ -105,3 +106,15 @@ def test_a_new_authority_renews_everything_and_a_role_that_left_is_taken_away(tm
     without = site(tmp_path, 'roles = ["operator", "viewer"]', 'roles = ["viewer"]')
     make_keys(without, out, project_root())
     assert names(out / "desk/keys") == {"ca.pem", "viewer.pem", "viewer.key", "panel.pem", "panel.key"}
+
+
+def test_the_device_of_a_robot_that_left_has_no_user_and_no_rights_any_more(tmp_path):
+    lab, out = site(tmp_path), tmp_path / "out"
+    make_keys(lab, out, project_root())
+    broker = out / "cell/broker"
+    assert "user rm1\n" in (broker / "acl").read_text()
+    (tmp_path / "lab.toml").write_text(EXAMPLE.read_text(encoding="utf-8").replace("rm1", "parol6"), encoding="utf-8")
+    make_keys(load_site(tmp_path / "lab.toml", project_root()), out, project_root())
+    assert (broker / "users").read_text().count("\n") == 2
+    assert {each.stem for each in broker.glob("*.password")} == {"gateway", "parol6"}
+    assert "user rm1\n" not in (broker / "acl").read_text()

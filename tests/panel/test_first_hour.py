@@ -18,6 +18,9 @@ from tests.panel.test_page import is_moving, rests
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {"en": DOCS / "first_hour.md", "es": DOCS / "es" / "primera_hora.md"}
+LOCALES = {"en": "en-GB", "es": "es-ES"}
+POSTS = {"en": "post", "es": "poste"}
+POINTS = {"en": ("One", "Two", "Three"), "es": ("Uno", "Dos", "Tres")}
 NAMED = re.compile(r"(?<!\*)\*{1,2}([^*\n]+?)\*{1,2}(?!\*)")
 SENTENCES = ("The red button and the space bar stop the arm", "El botón rojo y la barra espaciadora paran el brazo")
 
@@ -30,16 +33,28 @@ def test_every_word_that_it_names_is_on_the_page(language: str) -> None:
     assert [each for each in named if not any(text.startswith(each) for text in words)] == []
 
 
-@pytest.fixture
-def fresh(twin: Stack, chromium: Browser) -> Iterator[Person]:
-    """Somebody who has just typed `make up`, and reads Spanish."""
+class Newcomer(Person):
+    """Somebody who has just typed `make up`, and reads one of the two languages."""
+
+    def __init__(self, browser: Browser, port: str, language: str) -> None:
+        super().__init__(browser, port, LOCALES[language], SIZE)
+        self.post, self.points = POSTS[language], POINTS[language]
+        self._table = TABLES[language]
+
+    def words(self, key: str) -> str:
+        """The text of the page in that language, up to a figure that closes it."""
+        return self._table[key].partition(": {")[0]
+
+
+@pytest.fixture(params=LOCALES)
+def fresh(twin: Stack, chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Newcomer]:
     twin.wait_ready(30.0)
-    with Person(chromium, twin.deployment["GEMELO_PANEL_PORT"], "es-ES", SIZE) as person:
+    with Newcomer(chromium, twin.deployment["GEMELO_PANEL_PORT"], request.param) as person:
         yield person
         person.require_no_errors()
 
 
-def test_the_first_hour_goes_as_it_is_told(fresh: Person, twin: Stack) -> None:
+def test_the_first_hour_goes_as_it_is_told(fresh: Newcomer, twin: Stack) -> None:
     with gemelo.connect(timeout=10.0) as arm:
         switches_on(fresh, arm)
         moves(fresh, arm)
@@ -49,41 +64,41 @@ def test_the_first_hour_goes_as_it_is_told(fresh: Person, twin: Stack) -> None:
         breaks_it(fresh, arm)
 
 
-def switches_on(person: Person, arm: gemelo.Arm) -> None:
-    person.reads("En reposo")
-    person.tab("Equipo")
-    person.press("Apagar los motores")
+def switches_on(person: Newcomer, arm: gemelo.Arm) -> None:
+    person.reads(person.words("mode_idle"))
+    person.tab(person.words("tab_device"))
+    person.press(person.words("disarm"))
     until(lambda: not arm.device.state.armed, bool)
     declares(person, arm)
 
 
-def declares(person: Person, arm: gemelo.Arm) -> None:
-    person.press("Encender los motores")
+def declares(person: Newcomer, arm: gemelo.Arm) -> None:
+    person.press(person.words("arm"))
     until(lambda: arm.device.state.armed, bool)
-    person.press("Declarar la referencia")
-    person.press("Sí, está así")
-    person.reads("En reposo")
+    person.press(person.words("reference"))
+    person.press(person.words("reference_yes"))
+    person.reads(person.words("mode_idle"))
 
 
-def moves(person: Person, arm: gemelo.Arm) -> None:
-    person.tab("Mover")
+def moves(person: Newcomer, arm: gemelo.Arm) -> None:
+    person.tab(person.words("tab_move"))
     person.types("brazo_joint [°]", 30)
-    person.press("Planificar")
-    person.reads("Duración")
+    person.press(person.words("plan"))
+    person.reads(person.words("duration"))
     assert not is_moving(arm)
-    person.press("Ejecutar")
-    person.reads("Llegó")
+    person.press(person.words("execute"))
+    person.reads(person.words("ended_succeeded"))
     assert arm.joints["brazo_joint"] == pytest.approx(0.5236, abs=1e-3)
     person.types("brazo_joint [°]", -150)
-    person.press("Planificar y ejecutar")
+    person.press(person.words("plan_and_execute"))
     until(lambda: is_moving(arm), bool)
     person.page.keyboard.press("Space")
     rests(arm)
-    person.reads("El movimiento terminó antes de la meta")
+    person.reads(person.words("check_ended"))
 
 
-def jogs(person: Person, arm: gemelo.Arm) -> None:
-    person.tab("A mano")
+def jogs(person: Newcomer, arm: gemelo.Arm) -> None:
+    person.tab(person.words("tab_jog"))
     before = arm.joints["brazo_joint"]
     person.button("brazo_joint +").hover()
     person.page.mouse.down()
@@ -93,67 +108,67 @@ def jogs(person: Person, arm: gemelo.Arm) -> None:
     assert arm.joints["brazo_joint"] > before
 
 
-def puts_something_in_the_way(person: Person, arm: gemelo.Arm) -> None:
+def puts_something_in_the_way(person: Newcomer, arm: gemelo.Arm) -> None:
     arm.move(named="home")
-    person.tab("Escena")
-    person.types("Nombre", "poste")
-    for label, numbers in (("Tamaño [mm]", (40, 40, 160)), ("Centro [mm]", (290, 270, 80))):
+    person.tab(person.words("tab_scene"))
+    person.types(person.words("name"), person.post)
+    for label, numbers in ((person.words("size_mm"), (40, 40, 160)), (person.words("at_mm"), (290, 270, 80))):
         for place, number in enumerate(numbers):
             field = person.row(label).locator("input").filter(visible=True).nth(place)
             field.fill(str(number))
             field.press("Enter")
-    person.press("Añadir")
-    until(lambda: "poste" in arm.scene.objects, bool)
-    person.tab("Mover")
-    person.chooses("Posición con nombre", "left")
-    person.press("Planificar")
-    person.reads("Duración")
-    person.press("Ejecutar")
+    person.press(person.words("add"))
+    until(lambda: person.post in arm.scene.objects, bool)
+    person.tab(person.words("tab_move"))
+    person.chooses(person.words("named_state"), "left")
+    person.press(person.words("plan"))
+    person.reads(person.words("duration"))
+    person.press(person.words("execute"))
     until(lambda: arm.joints["brazo_joint"], lambda at: abs(at - arm.states["left"]["brazo_joint"]) < 1e-3)
     rests(arm)
 
 
-def teaches(person: Person, arm: gemelo.Arm, folder: Path) -> None:
-    person.tab("Enseñar")
-    for name in ("Uno", "Dos", "Tres"):
+def teaches(person: Newcomer, arm: gemelo.Arm, folder: Path) -> None:
+    person.tab(person.words("tab_teach"))
+    for name in person.points:
         arm.move(joints={"brazo_joint": arm.joints["brazo_joint"] - 0.1})
-        person.types("Nombre", name)
-        person.press("Recordar esta posición")
+        person.types(person.words("name"), name)
+        person.press(person.words("remember"))
         until(lambda name=name: f'"{name}"' in text_of(folder) or f".{name}]" in text_of(folder), bool)
-    person.tab("Programas")
-    for name in ("Uno", "Dos", "Tres"):
-        person.chooses("Adónde", name)
-        person.press("Añadir tras el paso")
-        person.reads(f"ir a {name}")
-    person.press("Revisar todo el programa")
-    person.reads("Todo el programa se puede ejecutar")
-    person.press("Ejecutar desde el paso")
-    person.reads("Terminado.")
+    person.tab(person.words("tab_programs"))
+    for name in person.points:
+        person.chooses(person.words("target"), name)
+        person.press(person.words("add_step"))
+        person.reads(f"{person.words('step_go')} {name}")
+    person.press(person.words("check"))
+    person.reads(person.words("check_ok"))
+    person.press(person.words("run_from"))
+    person.reads(person.words("run_done"))
 
 
-def breaks_it(person: Person, arm: gemelo.Arm) -> None:
-    person.tab("Equipo")
-    person.page.get_by_text("Lo que podría hacer una mano").filter(visible=True).first.click()
+def breaks_it(person: Newcomer, arm: gemelo.Arm) -> None:
+    person.tab(person.words("tab_device"))
+    person.page.get_by_text(person.words("virtual")).filter(visible=True).first.click()
     motion = arm.start(named="home", speed=0.1)
     until(lambda: is_moving(arm), bool)
-    person.press("Pulsar la parada de emergencia")
+    person.press(person.words("estop_press"))
     with pytest.raises(gemelo.Aborted):
         motion.wait()
-    person.reads("Parada de emergencia")
-    person.press("Soltar la parada de emergencia")
-    person.press("Borrar el fallo")
+    person.reads(person.words("mode_estop"))
+    person.press(person.words("estop_release"))
+    person.press(person.words("reset"))
     declares(person, arm)
     before = steps_away(person)
-    person.tab("Equipo")
-    person.press("Hacer patinar brazo_joint 10 pasos")
+    person.tab(person.words("tab_device"))
+    person.press(person.words("slip").format(joint="brazo_joint"))
     until(lambda: steps_away(person), lambda away: away == before + 10)
     assert arm.step_errors["brazo_joint"] == 0.0
 
 
-def steps_away(person: Person) -> int:
+def steps_away(person: Newcomer) -> int:
     """By how many steps the first joint's shaft is not where its counter says."""
-    person.tab("Estado")
-    rows = person.page.locator("table").filter(has_text="eje real", visible=True).locator("tr")
+    person.tab(person.words("tab_state"))
+    rows = person.page.locator("table").filter(has_text=person.words("shaft"), visible=True).locator("tr")
     _, _, executed, shaft = rows.filter(has_text="brazo_joint").first.locator("td").all_inner_texts()
     return int(shaft) - int(executed)
 

@@ -285,8 +285,9 @@ def test_a_mesh_of_a_hundred_thousand_triangles_is_gone_around(planner: Planner)
     rock = msgspec.structs.replace(post, name="rock", shape=MeshShape(data=stl_of(mesh), scale=(0.4, 0.4, 0.4)))
     show(planner, PlanningScene(version=10, objects=(rock,)))
     planner.prepare()
-    request = msgspec.structs.replace(request, allowed_time=PlanRequest(goal=request.goal).allowed_time)
-    response = planner.plan(request, None, clock=time.process_time)
+    slow_machine = 4.0  # times as slow as one that does it in the default time: 1.4 s of CPU was seen
+    allowed = slow_machine * PlanRequest(goal=request.goal).allowed_time
+    response = planner.plan(msgspec.structs.replace(request, allowed_time=allowed), None, clock=time.process_time)
     require_sound(planner, request, response, looks=40)  # each takes the other checker a tenth of a second
     assert response.planner_id != "straight"
 

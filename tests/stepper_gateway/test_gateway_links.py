@@ -157,7 +157,7 @@ def _frame_kind(frame: bytes) -> Kind:
         .__name__.lower()
         .replace("heartbeat", "hb")
         .replace("chunk", "traj")
-        .replace("command", "cmd")
+        .replace("commandframe", "cmd")
     )
 
 
