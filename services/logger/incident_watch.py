@@ -103,7 +103,7 @@ class IncidentWatch:
     def _on_statistics(self, message: NodeStatistics, now: int) -> Trigger | None:
         """The trigger where a service was started again before its silence was noticed."""
         node, started = message.node, message.started
-        was_heard = self._heard.get(node) is not None
+        was_heard = node in self._heard
         self._heard[node] = now
         before, self._started[node] = self._started.get(node), started
         if not was_heard or before == started:  # a silence that was told already is no second incident
