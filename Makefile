@@ -12,7 +12,7 @@ folders := $(filter-out $(side_by_side) tests/panel tests/stack,$(patsubst %/,%,
 patient := $(patsubst %,tests/panel/test_%.py,camera_box cameras model own_pages goals_on_the_stack \
 	page_on_the_stack picks pointing quiet_page six_joints_on_the_stack) $(patsubst %,tests/stack/test_%.py,black_box camera camera_mount clocks_apart configuration control device imported_arm locked_broker my_own_arm old_dialects picks \
 	plan_files planning provisioning serial_wire several_arms six_joints)
-one_by_one := $(patsubst %,tests/stack/test_%.py,chaos hostile_viewer jogging links stops)
+one_by_one := $(patsubst %,tests/stack/test_%.py,busy_machine chaos hostile_viewer jogging links stops)
 # They wait for a state, for as long as it takes; the longest first, so that the browsers are mostly on one side.
 in_pairs := $(patsubst %,tests/%.py,panel/test_page stack/test_whole stack/test_deaths stack/test_hosts)
 in_pairs += $(filter-out $(patient) $(one_by_one) $(in_pairs),$(wildcard tests/panel/test_*.py tests/stack/test_*.py))

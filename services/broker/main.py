@@ -19,6 +19,7 @@ from services.runtime.certificate_watch import CertificateWatch
 from services.runtime.deployment import DeploymentError, exposure, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
+from services.runtime.process.priority import step_ahead
 from services.runtime.process.readiness import Readiness
 
 BEAT = 1.0  # [s] of the readiness file
@@ -64,6 +65,7 @@ def run(deployment: Deployment, log: logging.Logger) -> int:
     if section.broker is Broker.MOSQUITTO:
         mosquitto.find()  # raises where it is not installed
     log.info("%s listens on %s port %d%s", section.broker, host, port, " with TLS" if section.secure_folder else "")
+    step_ahead()  # the device's heartbeats pass through here
     if section.broker is Broker.MOSQUITTO:
         return mosquitto.serve(section, folder, beat, readiness.not_ready)
     # amqtt takes half a second to import, which mosquitto need not wait for.

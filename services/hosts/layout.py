@@ -21,15 +21,16 @@ class ServiceRow:
     about: str
     memory: str  # [systemd's] above which it is ended: three times and more of what it takes on rm1
     extras: tuple[str, ...] = ()  # of pyproject.toml
+    is_ahead: bool = False  # it may take a real-time priority: what a stop or a heartbeat goes through
 
 
 SERVICES = {
     each.name: each
     for each in (
-        ServiceRow(ROUTER, "the Zenoh router", "512M"),
-        ServiceRow(BROKER, "the MQTT broker", "256M"),
-        ServiceRow("virtual_esp32", "the firmware core on real MQTT", "256M"),
-        ServiceRow("stepper_gateway", "trajectories to step knots", "512M"),
+        ServiceRow(ROUTER, "the Zenoh router", "512M", is_ahead=True),
+        ServiceRow(BROKER, "the MQTT broker", "256M", is_ahead=True),
+        ServiceRow("virtual_esp32", "the firmware core on real MQTT", "256M", is_ahead=True),
+        ServiceRow("stepper_gateway", "trajectories to step knots", "512M", is_ahead=True),
         ServiceRow("state_publisher", "joint states to frames", "256M"),
         ServiceRow("planner", "goals to verified trajectories", "4G", ("planner",)),
         ServiceRow("logger", "everything to MCAP, every command to CSV", "1G", ("record",)),

@@ -7,6 +7,7 @@ from schemas.site import Site
 from services.hosts.deployments import environment
 from services.hosts.layout import FILES, TASKS, Process, processes
 from services.hosts.quoting import systemd
+from services.runtime.process.priority import AHEAD
 
 TARGET = "gemelo.target"
 UNIT = """\
@@ -54,7 +55,7 @@ ProtectKernelModules=yes
 ProtectKernelTunables=yes
 RestrictAddressFamilies=AF_INET AF_INET6 AF_UNIX
 RestrictNamespaces=yes
-RestrictRealtime=yes
+{realtime}
 RestrictSUIDSGID=yes
 LockPersonality=yes
 SystemCallArchitectures=native
@@ -100,6 +101,7 @@ def _unit(site: Site, host: str, process: Process) -> str:
         files=FILES,
         state=systemd(site.state),
         devices=_devices(site, process),
+        realtime=f"LimitRTPRIO={AHEAD}" if service.is_ahead else "RestrictRealtime=yes",
     )
 
 

@@ -19,6 +19,7 @@ from services.runtime.certificate_watch import CertificateWatch
 from services.runtime.deployment import DeploymentError, exposure, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
+from services.runtime.process.priority import step_ahead
 from services.runtime.process.readiness import Readiness
 from services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
 
@@ -46,6 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with stop_on_signals(stop):
             require_free(host, port, "router", "listen_port" if deployment.router.listen_port else "port")
             with zenoh.open(config) as session:
+                step_ahead()
                 watch = end_dead_links(session)
                 locked = " with TLS, for certificates of its authority" if is_locked else ""
                 log.info("listening on %s port %d%s", host, port, locked)

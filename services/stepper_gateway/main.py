@@ -14,6 +14,7 @@ from services.arm.model.description import Arm, load_arm, require_motors
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
+from services.runtime.process.priority import step_ahead
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.inputs import BeganInput
 from services.stepper_gateway.ledger.ledger_file import LedgerFile, read_ledger
@@ -26,6 +27,10 @@ RATE = 50.0  # [Hz] standard: that of the device's states
 SWITCH_INTERVAL = 0.0005  # [s] chosen
 USUAL_BAUD = 921_600  # standard: the device's own, firmware/PROTOCOL.md
 VIRTUAL_LINE = "virtual_esp32.tty"
+NO_PRIORITY = (
+    "it runs without a real-time priority: heartbeats may be late on a machine that has too much to do "
+    "(`ulimit -r 1`, or a line for rtprio in /etc/security/limits.conf, would allow it)"
+)
 
 
 def run(node: Node, deployment: Deployment) -> None:
@@ -43,6 +48,8 @@ def run(node: Node, deployment: Deployment) -> None:
     shell = Shell(node, core, began, parameters, file)
     with closing(file), closing(open_device(deployment, arm, shell.wake)) as link:
         shell.use(link)
+        if not step_ahead():
+            node.log.info(NO_PRIORITY)
         node.spin(shell.step, rate=RATE)
         shell.finish()
         file.keep(core.ledger_record())

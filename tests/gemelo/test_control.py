@@ -212,7 +212,7 @@ def test_the_secret_is_never_published_nor_recorded_nor_logged(lab: Lab) -> None
     lab.stop_gateway()
     assert until(lambda: inputs)
     given = repr([each for message in inputs for each in unpacked(message.inputs)])
-    assert given.count("TakeControl(") == given.count("JoinControl(") == given.count("GiveControl(") == 1
+    assert given.count("ControlTake(") == given.count("ControlJoin(") == given.count("ControlGive(") == 1
     assert secret not in given
     assert seen
     assert not any(secret.encode() in payload for payload in seen)

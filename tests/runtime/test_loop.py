@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.runtime import endpoints
+from services.runtime.bus.identity import identify
 from services.runtime.loop import loop as loop_module
 from services.runtime.loop.loop import Loop, LoopFigures, Schedule
 from services.runtime.loop.task_queue import Task, TaskQueue
@@ -152,7 +153,7 @@ def test_slow_steps_and_slow_messages_take_turns(clock: CountedClock) -> None:
 
 
 def test_statistics_say_the_rate_since_the_report_before(clock: CountedClock) -> None:
-    statistics = endpoints.LoopStatistics("planner")
+    statistics = endpoints.LoopStatistics(identify("planner"))
     clock.spend(0.4)
     assert statistics.report(LoopFigures(20, 0.0), ()) is None
     clock.spend(0.6)

@@ -17,6 +17,7 @@ import pytest
 from schemas.topics import JOINT_STATES
 from services.runtime.node import Node
 from services.runtime.process.priority import BEHIND
+from tests.real_time import may_run_in_real_time
 from tests.runtime.support import ROOT, RouterProcess, programs, until
 
 PROMPT = 6.0  # [s] within which every process ends after SIGTERM
@@ -315,3 +316,20 @@ def test_what_may_wait_steps_behind_and_never_ahead(before: int, after: int) -> 
     command = [sys.executable, "-c", f"import os; os.nice({asked}); {code}"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert int(done.stdout) == max(after, os.nice(0))
+
+
+def test_every_thread_of_what_steps_ahead_has_a_real_time_priority_where_the_system_allows_it() -> None:
+    program = """
+import os, threading
+from services.runtime.process.priority import AHEAD, step_ahead
+before = threading.Thread(target=threading.Event().wait, daemon=True)
+before.start()
+has = step_ahead()
+threading.Thread(target=threading.Event().wait, daemon=True).start()
+threads = [int(each) for each in os.listdir("/proc/self/task")]
+policies = {(os.sched_getscheduler(each), os.sched_getparam(each).sched_priority) for each in threads}
+print(len(threads), has, policies == {(os.SCHED_RR, AHEAD)}, policies == {(os.SCHED_OTHER, 0)})
+"""
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    may = may_run_in_real_time()
+    assert done.stdout.split() == ["3", str(may), str(may), str(not may)]

@@ -30,6 +30,7 @@ from services.credentials.private_files import AccessError
 from services.mqtt.access import device_access
 from services.runtime.deployment import DeploymentError, load_deployment, project_root
 from services.runtime.process.logs import LEVELS, line_logger
+from services.runtime.process.priority import step_ahead
 from services.runtime.process.readiness import Readiness
 from services.runtime.process.shutdown import ShutdownRequest, end_with_any_thread
 
@@ -65,6 +66,7 @@ def run(deployment: Deployment, has_line: bool = False) -> None:
     end_with_any_thread(log, lambda: stop.is_set)
     if deployment.device is DeviceKind.BOARD:
         return idle(inbox, Readiness(folder, NAME))
+    step_ahead()  # a board has its processor for itself
     access = device_access(deployment.mqtt, arm.device.name)
     if arm.device.dialect is Dialect.RA:
         return VirtualSketch(arm, access, inbox, Readiness(folder, NAME)).run()
