@@ -100,10 +100,10 @@ def test_a_line_the_speed_and_the_planner_are_those_that_are_chosen(served: Serv
     far = arm.states["left"]
 
     def planned() -> gemelo.Plan:
-        before = motions.version
+        before = motions.plan
         served.press("plan")
-        until(lambda: motions.version, lambda version: version > before + 1)
-        assert motions.plan is not None, served.operator.newest_problem
+        until(lambda: motions.plan, lambda plan: plan is not None and plan is not before)
+        assert motions.plan is not None
         return motions.plan
 
     arm.scene.add_box("post", size=(0.04, 0.04, 0.16), at=(0.29, 0.27, 0.08))  # in the way
@@ -133,6 +133,37 @@ def test_a_line_the_speed_and_the_planner_are_those_that_are_chosen(served: Serv
     for share in (0.25, 0.5, 0.75):
         x, _, z = arm.fk(configuration_at(line, share * line.duration)).position
         assert (x, z) == pytest.approx((start.position[0], start.position[2]), abs=2e-3)
+
+
+def test_an_execute_right_after_plan_goes_to_the_new_goal_and_not_along_the_plan_before(
+    served: Served, arm: gemelo.Arm
+) -> None:
+    arm.move(named="ready")
+    served.operator.set_goal(arm.states["left"])
+    served.press("plan")
+    before = until(lambda: served.operator.motions.plan, lambda plan: plan is not None)
+    goal = degrees(arm.states["ready"][ARM]) - 8.0
+    served.browser.slide(f"{ARM} [°]", goal)
+    with passed(arm, ARM) as seen:
+        served.press("plan")
+        served.press("execute")  # in the same breath: the plan is not made yet
+        until(lambda: degrees(arm.joints[ARM]), lambda at: abs(at - goal) < 0.1)
+    assert served.operator.motions.plan is not before
+    assert served.operator.newest_problem is None
+    assert max(seen) <= max(seen[0], arm.joints[ARM]) + 1e-3  # "left" is the other way
+
+
+def test_a_stop_between_plan_and_execute_starts_nothing(served: Served, arm: gemelo.Arm) -> None:
+    at = arm.joints
+    served.browser.slide(f"{ARM} [°]", degrees(at[ARM]) + 8.0)
+    with passed(arm, ARM) as seen:
+        served.press("plan")
+        served.press("execute")
+        served.press("stop")
+        until(lambda: served.operator.motions.plan, lambda plan: plan is not None)
+        until(lambda: served.operator.motions.is_planning, lambda is_planning: not is_planning)
+    assert max(seen) - min(seen) < 1e-3
+    assert arm.joints == at
 
 
 def test_the_ghost_stands_where_its_time_is_set_to(served: Served, arm: gemelo.Arm) -> None:

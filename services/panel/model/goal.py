@@ -12,6 +12,7 @@ from services.panel.model.problems import Problem, problem_of
 from services.panel.model.tool_turns import tool_turns
 
 IDLE = 1.0  # [s] after which a solver without work looks whether it is to end
+FOUND = 1.0  # [s] in which a goal is mostly found; a plan waits no longer: somebody else may drag it all the time
 JUMP = {"rad": pi / 4, "m": 0.05}  # chosen: more of a joint between two points of a drag is another configuration
 FAR, TURNED = 0.1, pi / 4  # [m], [rad] chosen: to a goal so far away, as by a click, the joints go far in any case
 
@@ -52,7 +53,7 @@ class GoalSolver:
         self._arm, self._on_change = arm, on_change
         self._news = threading.Condition()
         self._wish: JointsWish | PoseWish | None = None
-        self._is_open = True
+        self._is_open, self._is_solving = True, False
         self.turns = tool_turns(arm.description)  # what the gizmo offers
         self.solved = 0  # wishes that were answered
         joints = arm.joints
@@ -82,6 +83,11 @@ class GoalSolver:
                 self.goal = replace(self.goal, wanted=None, version=self.goal.version + 1)
         self._on_change()
 
+    def wait(self, timeout: float = FOUND) -> bool:
+        """Until `goal` is that of the last wish; False where one is not found after `timeout` [s]."""
+        with self._news:
+            return self._news.wait_for(lambda: self._wish is None and not self._is_solving, timeout)
+
     def check_again(self) -> None:
         """What stands around has changed."""
         with self._news:
@@ -107,10 +113,13 @@ class GoalSolver:
                 if not self._is_open:
                     return
                 wish, self._wish, before = self._wish, None, self.goal
+                self._is_solving = True
             assert wish is not None
             goal = self._checked(before, wish) if isinstance(wish, JointsWish) else self._followed(before, wish)
             with self._news:
                 self.solved += 1
+                self._is_solving = False
+                self._news.notify_all()
                 if not isinstance(self._wish, JointsWish):  # sliders have gone on meanwhile: theirs stay
                     self.goal = replace(goal, version=self.goal.version + 1, source=wish.source)
             self._on_change()

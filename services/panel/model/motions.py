@@ -12,6 +12,7 @@ from services.panel.model.problems import Problem, problem_of
 
 AFTER_STOP = 0.7  # [s] chosen: a press that the same finger makes with Stop starts nothing
 ALLOWED_TIME = 5.0  # [s] for planning
+PATIENCE = 2.0 * ALLOWED_TIME  # [s] for a plan that is being made
 PLANNERS = ("", "native", "RRTConnect", "RRTstar", "BITstar", "PRM")
 
 
@@ -39,11 +40,13 @@ class Motions:
     def __init__(self, arm: gemelo.Arm, tell: Callable[[Problem], object]) -> None:
         self._arm, self._tell = arm, tell
         self._one = threading.Lock()
+        self._news = threading.Condition()
+        self._asked = 0  # presses on Plan whose plan is not made yet
+        self._is_making = False
         self._stopped = 0.0  # [s] monotonic, of the last press on Stop
         self._stops = 0
         self.plan: gemelo.Plan | None = None
         self.motion: gemelo.Motion | None = None
-        self.is_planning = False
         self.shows_plan = False  # by a ghost that goes along it: until it is executed, and again when a person asks
         self.version = 0  # +1 with every change
 
@@ -53,33 +56,67 @@ class Motions:
         motion = self.motion
         return motion is not None and not motion.is_over
 
+    @property
+    def is_planning(self) -> bool:
+        """True while a plan is made, or has been asked for."""
+        return self._is_making or self._asked > 0
+
+    def ask(self) -> None:
+        """Plan was pressed: the plan before is none any more, and an Execute that follows waits for the new one.
+
+        `make_asked` is to follow.
+        """
+        with self._news:
+            self._asked += 1
+            self.plan = None
+        self._changed()
+
+    def make_asked(self, target: Callable[[], gemelo.Target]) -> gemelo.Plan | None:
+        """As `make`, of the target that there is by then, for one `ask`."""
+        try:
+            return self.make(target())
+        finally:
+            with self._news:
+                self._asked = max(0, self._asked - 1)
+                self._news.notify_all()
+            self._changed()
+
     def make(self, target: gemelo.Target) -> gemelo.Plan | None:
         """Plans, and shows the plan; None and a problem told where there is none."""
         if not self._one.acquire(blocking=False):
             self._tell(Problem("busy", "busy"))
             return None
         try:
-            self.is_planning, self.plan = True, None
+            self._is_making, self.plan = True, None
             self._changed()
             self.plan = self._arm.plan(**target)
             self.shows_plan = True
         except Exception as error:
             self._tell(problem_of(error))
         finally:
-            self.is_planning = False
+            with self._news:
+                self._is_making = False
+                self._news.notify_all()
             self._one.release()
             self._changed()
         return self.plan
 
     def execute(self, plan: gemelo.Plan | None = None) -> gemelo.Motion | None:
-        """Goes exactly along `plan`, or the plan that is shown, and returns at its end; None if it did not begin."""
-        plan = plan or self.plan
-        if plan is None:
-            self._tell(Problem("no plan", "no plan"))
-            return None
+        """Goes exactly along `plan`, or the plan that is shown, and returns at its end; None if it did not begin.
+
+        Where one is being made it is waited for; why there is none is told by then.
+        """
         if time.monotonic() - self._stopped < AFTER_STOP:
             return None
-        return self._go(plan, self._stops)
+        stops, had_to_wait = self._stops, self.is_planning
+        with self._news:
+            self._news.wait_for(lambda: plan is not None or not self.is_planning, PATIENCE)
+        plan = plan or self.plan
+        if plan is not None:
+            return self._go(plan, stops)
+        if not had_to_wait:
+            self._tell(Problem("no plan", "no plan"))
+        return None
 
     def make_and_execute(self, target: gemelo.Target) -> gemelo.Motion | None:
         """Both; a Stop meanwhile ends it before it moves."""

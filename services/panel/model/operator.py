@@ -131,9 +131,9 @@ class Operator:
     # Motions
 
     def plan(self) -> None:
-        """A path to the goal, shown and not gone."""
+        """A path to the goal, shown and not gone; `motions.ask` has gone before."""
         self.forget_problem()
-        self.motions.make(self.choice.target(dict(self.goal.goal.joints)))
+        self.motions.make_asked(self._target)
         self.wake()
 
     def execute(self) -> None:
@@ -145,8 +145,13 @@ class Operator:
     def plan_and_execute(self) -> None:
         """Both."""
         self.forget_problem()
-        self.motions.make_and_execute(self.choice.target(dict(self.goal.goal.joints)))
+        self.motions.make_and_execute(self._target())
         self.wake()
+
+    def _target(self) -> gemelo.Target:
+        """To the goal that was wanted last, once it is found."""
+        self.goal.wait()
+        return self.choice.target(dict(self.goal.goal.joints))
 
     def step(self, target: gemelo.Target) -> None:
         """A small motion by a button, at once."""

@@ -26,10 +26,21 @@ class Kit:
         self._reasons: list[tuple[viser.GuiHtmlHandle, dict[str, str]]] = []
 
     def button(
-        self, label: str, action: Callable[[], object], *, color: Color | None = None, needs: str = ""
+        self,
+        label: str,
+        action: Callable[[], object],
+        *,
+        color: Color | None = None,
+        needs: str = "",
+        first: Callable[[], object] | None = None,
     ) -> viser.GuiButtonHandle:
-        """`action` runs in a thread of its own; once it is done, the refusal of the press before is shown no more."""
+        """`action` runs in a thread of its own; once it is done, the refusal of the press before is shown no more.
+
+        `first` runs before it, in the order in which a browser's buttons are pressed; it must not wait.
+        """
         handle = self.gui.add_button(label, color=color)
+        if first is not None:
+            handle.on_click(at_once(first))
 
         def act() -> None:
             told = self.operator.newest_problem

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Coroutine
 from math import degrees, radians
+from typing import Any
 
 import viser
 
@@ -14,6 +16,7 @@ from services.panel.model.tool_turns import ALL_RINGS
 from services.panel.view.kit import OWN_CHANGE, Kit, set_if_new
 
 PLACE_STEP, TURN_STEP = 0.1, 0.1  # [mm], [deg] of the fields
+Event = viser.GuiEvent[viser.GuiVector3Handle]
 
 
 class ToolFields:
@@ -24,11 +27,11 @@ class ToolFields:
         self._version, self._touched = -1, 0.0
         goal = self._operator.goal
         self._place = kit.gui.add_vector3(kit.words("tool_mm"), _shown_place(goal.goal), step=PLACE_STEP)
-        self._place.on_update(lambda event: self._lead(event, is_turned=False))
+        self._place.on_update(self._leading(is_turned=False))
         self._turn: viser.GuiVector3Handle | None = None
         if goal.turns.rings == ALL_RINGS:
             self._turn = kit.gui.add_vector3(kit.words("tool_deg"), _shown_turn(goal.goal), step=TURN_STEP)
-            self._turn.on_update(lambda event: self._lead(event, is_turned=True))
+            self._turn.on_update(self._leading(is_turned=True))
 
     def show(self, goal: GoalState) -> None:
         """The pose of the goal, or the one that was asked for and cannot be."""
@@ -39,7 +42,13 @@ class ToolFields:
         if self._turn is not None:
             set_if_new(self._turn, "value", _shown_turn(goal))
 
-    def _lead(self, event: viser.GuiEvent[viser.GuiVector3Handle], is_turned: bool) -> None:
+    def _leading(self, is_turned: bool) -> Callable[[Event], Coroutine[Any, Any, None]]:
+        async def lead(event: Event) -> None:  # in viser's loop: before a press that follows it
+            self._lead(event, is_turned)
+
+        return lead
+
+    def _lead(self, event: Event, is_turned: bool) -> None:
         if event.client_id is None:
             return
         self._touched = time.monotonic()
