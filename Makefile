@@ -35,12 +35,18 @@ down: ## stop a twin that runs elsewhere
 	@PROC_COMP_CONFIG=.gemelo $(bin)/process-compose down
 
 test: setup ## all tests: Python, firmware, whole stack
-	@deploy/test_firmware
 	@deploy/run_tests worksteal $(side_by_side)
+	@$(MAKE) --jobs 2 --keep-going test-firmware test-stacks
+	@deploy/optional
+
+# The firmware's build takes the time that the stacks leave while arms move.
+.PHONY: test-firmware test-stacks
+test-firmware:
+	@deploy/behind deploy/test_firmware
+test-stacks:
 	@deploy/run_tests loadfile $(file_by_file)
 	@deploy/run_tests pairs $(in_pairs)
 	@deploy/run_tests no $(one_by_one)
-	@deploy/optional
 
 check: setup ## ruff, mypy, import-linter, clang-format
 	@$(MAKE) --jobs 2 --keep-going --output-sync=target $(checks)
