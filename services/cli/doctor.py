@@ -30,6 +30,7 @@ from services.credentials.private_files import AccessError
 from services.mqtt.access import gateway_access
 from services.runtime.clock_offset import ClockOffset
 from services.runtime.deployment import load_deployment, project_root, when_silent
+from services.runtime.process.priority import may_step_ahead
 
 BROKER_PAGE = "docs/my_broker.md has every such sentence with what to do"
 # Tuning constants: chosen.
@@ -110,8 +111,18 @@ def _machine() -> Iterator[Diagnosis]:
         yield Diagnosis(Verdict.WARNING, "CPU", found, remedy)
     else:
         yield Diagnosis(Verdict.OK, "CPU", found)
+    yield _priority()
     memory = psutil.virtual_memory().available
     yield _enough("memory", memory, LEAST_MEMORY, "end what uses it")
+
+
+def _priority() -> Diagnosis:
+    """Of gateway, broker, router and virtual device; without it a twin works, as long as the machine has time left."""
+    if may_step_ahead():
+        return Diagnosis(Verdict.OK, "priority", "heartbeats and stops go before everything else of this machine")
+    found = "heartbeats and stops wait their turn: beside much other work a device may hold for want of them"
+    remedy = 'a line "<user> - rtprio 1" in /etc/security/limits.conf and a new login let them go first'
+    return Diagnosis(Verdict.OK, "priority", found, remedy)
 
 
 def _enough(subject: str, free: float, least: float, remedy: str) -> Diagnosis:

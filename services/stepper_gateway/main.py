@@ -28,8 +28,7 @@ SWITCH_INTERVAL = 0.0005  # [s] chosen
 USUAL_BAUD = 921_600  # standard: the device's own, firmware/PROTOCOL.md
 VIRTUAL_LINE = "virtual_esp32.tty"
 NO_PRIORITY = (
-    "it runs without a real-time priority: heartbeats may be late on a machine that has too much to do "
-    "(`ulimit -r 1`, or a line for rtprio in /etc/security/limits.conf, would allow it)"
+    "without a real-time priority: beside much other work heartbeats may come late (`gemelo doctor` has the remedy)"
 )
 
 

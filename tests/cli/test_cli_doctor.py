@@ -19,6 +19,7 @@ from services.cli.main import run
 from services.mqtt import secure_folder
 from services.runtime.clock_offset import ClockOffset
 from services.runtime.deployment import when_silent
+from tests.real_time import may_run_in_real_time
 from tests.stepper_gateway.locked import Mosquitto, external, locked
 
 OK = ClockOffset(0.0, 0.001)
@@ -45,6 +46,7 @@ def test_the_doctor_without_a_twin_says_what_would_do(monkeypatch, capsys):
     for name in ("router", "broker"):
         assert (found[name]["verdict"], found[name]["remedy"]) == ("error", "start the twin with `make up`")
     assert found["robot"]["verdict"] == "ok"
+    assert bool(found["priority"]["remedy"]) is not may_run_in_real_time()
     assert "twin" not in found
 
 

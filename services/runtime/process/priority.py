@@ -17,6 +17,19 @@ def step_behind() -> None:
         os.nice(max(0, BEHIND - os.nice(0)))
 
 
+def may_step_ahead() -> bool:
+    """True if the OS would let `step_ahead` do so; nothing stays changed."""
+    if sys.platform != "linux":
+        return False
+    policy, share = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(AHEAD))
+    except OSError:
+        return False
+    os.sched_setscheduler(0, policy, share)
+    return True
+
+
 def step_ahead() -> bool:
     """Gives all threads of this process a real-time priority, so that a busy machine delays no heartbeat; true if so.
 
