@@ -82,6 +82,7 @@ def test_the_tool_s_numbers_lead_the_goal_and_what_cannot_be_says_so(person: Per
 
 
 def test_a_move_is_held_and_goes_on(person: Person, arm: gemelo.Arm) -> None:
+    arm.speed(0.2)  # a browser that draws slowly presses late
     person.types(f"{ARM} [°]", 150)
     person.press("Plan and execute")
     until(lambda: abs(arm.velocities[ARM]), lambda speed: speed > 0.1)
@@ -89,6 +90,7 @@ def test_a_move_is_held_and_goes_on(person: Person, arm: gemelo.Arm) -> None:
     until(lambda: arm.device.state.mode.name, lambda mode: mode == "HOLD")
     until(lambda: abs(arm.velocities[ARM]), lambda speed: speed == 0.0)
     assert degrees(arm.joints[ARM]) < 145.0
+    arm.speed(1.0)
     person.press("Resume")
     until(lambda: degrees(arm.joints[ARM]), lambda at: abs(at - 150.0) < 0.05)
 

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,23 @@ class Lab:
             text=True, timeout=120.0, check=False,
         )  # fmt: skip
 
+    @contextmanager
+    def changed(self, *changes: tuple[str, str]) -> Iterator[None]:
+        """The site's file with those texts replaced, and rendered so; then both as they were."""
+        before = text = self.file.read_text()
+        for old, new in changes:
+            text = text.replace(old, new)
+        try:
+            self._render(text)
+            yield
+        finally:
+            self._render(before)
+
+    def _render(self, text: str) -> None:
+        self.file.write_text(text)
+        done = self.deploy("render")
+        assert done.returncode == 0, done.stderr
+
     def there(self, *words: str) -> subprocess.CompletedProcess[str]:
         """A command there, by the user of the services, with the deployment of who works there."""
         return self.host.run(f"cd / && runuser -u gemelo -- env GEMELO_CONFIG=/etc/gemelo/rm1.toml {' '.join(words)}")
@@ -94,14 +112,9 @@ def test_a_dry_run_does_nothing_there(lab: Lab) -> None:
     assert not lab.host.calls.exists()
 
 
-def test_where_gemelo_cannot_be_run_nothing_is_copied_and_the_remedy_is_said(lab: Lab, tmp_path: Path) -> None:
-    text = lab.file.read_text()
-    try:
-        lab.file.write_text(text.replace(f'project = "{project_root()}"', 'project = "/opt/nowhere"')
-                            .replace("/etc/gemelo", "/etc/elsewhere"))  # fmt: skip
+def test_where_gemelo_cannot_be_run_nothing_is_copied_and_the_remedy_is_said(lab: Lab) -> None:
+    with lab.changed((f'project = "{project_root()}"', 'project = "/opt/nowhere"'), ("/etc/gemelo", "/etc/elsewhere")):
         done = lab.deploy("install", "one")
-    finally:
-        lab.file.write_text(text)
     assert done.returncode == 1
     assert "gemelo cannot run /opt/nowhere/.venv/bin/gemelo on one: `make setup` in /opt/nowhere" in done.stderr
     assert lab.host.run("ls /etc/elsewhere").stdout == ""
@@ -109,7 +122,7 @@ def test_where_gemelo_cannot_be_run_nothing_is_copied_and_the_remedy_is_said(lab
 
 def test_where_the_robots_own_files_are_missing_nothing_is_copied_and_the_remedy_is_said(lab: Lab) -> None:
     """An arm or cell of one's own is not in what a host has installed."""
-    text, own = lab.file.read_text(), project_root() / "urdf/own_of_test"
+    own = project_root() / "urdf/own_of_test"
     own.mkdir()
     try:
         (own / "cell.toml").write_text((project_root() / "urdf/rm1/cell.toml").read_text())
@@ -117,10 +130,9 @@ def test_where_the_robots_own_files_are_missing_nothing_is_copied_and_the_remedy
             if file.name != "cell.toml":
                 (own / file.name).symlink_to(file)
         own.chmod(0o700)  # of root, so that the services' user has none of it
-        lab.file.write_text(text.replace('"urdf/rm1"', '"urdf/rm1"\ncell = "urdf/own_of_test/cell.toml"'))
-        done = lab.deploy("install", "one")
+        with lab.changed(('"urdf/rm1"', '"urdf/rm1"\ncell = "urdf/own_of_test/cell.toml"')):
+            done = lab.deploy("install", "one")
     finally:
-        lab.file.write_text(text)
         shutil.rmtree(own)
     assert done.returncode == 1
     assert f"gemelo cannot read {own}/cell.toml on one: `rsync -a --relative urdf/own_of_test root@" in done.stderr
