@@ -20,6 +20,11 @@ SCALE = 0.5  # of a picture's pixels to those of the page: a processor draws a q
 CONTROLS = 450  # [pixels] of the page
 STILL = 2.5  # [s] the drawing of a loaded machine lags so much
 CHANGED = 30  # of 255: what differs more between two pictures was drawn anew
+# At most ten pictures a second: a processor that draws does little else, and the tests wait for what it shows.
+CALM = """
+  window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 100);
+  window.cancelAnimationFrame = (number) => clearTimeout(number);
+"""
 BLUE = (45, 140, 255)  # of the gizmo's arrow along z
 
 
@@ -32,6 +37,7 @@ class Person:
             SCALE * (size["width"] - CONTROLS)
         )  # [pixels] of the picture that are drawn in three dimensions
         self._address = f"http://127.0.0.1:{port}"
+        self._context.add_init_script(CALM)
         self.page = self._context.new_page()
         self.page.set_default_timeout(PATIENCE)
         self._errors: list[str] = []
