@@ -18,7 +18,7 @@ from services.runtime.process.shutdown import ShutdownRequest
 
 RETRY_PERIOD = 0.1  # [s]
 HANDSHAKE = 1.0  # [s] for the router to say why it refuses a certificate
-SILENT_WAIT = 1.0  # [s] of waiting that are not worth a word: all processes start at once
+SILENT_WAIT = 3.0  # [s] of waiting that are not worth a word: all processes start at once, on a slow machine too
 
 
 def connect(router: RouterSection, robot: str, log: logging.Logger, stop: ShutdownRequest) -> Bus:
