@@ -20,6 +20,7 @@ from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, 
 from services.bench.scenes import rm1
 from services.bench.stack import Running, Stacks
 from services.bench.traffic import send_at_once
+from services.mqtt.client import stop_loop
 from services.stepper_gateway.links.frames import BadFrame, StateFrame, decode
 
 LOOKUP_GOAL = FigureGoal(median=10.0)  # [us]
@@ -103,7 +104,7 @@ def state_to_frame_ms(stacks: Stacks) -> Figure:
     listener = listen(running, arrivals)
     running.node.wait(DURATION)
     listener.disconnect()
-    listener.loop_stop()
+    stop_loop(listener)
     samples = [
         (when - arrivals[device_times[stamp]]) * 1e3
         for stamp, when in frames.items()

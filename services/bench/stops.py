@@ -33,6 +33,7 @@ from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, 
 from services.bench.latency import sharp_start
 from services.bench.stack import Running, Stacks, families
 from services.bench.traffic import OURS, connected, flood
+from services.mqtt.client import stop_loop
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.zenoh_bus import ZenohBus
 
@@ -73,7 +74,7 @@ class StopWire:
 
     def close(self) -> None:
         self._client.disconnect()
-        self._client.loop_stop()
+        stop_loop(self._client)
 
 
 class StopCaller:

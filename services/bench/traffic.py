@@ -49,6 +49,7 @@ from schemas.topics import (
     JOINT_TARGETS,
     PLAN,
 )
+from services.mqtt.client import stop_loop
 from services.runtime.bus.pace import Pace, Rate
 from services.runtime.bus.zenoh_bus import ZenohBus
 
@@ -157,7 +158,7 @@ def ask(port: int, size: int, rate: float, count: int) -> list[float]:
         client.publish(THERE, _COUNT.pack(number) + filler, qos=1)
     time.sleep(0.5)
     client.disconnect()
-    client.loop_stop()
+    stop_loop(client)
     return took
 
 

@@ -23,6 +23,7 @@ from services.broker import mosquitto
 from services.chaos.clocks import ClockError, SteppingClocks
 from services.chaos.slots import SlotFile
 from services.chaos.slow_link import SlowLink
+from services.mqtt.client import stop_loop
 from services.runtime.actions.keys import feedback_topic, status_topic
 from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.deployment import load_deployment, project_root
@@ -143,7 +144,7 @@ class WireStranger:
     def close(self) -> None:
         """Leaves the broker."""
         self._client.disconnect()
-        self._client.loop_stop()
+        stop_loop(self._client)
 
     def repeat(self, random: Random, count: int) -> None:
         """Says `count` of the newest frames once more."""

@@ -23,6 +23,7 @@ from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options
 from services.cli.ra_intake import OUTPUT, RaIntake, RefusedMessage
 from services.cli.session import CommandSession, connect, share_control
+from services.mqtt.client import stop_loop
 from services.runtime.errors import NoAnswer, RequestRefused
 
 JOINTS, STATES, READINGS = "ra/juntas", "ra/estados", "ra/sensores"
@@ -75,7 +76,7 @@ class Listener:
     def close(self) -> None:
         """Leave the broker; without targets the gateway brakes."""
         self._client.disconnect()
-        self._client.loop_stop()
+        stop_loop(self._client)
 
     def _connected(self) -> paho.Client:
         mqtt = self._session.deployment.mqtt

@@ -89,3 +89,24 @@ def test_a_packet_that_is_none_ends_the_connection_and_the_next_one_is_read(bad:
 def test_whatever_bytes_come_the_client_comes_back(bad: bytes) -> None:
     with closing(Broker(bad, hangs_up=True)) as broker, listening_to(broker) as heard:
         assert until(lambda: ("a/b", GOOD) in heard, 10.0), (broker.connections, heard)
+
+
+class EndingClient(MqttClient):
+    """Its thread ends, and paho's takes itself away, just after it was seen to be there."""
+
+    looks = 0
+
+    @property
+    def _thread(self) -> threading.Thread | None:
+        self.looks += 1
+        return threading.Thread() if self.looks < 3 else None
+
+    @_thread.setter
+    def _thread(self, thread: threading.Thread | None) -> None: ...
+
+
+def test_a_thread_that_ends_just_as_it_is_waited_for_is_no_error() -> None:
+    client = EndingClient(BrokerAccess("127.0.0.1", 1), "ending")
+    client.looks = 0
+    client.loop_stop()
+    assert client.looks == 3

@@ -88,7 +88,7 @@ class XmlReader:
             self.fault(element, where, f'"{text}" is not a number', comma)
             return 0.0
         if not math.isfinite(value):
-            self.fault(element, where, f"{text} is not finite")
+            self.fault(element, where, f"{text} is not finite", "write a number")
             return 0.0
         return value
 
