@@ -73,11 +73,8 @@ class Census:
         return len(self._asked_at) < MAX_NODES
 
     def _ask(self, asked: _Asked) -> None:
-        try:
-            for request in (info_request, interfaces_request, parameters_request):  # the first one also for its clock
-                self._ask_one(asked, request(asked.name))
-        except NoAnswer:  # it has just ended
-            return
+        for request in (info_request, interfaces_request, parameters_request):  # the first one also for its clock
+            self._ask_one(asked, request(asked.name))
 
     def _ask_one(self, asked: _Asked, request: Request[Empty, Any]) -> None:
         began = self._node.monotonic()
@@ -92,7 +89,7 @@ class Census:
         """`took` [s] is the round trip."""
         try:
             answer = pending.response()
-        except (NoAnswer, RequestRefused):
+        except (NoAnswer, RequestRefused):  # it has just ended, or there never was one of that name
             return
         asked.answers[type(answer).__name__] = answer
         if isinstance(answer, NodeInfo) and answer.clock:

@@ -176,11 +176,11 @@ class Node:
     def ask(
         self, request: Request[Q, R], question: Q, timeout: float, on_answer: Callable[[], None]
     ) -> requests.PendingCall[Q, R]:
-        """Asks and returns at once; `on_answer` is called from another thread when `response()` blocks no more.
+        """Asks and returns at once; `on_answer` is called when `response()` blocks no more, mostly from another thread.
 
-        `timeout` is in [s]. Raises `NoAnswer` where nobody serves the request.
+        `timeout` is in [s]. Where nobody serves the request, `response()` raises `NoAnswer` at once.
         """
-        return requests.PendingCall(self._bus, request, question, timeout, on_answer)
+        return requests.PendingCall(self._bus, request, question, timeout, on_answer, appearance=0.0)
 
     def is_served(self, request: Request[Q, R]) -> bool:
         """True if a node serves `request` now. It is watched from the first look on, so that a later call finds it."""

@@ -43,6 +43,24 @@ def test_the_clock_of_every_node_is_in_its_record(tmp_path: Path, ahead: float) 
     assert record.info.clock == 0  # the moment of the answer is nothing of the node
 
 
+def test_names_that_nobody_has_hold_up_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stranger's statistics, or the last ones of a command: a recorder that waited for each would miss what comes."""
+    monkeypatch.setattr(MemoryBus, "wait_served", lambda bus, key, timeout: pytest.fail(f"it waits for {key}"))
+    deployment = Deployment(paths=PathsSection(run=str(tmp_path / "run"), out=str(tmp_path / "out")))
+    network, records, heard = MemoryNetwork(), [], []
+    with (
+        Node("stranger", deployment, robot="rm1", bus=MemoryBus(network)) as stranger,
+        Node("logger", deployment, robot="rm1", bus=MemoryBus(network)) as logger,
+    ):
+        Census(logger, records.append)
+        logger.subscribe(STATISTICS, lambda message: heard.append(message.node))
+        for number in range(50):
+            stranger.publisher(STATISTICS).put(NodeStatistics(node=f"nobody_{number}"))
+        assert hear(logger, lambda: "nobody_49" in heard)
+        logger.wait(0.0)  # what the answers have left to do
+    assert records == []
+
+
 def test_a_node_that_was_started_again_is_asked_at_once_and_one_of_long_ago_makes_place(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("services.recordings.census.MAX_NODES", 1)
     deployment = Deployment(paths=PathsSection(run=str(tmp_path / "run"), out=str(tmp_path / "out")))

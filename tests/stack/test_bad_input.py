@@ -302,5 +302,5 @@ def test_extreme_strays_on_a_key_keep_nothing_from_working(topic, stack, neighbo
     assert neighbour.wait_for(neighbour.moves_a_little, 3.0), neighbour.objection
     assert stack.pids() == pids
     if topic.delivery is Delivery.LATCHED:
-        has_dropped = neighbour.wait_for(lambda: neighbour.has_dropped(topic.key, before, count), 10.0)
+        has_dropped = neighbour.wait_for(lambda: neighbour.has_dropped(topic.key, before, count), 3.0)
         assert has_dropped, (before, count, neighbour.readers(topic.key))

@@ -24,17 +24,24 @@ class PendingCall(Generic[Q, R]):
     """A request that was sent, and its reply."""
 
     def __init__(
-        self, bus: Bus, request: Request[Q, R], question: Q, timeout: float, wake: Task, number: int = 0
+        self,
+        bus: Bus,
+        request: Request[Q, R],
+        question: Q,
+        timeout: float,
+        wake: Task,
+        number: int = 0,
+        appearance: float = SERVER_APPEARANCE_TIMEOUT,
     ) -> None:
         """Sends the request, with `timeout` [s] for its reply; `wake` is then called from another thread.
 
-        Raises `NoAnswer` where no node serves the request.
+        Raises `NoAnswer` where no node serves the request within `appearance` [s]; with 0 it is sent in any case.
         """
         self._bus, self._request, self._wake = bus, request, wake
         self._timeout = timeout
         self._answers: SimpleQueue[BusReply | None] = SimpleQueue()
         payload, number = to_payload(question), number or bus.take_number()
-        if not bus.wait_served(request.key, min(timeout, SERVER_APPEARANCE_TIMEOUT)):
+        if appearance and not bus.wait_served(request.key, min(timeout, appearance)):
             raise NoAnswer(_nobody(bus, request))
         bus.ask(request.key, schema_of(request.request), payload, timeout, self._on_answer, request.urgent, number)
 
