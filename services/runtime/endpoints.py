@@ -37,6 +37,11 @@ class NodeEndpoints:
     servers: list[RequestServer[Any, Any]] = field(default_factory=list)
     actions: list[ActionServer[Any, Any, Any]] = field(default_factory=list)
 
+    def add(self, subscription: Subscription[Any]) -> None:
+        """Counts it until it is closed."""
+        self.subscriptions.append(subscription)
+        subscription.on_close = lambda: self.subscriptions.remove(subscription)
+
     def info(self, identity: Identity, robot: str) -> NodeInfo:
         """The node's identity and endpoints."""
         from importlib.metadata import version  # 20 ms that most nodes never need

@@ -125,7 +125,7 @@ class Node:
         cheaper for a node that displays them. With 0 none is left out either, and each is handled as it comes.
         """
         subscription = Subscription(self._bus, self._loop, topic, on_message, self.log.warning, own, batch)
-        self._endpoints.subscriptions.append(subscription)
+        self._endpoints.add(subscription)
         return subscription
 
     def subscribe_signed(self, topic: Topic[M], on_message: Callable[[M, str], object]) -> Subscription[M]:
@@ -133,7 +133,7 @@ class Node:
         subscription = Subscription(
             self._bus, self._loop, topic, lambda message: None, self.log.warning, False, None, on_message
         )
-        self._endpoints.subscriptions.append(subscription)
+        self._endpoints.add(subscription)
         return subscription
 
     def latest(self, topic: Topic[M], *, on_demand: bool = False) -> Latest[M]:
@@ -143,7 +143,7 @@ class Node:
         """
         if on_demand:
             unread = LatestOnDemand(self._bus, self._loop, topic, self.log.warning)
-            self._endpoints.subscriptions.append(unread.subscription)
+            self._endpoints.add(unread.subscription)
             return unread
         latest = Latest(topic)
         self.subscribe(topic, latest.on_message)

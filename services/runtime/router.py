@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with stop_on_signals(stop):
             require_free(host, port, "router", "listen_port" if deployment.router.listen_port else "port")
             with zenoh.open(config) as session:
-                step_ahead()
+                step_ahead()  # a stop passes through here
                 watch = end_dead_links(session)
                 locked = " with TLS, for certificates of its authority" if is_locked else ""
                 log.info("listening on %s port %d%s", host, port, locked)

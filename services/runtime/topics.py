@@ -65,6 +65,7 @@ class Subscription(Generic[M]):
         self.topic = topic
         self._handler, self._on_signed, self._warn = handler, on_signed, warn
         self._received, self._bad, self._lost_said = 0, 0, False
+        self.on_close: Callable[[], object] | None = None
         self._loop = loop
         self._queue: ArrivalQueue = self._queue_for(batch) if queue is None else queue
         self._declaration = bus.subscribe(topic.key, topic.delivery, self._queue.on_arrival, self._queue.on_miss, own)
@@ -84,6 +85,10 @@ class Subscription(Generic[M]):
         return TopicStatistics(key=self.topic.key, received=received, dropped=self._queue.dropped, bad=self._bad)
 
     def close(self) -> None:
+        """Nothing is handed over any more, and its node no longer counts it."""
+        on_close, self.on_close = self.on_close, None
+        if on_close is not None:
+            on_close()
         self._declaration.close()
         if isinstance(self._queue, EveryQueue):
             self._loop.forget(self._queue.deliver_all)

@@ -465,6 +465,15 @@ def test_statistics_come_on_the_bus(buses: Buses) -> None:
     assert "joint_states" in {topic.key for topic in heard[0].topics}
 
 
+def test_what_was_closed_is_counted_and_told_no_more(buses: Buses) -> None:
+    node = buses.node("reader")
+    kept, closed = (node.subscribe(JOINT_STATES, lambda message: None) for _ in range(2))
+    closed.close()
+    assert [each.key for each in node.statistics()].count(JOINT_STATES.key) == 1
+    kept.close()
+    assert JOINT_STATES.key not in [each.key for each in node.statistics()]
+
+
 def test_a_slow_step_does_not_starve_the_inbox(buses: Buses) -> None:
     reader, writer = buses.node("reader"), buses.node("writer")
     latest = reader.latest(JOINT_STATES)
