@@ -118,10 +118,10 @@ class GoalSolver:
             goal = self._checked(before, wish) if isinstance(wish, JointsWish) else self._followed(before, wish)
             with self._news:
                 self.solved += 1
-                self._is_solving = False
-                self._news.notify_all()
                 if not isinstance(self._wish, JointsWish):  # sliders have gone on meanwhile: theirs stay
                     self.goal = replace(goal, version=self.goal.version + 1, source=wish.source)
+                self._is_solving = False
+                self._news.notify_all()
             self._on_change()
 
     def _checked(self, before: GoalState, wish: JointsWish) -> GoalState:

@@ -42,7 +42,6 @@ class Motions:
         self._one = threading.Lock()
         self._news = threading.Condition()
         self._asked = 0  # presses on Plan whose plan is not made yet
-        self._is_making = False
         self._stopped = 0.0  # [s] monotonic, of the last press on Stop
         self._stops = 0
         self.plan: gemelo.Plan | None = None
@@ -59,7 +58,7 @@ class Motions:
     @property
     def is_planning(self) -> bool:
         """True while a plan is made, or has been asked for."""
-        return self._is_making or self._asked > 0
+        return self._one.locked() or self._asked > 0
 
     def ask(self) -> None:
         """Plan was pressed: the plan before is none any more, and an Execute that follows waits for the new one.
@@ -68,7 +67,7 @@ class Motions:
         """
         with self._news:
             self._asked += 1
-            self.plan = None
+        self.plan = None
         self._changed()
 
     def make_asked(self, target: Callable[[], gemelo.Target]) -> gemelo.Plan | None:
@@ -77,8 +76,7 @@ class Motions:
             return self.make(target())
         finally:
             with self._news:
-                self._asked = max(0, self._asked - 1)
-                self._news.notify_all()
+                self._asked -= 1
             self._changed()
 
     def make(self, target: gemelo.Target) -> gemelo.Plan | None:
@@ -87,16 +85,13 @@ class Motions:
             self._tell(Problem("busy", "busy"))
             return None
         try:
-            self._is_making, self.plan = True, None
+            self.plan = None
             self._changed()
             self.plan = self._arm.plan(**target)
             self.shows_plan = True
         except Exception as error:
             self._tell(problem_of(error))
         finally:
-            with self._news:
-                self._is_making = False
-                self._news.notify_all()
             self._one.release()
             self._changed()
         return self.plan
@@ -152,4 +147,6 @@ class Motions:
         return motion
 
     def _changed(self) -> None:
-        self.version += 1
+        with self._news:
+            self.version += 1
+            self._news.notify_all()
