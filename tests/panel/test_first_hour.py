@@ -88,6 +88,7 @@ def moves(person: Newcomer, arm: gemelo.Arm) -> None:
     person.press(person.words("execute"))
     until(lambda: arm.joints["brazo_joint"], lambda at: abs(at - 0.5236) < 1e-3)
     person.reads(person.words("ended_succeeded"))
+    assert arm.joints["brazo_joint"] == pytest.approx(0.5236, abs=1e-3)
     person.types("brazo_joint [°]", -150)
     person.press(person.words("plan_and_execute"))
     until(lambda: is_moving(arm), bool)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -32,9 +33,9 @@ def test_a_machine_that_is_far_too_busy_delays_no_heartbeat(operator: Operator) 
         plan = operator.plan(SPEED)
         with hogs():
             outcome = operator.send(plan).wait(plan.duration + 20.0)
+        assert not jumps(operator.arm, operator.seen)
         if not may_run_in_real_time() and outcome.status is GoalStatusCode.ABORTED:
-            assert outcome.result.error_string
+            assert re.search("heartbeat|silent|joint state", outcome.result.error_string), outcome
             return
         assert outcome.status is GoalStatusCode.SUCCEEDED, outcome
         assert outcome.result.executed_steps == outcome.result.commanded_steps
-        assert not jumps(operator.arm, operator.seen)
