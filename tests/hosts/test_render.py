@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -245,7 +246,8 @@ def test_the_example_is_rendered_hardened_and_readable(tmp_path):
     require_readable(lab, tmp_path)
     unit = directives(rendered(lab, "cell")["systemd/gemelo-rm1-stepper_gateway.service"])
     wanted = """NoNewPrivileges=yes User=gemelo ProtectSystem=strict CapabilityBoundingSet= Type=notify WatchdogSec=5
-        Restart=always MemoryMax=512M TasksMax=256 LimitNOFILE=4096 LimitCORE=0 UMask=0077 PrivateDevices=yes"""
+        Restart=always MemoryMax=512M TasksMax=256 LimitNOFILE=4096 LimitCORE=0 UMask=0077 PrivateDevices=yes
+        LimitRTPRIO=1"""
     for directive in wanted.split():
         assert tuple(directive.split("=", 1)) in [(key, value) for _, key, value in unit]
     files = rendered(lab, "brain")
@@ -255,6 +257,20 @@ def test_the_example_is_rendered_hardened_and_readable(tmp_path):
     read = zenoh.Config.from_file(str(config))
     assert json.loads(read.get_json("listen/endpoints")) == ["tls/10.0.0.12:7447"]
     assert json.loads(read.get_json("access_control"))["default_permission"] == "deny"
+
+
+def test_only_what_a_stop_or_a_heartbeat_goes_through_may_take_a_real_time_priority(tmp_path):
+    """And it does so: the unit allows what the program asks for, and no other program asks."""
+    lab = site(tmp_path)
+    entries = tomllib.loads((project_root() / "pyproject.toml").read_text())["project"]["scripts"]
+    for host in lab.hosts:
+        files = rendered(lab, host)
+        for process in processes(lab, host):
+            unit = directives(files[f"systemd/{process.unit}.service"])
+            module = project_root() / f"{entries[process.program].partition(':')[0].replace('.', '/')}.py"
+            asks = "step_ahead()" in module.read_text()
+            assert values(unit, "LimitRTPRIO") == (["1"] if asks else []), process
+            assert values(unit, "RestrictRealtime") == ([] if asks else ["yes"]), process
 
 
 def test_a_service_is_started_again_however_often_and_nobody_waits_until_all_are_ready(tmp_path):
