@@ -6,6 +6,7 @@ import os
 import subprocess
 from functools import cache
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -22,20 +23,27 @@ def lack(name: str) -> str:
 
 def need(name: str) -> None:
     """Skips the test, or all that a fixture is for, where `name` is missing; CI installs it, so there it fails."""
-    if not lack(name):
-        return
-    if "CI" in os.environ:
-        pytest.fail(lack(name))
-    pytest.skip(lack(name))
+    if lack(name):
+        _go_without(lack(name))
 
 
 def need_root(file: str, with_taps: bool = False) -> None:
     """Skips all that a fixture is for where network namespaces (and TAP devices) cannot be made.
 
-    No package brings that: `deploy/optional` names it with its own remedy, and CI that is not root goes on without.
+    No package brings that right: `deploy/optional` names both in the closing line of `make test`, each with its remedy.
+    CI runs as root, so there it fails; whether its kernel has TAP devices is not the project's to say.
     """
     need("ip")
     if os.geteuid() != 0:
-        pytest.skip(f"network namespaces are root's to make: sudo .venv/bin/pytest {file}")
+        _go_without(f"network namespaces are root's to make: sudo .venv/bin/pytest {file}")
     if with_taps and not os.access("/dev/net/tun", os.W_OK):
-        pytest.skip("TAP devices cannot be made here: /dev/net/tun is missing or may not be written")
+        pytest.skip(
+            "TAP devices cannot be made here: /dev/net/tun is missing or may not be written (sudo modprobe tun)"
+        )
+
+
+def _go_without(reason: str) -> NoReturn:
+    """What a person's machine lacks is left out of their run, and said; what CI lacks would never be tested at all."""
+    if "CI" in os.environ:
+        pytest.fail(reason)
+    pytest.skip(reason)

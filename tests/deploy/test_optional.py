@@ -71,5 +71,23 @@ def test_a_test_that_needs_it_is_skipped_and_fails_in_ci(monkeypatch, environmen
         optional.need("mosquitto")
 
 
+@pytest.mark.parametrize(
+    ("environment", "outcome"), [({}, pytest.skip.Exception), ({"CI": "true"}, pytest.fail.Exception)]
+)
+def test_who_is_not_root_goes_without_network_namespaces_but_ci_does_not(monkeypatch, environment, outcome):
+    monkeypatch.setattr(os, "environ", environment)
+    monkeypatch.setattr(optional, "lack", lambda name: "")
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    with pytest.raises(outcome, match=r"root's to make: sudo \.venv/bin/pytest tests/stack/test_hosts\.py"):
+        optional.need_root("tests/stack/test_hosts.py")
+
+
+def test_that_there_are_no_tap_devices_is_said_in_the_same_line(bare: Path):
+    command, environment = [ROOT / "deploy/optional"], {"PATH": str(bare), "TUN": str(bare / "none")}
+    told = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+    assert len(told.splitlines()) == 1
+    assert "which need TAP devices (sudo modprobe tun)" in told
+
+
 def test_a_name_that_is_in_no_row_is_an_error(bare: Path):
     assert said(bare, "gtest").returncode == 2
