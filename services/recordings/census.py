@@ -83,7 +83,7 @@ class Census:
             took = self._node.monotonic() - began
             self._node.post(lambda: self._take(asked, pending, took))
 
-        pending = self._node.ask(request, Empty(), TIMEOUT, on_answer)
+        pending = self._node.ask_at_once(request, Empty(), TIMEOUT, on_answer)
 
     def _take(self, asked: _Asked, pending: PendingCall[Empty, Any], took: float) -> None:
         """`took` [s] is the round trip."""

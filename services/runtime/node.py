@@ -176,9 +176,18 @@ class Node:
     def ask(
         self, request: Request[Q, R], question: Q, timeout: float, on_answer: Callable[[], None]
     ) -> requests.PendingCall[Q, R]:
-        """Asks and returns at once; `on_answer` is called when `response()` blocks no more, mostly from another thread.
+        """Asks, and waits for no answer; `on_answer` is called from another thread when `response()` blocks no more.
 
-        `timeout` is in [s]. Where nobody serves the request, `response()` raises `NoAnswer` at once.
+        `timeout` is in [s]. Raises `NoAnswer` where nobody serves the request, after a wait for whoever may just start.
+        """
+        return requests.PendingCall(self._bus, request, question, timeout, on_answer)
+
+    def ask_at_once(
+        self, request: Request[Q, R], question: Q, timeout: float, on_answer: Callable[[], None]
+    ) -> requests.PendingCall[Q, R]:
+        """As `ask`, for a task that may hold nothing up: never waits for a server.
+
+        Where nobody serves the request, `response()` raises `NoAnswer` at once; `on_answer` may be called from here.
         """
         return requests.PendingCall(self._bus, request, question, timeout, on_answer, appearance=0.0)
 

@@ -57,7 +57,7 @@ class NodeClock:
             took = self._node.monotonic() - began
             self._node.post(lambda: self._take(pending, asked, took))
 
-        pending = self._node.ask(info_request(self._other), Empty(), TIMEOUT, on_answer)
+        pending = self._node.ask_at_once(info_request(self._other), Empty(), TIMEOUT, on_answer)
 
     def _take(self, pending: PendingCall[Empty, NodeInfo], asked: int, took: float) -> None:
         try:

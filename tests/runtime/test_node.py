@@ -20,6 +20,7 @@ from schemas.topics import COMMAND_ACKS, DESCRIPTION, JOINT_STATES, LOG, PLAN, S
 from services.runtime import topics
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.errors import NoAnswer, NodeNameTaken, RequestRefused
 from services.runtime.node import Node
 from services.runtime.requests.client import call
@@ -271,6 +272,31 @@ def test_nobody_and_a_silent_server_are_told_apart(buses: Buses) -> None:
     server.serve(PLAN, lambda request: PlanResponse())  # and does not spin
     with pytest.raises(NoAnswer, match="did not answer plan within"):
         client.call(PLAN, PlanRequest(), timeout=0.3)
+
+
+def test_who_asks_waits_for_a_server_that_just_starts_and_else_hears_that_nobody_serves(buses: Buses) -> None:
+    server, client = buses.node("planner"), buses.node("client")
+    answered = threading.Event()
+    with pytest.raises(NoAnswer, match="nobody serves plan: is planner running"):
+        client.ask(PLAN, PlanRequest(), 0.3, answered.set)
+    late = threading.Timer(0.1, lambda: server.serve(PLAN, lambda request: PlanResponse(code=PlanCode.SUCCESS)))
+    late.start()
+    call = client.ask(PLAN, PlanRequest(), 10.0, answered.set)
+    late.join()
+    with spinning(server):
+        assert call.response().code is PlanCode.SUCCESS
+    assert answered.wait(1.0)
+
+
+def test_who_asks_at_once_waits_for_nobody(buses: Buses, monkeypatch: pytest.MonkeyPatch) -> None:
+    for kind in (MemoryBus, ZenohBus):
+        monkeypatch.setattr(kind, "wait_served", lambda bus, key, timeout: pytest.fail(f"it waits for {key}"))
+    client = buses.node("client")
+    answered = threading.Event()
+    call = client.ask_at_once(PLAN, PlanRequest(), 10.0, answered.set)
+    assert answered.wait(5.0), "the time-out is not waited for"
+    with pytest.raises(NoAnswer, match="planner did not answer plan: it has just ended"):
+        call.response()
 
 
 def test_a_script_handles_its_inbox_while_it_waits_for_an_answer(buses: Buses) -> None:
