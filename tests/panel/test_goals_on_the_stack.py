@@ -76,6 +76,34 @@ def test_what_a_dragged_goal_would_touch_is_named_with_how_deep_and_drawn_red_an
     assert move._problem.content == ""
 
 
+def test_a_goal_is_checked_anew_when_anybody_changes_what_stands_around(served: Served, arm: gemelo.Arm) -> None:
+    goal = served.operator.goal
+    served.operator.set_goal(BEHIND)
+    until(lambda: goal.goal, lambda now: now.joints == BEHIND and now.problem is None)
+    arm.scene.add_box("late_post", **POST)  # over another connection than the page's
+    said = until(lambda: served.page._move._problem.content, lambda content: "late_post would touch: " in content)
+    assert "<b>Something is in the way</b>" in said
+    until(lambda: served.world._bad_goal.is_visible, bool)
+    arm.scene.remove("late_post")
+    until(lambda: goal.goal.problem, lambda problem: problem is None)
+    until(lambda: served.page._move._problem.content, lambda content: content == "")
+    assert goal.goal.joints == BEHIND
+
+
+def test_a_pose_out_of_reach_stays_wanted_when_the_scene_changes(served: Served, arm: gemelo.Arm) -> None:
+    goal = served.operator.goal
+    far = gemelo.Pose((0.9, 0.3, 0.1), (0.0, 0.0, 0.0, 1.0))
+    goal.set_pose(far)
+    told = until(lambda: goal.goal, lambda now: now.wanted == far)
+    answered = goal.solved
+    arm.scene.add_box("bystander", size=(0.02, 0.02, 0.02), at=(-0.4, -0.4, 0.01))
+    until(lambda: goal.solved, lambda solved: solved > answered)
+    assert (goal.goal.wanted, goal.goal.joints) == (far, told.joints)
+    assert goal.goal.problem is not None
+    assert goal.goal.problem.is_same(told.problem)
+    arm.scene.remove("bystander")
+
+
 def test_a_drag_that_only_another_configuration_can_follow_says_so_and_a_far_goal_does_not(
     served: Served, arm: gemelo.Arm
 ) -> None:

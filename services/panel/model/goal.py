@@ -53,7 +53,8 @@ class GoalSolver:
         self._arm, self._on_change = arm, on_change
         self._news = threading.Condition()
         self._wish: JointsWish | PoseWish | None = None
-        self._is_open, self._is_solving = True, False
+        self._pose_wish: PoseWish | None = None  # the last one
+        self._is_open, self._is_solving, self._is_stale = True, False, False
         self.turns = tool_turns(arm.description)  # what the gizmo offers
         self.solved = 0  # wishes that were answered
         joints = arm.joints
@@ -74,7 +75,9 @@ class GoalSolver:
         Its orientation counts where it was turned, or where the arm can keep it; else it follows from the place.
         """
         with self._news:
-            self._want(PoseWish(pose, source, is_turned or (any(self.turns.rings) and self.turns.keeps_orientation)))
+            keeps = any(self.turns.rings) and self.turns.keeps_orientation
+            self._pose_wish = PoseWish(pose, source, is_turned or keeps)
+            self._want(self._pose_wish)
 
     def settle(self) -> None:
         """The drag has ended: the gizmo goes back to where the goal arm's tool is."""
@@ -86,13 +89,13 @@ class GoalSolver:
     def wait(self, timeout: float = FOUND) -> bool:
         """Until `goal` is that of the last wish; False where one is not found after `timeout` [s]."""
         with self._news:
-            return self._news.wait_for(lambda: self._wish is None and not self._is_solving, timeout)
+            return self._news.wait_for(lambda: not (self._has_work or self._is_solving), timeout)
 
     def check_again(self) -> None:
-        """What stands around has changed."""
+        """What stands around has changed; what is wished meanwhile stays."""
         with self._news:
-            if self._wish is None:
-                self._want(JointsWish(self.goal.joints, self.goal.source))
+            self._is_stale = True
+            self._news.notify_all()
 
     def close(self) -> None:
         """Ends the thread."""
@@ -101,6 +104,10 @@ class GoalSolver:
             self._news.notify_all()
         self._thread.join(2.0)
 
+    @property
+    def _has_work(self) -> bool:
+        return self._wish is not None or self._is_stale
+
     def _want(self, wish: JointsWish | PoseWish) -> None:
         self._wish = wish
         self._news.notify_all()
@@ -108,13 +115,13 @@ class GoalSolver:
     def _run(self) -> None:
         while True:
             with self._news:
-                while self._wish is None and self._is_open:
+                while self._is_open and not self._has_work:
                     self._news.wait(IDLE)
                 if not self._is_open:
                     return
-                wish, self._wish, before = self._wish, None, self.goal
-                self._is_solving = True
-            assert wish is not None
+                before = self.goal
+                wish = self._wish or self._standing_wish(before)
+                self._wish, self._is_stale, self._is_solving = None, False, True
             goal = self._checked(before, wish) if isinstance(wish, JointsWish) else self._followed(before, wish)
             with self._news:
                 self.solved += 1
@@ -123,6 +130,12 @@ class GoalSolver:
                 self._is_solving = False
                 self._news.notify_all()
             self._on_change()
+
+    def _standing_wish(self, goal: GoalState) -> JointsWish | PoseWish:
+        """What `goal` is of: where it could not follow the gizmo, the gizmo's pose."""
+        if goal.wanted is not None and self._pose_wish is not None:
+            return self._pose_wish
+        return JointsWish(goal.joints, goal.source)
 
     def _checked(self, before: GoalState, wish: JointsWish) -> GoalState:
         """The configuration of the sliders, which is shown also where it cannot be."""

@@ -46,6 +46,7 @@ class Operator:
         self.homing: dict[str, str] = {}  # by joint what it does, while the arm homes
         self._told: ToldProblem | None = None
         self.goal = GoalSolver(arm, self.wake)
+        arm.node.subscribe(gemelo.topics.SCENE, lambda scene: self.goal.check_again())  # whoever has changed it
         self.motions = Motions(arm, self.tell)
         self.jogging = Jogging(arm, self._jog_refused)
         self.teaching = Teaching(arm, self.wake)

@@ -109,14 +109,12 @@ class SceneTab:
             at = [float(value) for value in event.target.position]
             w, a, b, c = (float(value) for value in event.target.wxyz)
             self._operator.guarded(lambda: self._operator.arm.scene.move(item.name, at, (a, b, c, w)))
-            self._operator.goal.check_again()
 
         return gizmo
 
     def _with_chosen(self, action: Callable[[str], object]) -> None:
         name = self._require_chosen()
         action(name)
-        self._operator.goal.check_again()
 
     def _require_chosen(self) -> str:
         if self._chosen.value not in self._names:
@@ -138,7 +136,6 @@ class SceneTab:
             scene.resize(name, shape)
         if at != item.pose.translation and not item.attached:
             scene.move(name, at, item.pose.rotation or Transform().rotation)
-        self._operator.goal.check_again()
 
     def _add(self) -> None:
         kind = SHAPES[[self._kit.words(shape) for shape in SHAPES].index(self._shape.value)]
@@ -158,7 +155,6 @@ class SceneTab:
         self._chosen.options = (self._kit.words("none"), *self._names, name)
         self._names = (*self._names, name)
         set_if_new(self._chosen, "value", name)
-        self._operator.goal.check_again()
 
     def _free_name(self, name: str) -> str:
         """The name, or the same with a number: adding never replaces without a word."""
