@@ -16,50 +16,57 @@ Watch = Callable[[str, Callable[[bool], None]], Declaration]
 SETTLE = 0.2  # [s] from a token's end to a conclusion; a router that ends takes longer to be missed than its tokens
 FIRST_SIGHT = 2.0  # [s] in which the token of a client that has just sent a goal must have been seen
 RETURN = 5.0  # [s] that clients have to come back to a router: retry 0.5 s, open 1 s (zenoh_config), and as much again
+LINGER = 60.0  # [s] that a client without a goal is watched: mostly the next one comes
+MAX_IDLE = 32  # clients without a goal that are watched
 
 
 @dataclass
-class Attached:
-    """One goal and its client's token."""
+class Client:
+    """One client's token, and the goals that end with it."""
 
-    client: str  # key of the token
     missing_since: float | None  # [s] monotonic; None while the token is there
     patience: float  # [s] that it may be missing
+    goals: set[str] = field(default_factory=set)
+    idle_since: float = 0.0  # [s] monotonic, while it has no goals
     declarations: list[Declaration] = field(default_factory=list)
+
+    def is_lost(self, now: float) -> bool:
+        """True if its token has been missing for longer than it may, at `now` [s monotonic]."""
+        return self.missing_since is not None and now - self.missing_since > self.patience
 
 
 class ClientWatch:
-    """Everything here runs in the thread of logic; `watch` calls back there, True when a token comes."""
+    """Everything here runs in the thread of logic; `watch` calls back there, True when a token comes.
+
+    A client is watched beyond its goal, so that its next one need not wait for a first sight of it.
+    """
 
     def __init__(self, watch: Watch, is_connected: Callable[[], bool]) -> None:
         self._watch, self._is_connected = watch, is_connected
-        self._goals: dict[str, Attached] = {}
+        self._clients: dict[str, Client] = {}  # by key of the token
         self._was_away = False
         self._back_at = float("-inf")  # [s] monotonic, when the router came back last
         self._now = 0.0  # [s] monotonic, of the last call
 
     def add(self, goal_id: str, client: str, now: float) -> None:
         """Watches `client`'s token [key] for the goal from `now` [s monotonic] on."""
-        goal = self._goals[goal_id] = Attached(client, now, FIRST_SIGHT)
-
-        def on_token(is_there: bool) -> None:
-            if is_there:
-                goal.missing_since = None
-            elif goal.missing_since is None:
-                goal.missing_since, goal.patience = self._now, SETTLE
-
         self._now = now
-        goal.declarations.append(self._watch(client, on_token))
+        watched = self._clients.get(client) or self._watched(client)
+        if not watched.goals and watched.missing_since is not None:
+            watched.missing_since, watched.patience = now, FIRST_SIGHT
+        watched.goals.add(goal_id)
 
     def forget(self, goal_id: str) -> None:
         """The goal has ended."""
-        goal = self._goals.pop(goal_id, None)
-        for declaration in goal.declarations if goal else ():
-            declaration.close()
+        for client in self._clients.values():
+            if goal_id in client.goals:
+                client.goals.remove(goal_id)
+                client.idle_since = self._now
 
     def take_lost(self, now: float) -> list[tuple[str, str]]:
         """Goals whose client is gone at `now` [s monotonic], with its token; each is named once."""
         self._now = now
+        self._drop_idle()
         if not self._is_connected():
             self._was_away = True
             return []
@@ -67,10 +74,34 @@ class ClientWatch:
             self._was_away, self._back_at = False, now
         if now - self._back_at < RETURN:
             return []
-        lost = [(goal_id, goal.client) for goal_id, goal in self._goals.items() if _is_lost(goal, now)]
-        for goal_id, _ in lost:
-            self.forget(goal_id)
-        return lost
+        gone = [key for key, client in self._clients.items() if client.goals and client.is_lost(now)]
+        return [(goal_id, key) for key in gone for goal_id in sorted(self._dropped(key).goals)]
+
+    def _watched(self, key: str) -> Client:
+        client = self._clients[key] = Client(self._now, FIRST_SIGHT)
+
+        def on_token(is_there: bool) -> None:
+            if is_there:
+                client.missing_since = None
+            elif client.missing_since is None:
+                client.missing_since, client.patience = self._now, SETTLE
+
+        client.declarations.append(self._watch(key, on_token))
+        return client
+
+    def _drop_idle(self) -> None:
+        """Those that have been without a goal for long, and of too many the ones that were so first."""
+        idle = sorted((client.idle_since, key) for key, client in self._clients.items() if not client.goals)
+        too_many = len(idle) - MAX_IDLE
+        for place, (since, key) in enumerate(idle):
+            if place < too_many or self._now - since > LINGER:
+                self._dropped(key)
+
+    def _dropped(self, key: str) -> Client:
+        client = self._clients.pop(key)
+        for declaration in client.declarations:
+            declaration.close()
+        return client
 
 
 class Absence:
@@ -123,7 +154,3 @@ class Absences:
             if client not in self._of:
                 self._of[client] = Absence(self._watch, self._is_connected, client, now)
         return {client: self._of[client].seconds(now) for client in wanted}
-
-
-def _is_lost(goal: Attached, now: float) -> bool:
-    return goal.missing_since is not None and now - goal.missing_since > goal.patience

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from services.runtime.client_watch import FIRST_SIGHT, RETURN, SETTLE, ClientWatch
+from services.runtime.client_watch import FIRST_SIGHT, LINGER, MAX_IDLE, RETURN, SETTLE, ClientWatch
 
 
 class Tokens:
@@ -68,10 +68,53 @@ def test_nothing_is_concluded_while_the_router_is_away_nor_right_after_it() -> N
     assert clients.take_lost(131.0 + 1.1 * RETURN) == [("goal", "@id/a")]
 
 
-def test_a_goal_that_has_ended_is_forgotten() -> None:
+def test_a_goal_that_has_ended_is_forgotten_and_its_client_after_a_while() -> None:
     tokens, clients = watch()
     clients.add("goal", "@id/a", 100.0)
     clients.forget("goal")
     clients.forget("goal")
-    assert clients.take_lost(200.0) == []
+    assert clients.take_lost(100.0 + 0.9 * LINGER) == []
+    assert tokens.closed == 0
+    assert clients.take_lost(100.0 + 1.1 * LINGER) == []
     assert tokens.closed == 1
+
+
+def test_the_next_goal_of_a_client_that_was_seen_needs_no_first_sight() -> None:
+    """On a machine without time to spare the bus took longer than that to tell of a client that was there."""
+    tokens, clients = watch()
+    clients.add("first", "@id/a", 100.0)
+    tokens.watchers.pop("@id/a")(True)
+    clients.forget("first")
+    clients.take_lost(110.0)
+    clients.add("second", "@id/a", 110.0)
+    assert not tokens.watchers, "it is watched already"
+    assert clients.take_lost(110.0 + 10.0 * FIRST_SIGHT) == []
+
+
+def test_a_client_that_vanished_between_its_goals_is_given_the_time_of_a_first_sight() -> None:
+    tokens, clients = watch()
+    clients.add("first", "@id/a", 100.0)
+    clients.forget("first")
+    for is_there in (True, False):
+        tokens.watchers["@id/a"](is_there)
+    clients.add("second", "@id/a", 120.0)
+    assert clients.take_lost(120.0 + 0.9 * FIRST_SIGHT) == []
+    assert clients.take_lost(120.0 + 1.1 * FIRST_SIGHT) == [("second", "@id/a")]
+
+
+def test_all_goals_of_a_client_are_lost_with_it() -> None:
+    tokens, clients = watch()
+    for goal in ("one", "next"):
+        clients.add(goal, "@id/a", 100.0)
+    for is_there in (True, False):
+        tokens.watchers["@id/a"](is_there)
+    assert clients.take_lost(105.0) == [("next", "@id/a"), ("one", "@id/a")]
+
+
+def test_of_many_clients_that_have_no_goals_the_last_are_watched() -> None:
+    tokens, clients = watch()
+    for number in range(MAX_IDLE + 5):
+        clients.add("goal", f"@id/{number}", 100.0 + number)
+        clients.forget("goal")
+    clients.take_lost(100.0 + MAX_IDLE + 5)
+    assert tokens.closed == 5
