@@ -185,7 +185,7 @@ class Node:
     def ask_at_once(
         self, request: Request[Q, R], question: Q, timeout: float, on_answer: Callable[[], None]
     ) -> requests.PendingCall[Q, R]:
-        """As `ask`, for a task that may hold nothing up: never waits for a server.
+        """As `ask`, `timeout` in [s], for a task that may hold nothing up: never waits for a server.
 
         Where nobody serves the request, `response()` raises `NoAnswer` at once; `on_answer` may be called from here.
         """

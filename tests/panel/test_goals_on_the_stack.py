@@ -181,15 +181,55 @@ def test_an_execute_right_after_plan_goes_to_the_new_goal_and_not_along_the_plan
     assert max(seen) <= max(seen[0], arm.joints[ARM]) + 1e-3  # "left" is the other way
 
 
-def test_a_stop_between_plan_and_execute_starts_nothing(served: Served, arm: gemelo.Arm) -> None:
+def test_an_execute_right_after_plan_and_execute_goes_nowhere_else(served: Served, arm: gemelo.Arm) -> None:
+    arm.move(named="ready")
+    served.operator.set_goal(arm.states["left"])
+    served.press("plan")
+    until(lambda: served.operator.motions.plan, lambda plan: plan is not None)
+    goal = degrees(arm.states["ready"][ARM]) - 8.0
+    served.browser.slide(f"{ARM} [°]", goal)
+    with passed(arm, ARM) as seen:
+        served.press("plan_and_execute")
+        served.press("execute")
+        until(lambda: degrees(arm.joints[ARM]), lambda at: abs(at - goal) < 0.1)
+        until(lambda: served.operator.motions.is_moving, lambda is_moving: not is_moving)
+    assert served.operator.newest_problem is None
+    assert max(seen) <= max(seen[0], arm.joints[ARM]) + 1e-3  # "left" is the other way
+
+
+def test_a_stop_starts_nothing_also_where_the_goal_is_found_long_after_it(
+    served: Served, arm: gemelo.Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motions, found = served.operator.motions, threading.Event()
+    monkeypatch.setattr(served.operator.goal, "wait", lambda: found.wait(10.0))
     at = arm.joints
+    served.browser.slide(f"{ARM} [°]", degrees(at[ARM]) + 8.0)
+    with passed(arm, ARM) as seen:
+        served.press("plan_and_execute")
+        until(lambda: motions.is_planning, bool)
+        served.press("stop")
+        until(lambda: motions._has_just_stopped(), bool)
+        until(lambda: motions._has_just_stopped(), lambda has_just_stopped: not has_just_stopped)
+        found.set()
+        until(lambda: motions.is_planning, lambda is_planning: not is_planning)
+        assert motions.plan is not None
+        heard = len(seen)
+        until(lambda: len(seen), lambda count: count > heard + 10)
+    assert max(seen) - min(seen) < 1e-3
+    assert arm.joints == at
+
+
+def test_a_stop_between_plan_and_execute_starts_nothing(served: Served, arm: gemelo.Arm) -> None:
+    at, before = arm.joints, served.operator.motions.plan
     served.browser.slide(f"{ARM} [°]", degrees(at[ARM]) + 8.0)
     with passed(arm, ARM) as seen:
         served.press("plan")
         served.press("execute")
         served.press("stop")
-        until(lambda: served.operator.motions.plan, lambda plan: plan is not None)
+        until(lambda: served.operator.motions.plan, lambda plan: plan is not None and plan is not before)
         until(lambda: served.operator.motions.is_planning, lambda is_planning: not is_planning)
+        heard = len(seen)
+        until(lambda: len(seen), lambda count: count > heard + 10)
     assert max(seen) - min(seen) < 1e-3
     assert arm.joints == at
 

@@ -44,6 +44,7 @@ class Motions:
         self._asked = 0  # presses on Plan whose plan is not made yet
         self._stopped = 0.0  # [s] monotonic, of the last press on Stop
         self._stops = 0
+        self._led: gemelo.Plan | None = None  # the last one that was made to be executed at once
         self.plan: gemelo.Plan | None = None
         self.motion: gemelo.Motion | None = None
         self.shows_plan = False  # by a ghost that goes along it: until it is executed, and again when a person asks
@@ -61,9 +62,9 @@ class Motions:
         return self._one.locked() or self._asked > 0
 
     def ask(self) -> None:
-        """Plan was pressed: the plan before is none any more, and an Execute that follows waits for the new one.
+        """A plan was asked for by a press: the one before is none any more, and an Execute that follows waits.
 
-        `make_asked` is to follow.
+        `make_asked` or `make_asked_and_execute` is to follow.
         """
         with self._news:
             self._asked += 1
@@ -75,9 +76,7 @@ class Motions:
         try:
             return self.make(target())
         finally:
-            with self._news:
-                self._asked -= 1
-            self._changed()
+            self._made()
 
     def make(self, target: gemelo.Target) -> gemelo.Plan | None:
         """Plans, and shows the plan; None and a problem told where there is none."""
@@ -101,12 +100,14 @@ class Motions:
 
         Where one is being made it is waited for; why there is none is told by then.
         """
-        if time.monotonic() - self._stopped < AFTER_STOP:
+        if self._has_just_stopped():
             return None
         stops, had_to_wait = self._stops, self.is_planning
         with self._news:
             self._news.wait_for(lambda: plan is not None or not self.is_planning, PATIENCE)
         plan = plan or self.plan
+        if had_to_wait and plan is not None and plan is self._led:
+            return None
         if plan is not None:
             return self._go(plan, stops)
         if not had_to_wait:
@@ -115,11 +116,20 @@ class Motions:
 
     def make_and_execute(self, target: gemelo.Target) -> gemelo.Motion | None:
         """Both; a Stop meanwhile ends it before it moves."""
-        if time.monotonic() - self._stopped < AFTER_STOP:
+        if self._has_just_stopped():
             return None
         stops = self._stops
         plan = self.make(target)
         return self._go(plan, stops) if plan is not None else None
+
+    def make_asked_and_execute(self, target: Callable[[], gemelo.Target]) -> gemelo.Motion | None:
+        """As `make_and_execute`, of the target that there is by then, for one `ask`."""
+        stops, has_just_stopped, plan = self._stops, self._has_just_stopped(), None
+        try:
+            plan = self.make(target())
+        finally:
+            self._made(plan)
+        return self._go(plan, stops) if plan is not None and not has_just_stopped else None
 
     def on_stop(self) -> None:
         """What is asked for just now, and what is being planned, does not begin."""
@@ -129,6 +139,15 @@ class Motions:
     def forget_plan(self) -> None:
         """The plan is shown no more."""
         self.plan = None
+        self._changed()
+
+    def _has_just_stopped(self) -> bool:
+        return time.monotonic() - self._stopped < AFTER_STOP
+
+    def _made(self, led: gemelo.Plan | None = None) -> None:
+        """What was asked for is made; `led` is executed by who has asked."""
+        with self._news:
+            self._asked, self._led = self._asked - 1, led or self._led
         self._changed()
 
     def _go(self, plan: gemelo.Plan, stops: int) -> gemelo.Motion | None:

@@ -144,9 +144,9 @@ class Operator:
         self.wake()
 
     def plan_and_execute(self) -> None:
-        """Both."""
+        """Both; `motions.ask` has gone before."""
         self.forget_problem()
-        self.motions.make_and_execute(self._target())
+        self.motions.make_asked_and_execute(self._target)
         self.wake()
 
     def _target(self) -> gemelo.Target:

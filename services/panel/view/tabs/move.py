@@ -36,9 +36,10 @@ class MoveTab:
         if self._state_names:
             named = kit.gui.add_dropdown(words("named_state"), (words("choose"), *self._state_names))
             named.on_update(lambda event: self._name(event))
-        kit.button(words("plan"), self._operator.plan, color="blue", first=self._operator.motions.ask)
+        ask = self._operator.motions.ask
+        kit.button(words("plan"), self._operator.plan, color="blue", first=ask)
         kit.button(words("execute"), self._operator.execute, color="green", needs="move")
-        kit.button(words("plan_and_execute"), self._operator.plan_and_execute, color="green", needs="move")
+        kit.button(words("plan_and_execute"), self._operator.plan_and_execute, color="green", needs="move", first=ask)
         kit.reasons(move=words("execute"))
         self._plan = kit.line()
         self._play = kit.gui.add_checkbox(words("play"), True)

@@ -108,6 +108,7 @@ class TeachTab:
 
     def _go(self) -> None:
         self._as_goal()
+        self._operator.motions.ask()
         self._operator.plan_and_execute()
 
     def _show(self) -> None:
