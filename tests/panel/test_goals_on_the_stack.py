@@ -339,11 +339,11 @@ def test_the_state_is_told_in_rows_of_its_own(served: Served, arm: gemelo.Arm) -
     arm.move(joints={ARM: 0.5, LIFT: 0.05})
     state, device = served.page._state, served.page._device
     steps = dict(zip(arm.device.state.name, arm.device.state.steps, strict=True))
-    rows = until(lambda: state._joints.content, lambda content: f">{steps[ARM]}<" in content and "28.6" in content)
+    wanted = arm.description.joint(ARM).steps.to_steps(0.5)
+    expected = {f">{steps[ARM]}<", "28.6", f">{wanted:.1f}<"}  # what was commanded comes over a topic of its own
+    rows = until(lambda: state._joints.content, lambda content: all(each in content for each in expected))
     for word in ("measured", "steps_off", "commanded", "executed"):
         assert ENGLISH[word] in rows
-    wanted = arm.description.joint(ARM).steps.to_steps(0.5)
-    assert f">{wanted:.1f}<" in rows
     tool, (x, y, z) = state._tool.content, arm.pose().position
     until(lambda: state._tool.content, lambda content: f"{1e3 * x:.1f}, {1e3 * y:.1f}, {1e3 * z:.1f} mm" in content)
     for sensor in arm.description.sensors:

@@ -126,10 +126,12 @@ class Motions:
         """As `make_and_execute`, of the target that there is by then, for one `ask`."""
         stops, has_just_stopped, plan = self._stops, self._has_just_stopped(), None
         try:
-            plan = self.make(target())
+            made = self.make(target())
+            if not has_just_stopped and stops == self._stops:  # else the plan is only shown
+                plan = made
         finally:
             self._made(plan)
-        return self._go(plan, stops) if plan is not None and not has_just_stopped else None
+        return self._go(plan, stops) if plan is not None else None
 
     def on_stop(self) -> None:
         """What is asked for just now, and what is being planned, does not begin."""
