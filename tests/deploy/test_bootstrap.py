@@ -69,7 +69,7 @@ def test_packages_are_installed_by_hash(machine):
     machine.bootstrap()
     calls = (machine.home / "uv.log").read_text()
     assert "--require-hashes --requirement requirements.lock" in calls
-    assert "--no-deps --no-build-isolation --editable ." in calls
+    assert "--no-deps --no-build-isolation --config-settings editable_mode=compat --editable ." in calls
 
 
 @pytest.mark.parametrize(
