@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from typing import Any, NamedTuple, NoReturn
 
@@ -16,6 +17,7 @@ from services.cli.errors import ExitCode, nearest
 
 Options = argparse.Namespace
 Choices = Mapping[str, Iterable[str]]  # words that may follow, by the arguments so far (joined by a blank)
+ALIKE = 0.7  # of difflib's 1: a slip or another ending; chosen
 _NEGATIVE_NUMBER = re.compile(r"^-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:[A-Za-z°%][A-Za-z0-9/^²]*)?$")
 
 
@@ -42,6 +44,7 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **settings: Any) -> None:
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
         self._negative_number_matcher = _NEGATIVE_NUMBER
+        self.typed: Parser | None = None  # its leaf: argparse tells the root what that leaves
 
     def error(self, message: str) -> NoReturn:
         """Ends the process with code 2 and one sentence."""
@@ -54,7 +57,19 @@ class Parser(argparse.ArgumentParser):
             guess = nearest(said, choices)
             hint = f'did you mean "{guess}"?' if guess else f"there is {', '.join(choices)}"
             message = f'no {what} "{said}": {hint}'
+        left_over = re.fullmatch(r"unrecognized arguments: (\S+).*", message, re.DOTALL)
+        if left_over is not None and self.typed is not None:
+            self.typed.error(self.typed.strange(left_over[1]))
         self.exit(ExitCode.USAGE, f"{self.prog}: {message}\n")
+
+    def strange(self, word: str) -> str:
+        """What is said of a word that the command does not take, with the option that is most like it."""
+        options = re.findall(r"--[a-z][\w-]*", self.format_usage())
+        alike = get_close_matches(word.partition("=")[0], options, 1, ALIKE) if word.startswith("-") else []
+        said = f'"{word}" is no option' if word.startswith("-") else f'"{word}" is one word too many'
+        there_is = f"there is {', '.join(dict.fromkeys(options))}" if options else "it has no options"
+        hint = f"did you mean {alike[0]}?" if alike else there_is
+        return f"{said}: {hint}\nsee `{self.prog} --help`, with examples"
 
 
 def build(
@@ -78,6 +93,7 @@ def build(
         leaf = where.add_parser(word, help=command.about, description=command.about, allow_abbrev=False)
         if command.words == tuple(arguments[: len(command.words)]):
             complete(leaf, command)
+            root.typed = leaf
     return root
 
 

@@ -80,6 +80,25 @@ def test_a_wrong_argument_is_called_what_it_is(capsys):
     assert 'no state "maybe": there is on, off' in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("jog --joints q1=3deg/s", 'gemelo jog: "--joints" is no option: did you mean --joint?'),
+        ("state --jsn", 'gemelo state: "--jsn" is no option: did you mean --json?'),
+        ("jog --sideways 1", 'gemelo jog: "--sideways" is no option: there is --joint, --twist, --turn, --frame'),
+        ("jog turn 20deg/s", 'gemelo jog: "turn" is one word too many: there is --joint, --twist'),
+        ("hold now", 'gemelo hold: "now" is one word too many: it has no options'),
+    ],
+)
+def test_what_a_command_does_not_take_is_named_with_what_it_takes(line, said, capsys):
+    with pytest.raises(SystemExit) as ended:
+        run(line.split())
+    shown = capsys.readouterr().err
+    assert ended.value.code == ExitCode.USAGE
+    assert shown.startswith(said)
+    assert f"`gemelo {line.split()[0]} --help`" in shown
+
+
 def test_a_message_is_written_as_json():
     message = message_of(JOINT_TARGETS.message, '{"name": ["q1"], "position": [0.5]}')
     assert message.name == ("q1",)
