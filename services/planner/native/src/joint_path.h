@@ -20,6 +20,9 @@ class JointPath {
     virtual void at(size_t span, double share, double* joints) const = 0;
     // The most that each joint value changes per unit of the span's parameter.
     virtual void speed(size_t span, double* speeds) const = 0;
+    // How each joint value changes per unit of the span's parameter about `share`, into `rates` (dof,); returns by how
+    // much at most it does otherwise within `half` of it, as a share of `speeds`, which are those of the span.
+    virtual double rate(size_t span, double share, double half, const double* speeds, double* rates) const = 0;
 };
 
 // Through rows (count, dof); a span leads from a row to the one `stride` rows on, or to the last, by way of those
@@ -48,6 +51,27 @@ class Polyline : public JointPath {
             for (size_t i = 0; i < dof_; ++i) speeds[i] = std::max(speeds[i], std::abs(to[i] - from[i]));
         }
         for (size_t i = 0; i < dof_; ++i) speeds[i] *= static_cast<double>(lines);
+    }
+
+    // Between the least and the largest of the lines that are reached.
+    double rate(size_t span, double share, double half, const double* speeds, double* rates) const override {
+        const size_t lines = lines_of(span);
+        const double scale = static_cast<double>(lines);
+        const size_t first = static_cast<size_t>(std::max(0.0, (share - half) * scale));
+        const size_t last = std::min(lines - 1, static_cast<size_t>(std::max(0.0, (share + half) * scale)));
+        double most = 0.0;
+        for (size_t i = 0; i < dof_; ++i) {
+            const double* from = rows_ + (span * stride_ + std::min(first, lines - 1)) * dof_ + i;
+            double low = from[dof_] - from[0], high = low;
+            for (size_t line = first + 1; line <= last; ++line) {
+                from += dof_;
+                low = std::min(low, from[dof_] - from[0]);
+                high = std::max(high, from[dof_] - from[0]);
+            }
+            rates[i] = 0.5 * (low + high) * scale;
+            if (high > low) most = std::max(most, 0.5 * (high - low) * scale / speeds[i]);
+        }
+        return most;
     }
 
   private:
@@ -89,6 +113,19 @@ class Spline : public JointPath {
             const bool is_between = rise > 0.0 && fall > 0.0;
             speeds[i] = is_between ? begin + 0.5 * rise * rise / (rise + fall) : std::max(begin, end);
         }
+    }
+
+    // The second derivative goes straight from one second difference of the control points to the next.
+    double rate(size_t span, double u, double half, const double* speeds, double* rates) const override {
+        double most = 0.0;
+        for (size_t i = 0; i < dof_; ++i) {
+            const double* p = points_ + span * dof_ + i;
+            const double first = p[dof_] - p[0], second = p[2 * dof_] - p[dof_], third = p[3 * dof_] - p[2 * dof_];
+            rates[i] = 0.5 * (1.0 - u) * (1.0 - u) * first + (0.5 + u - u * u) * second + 0.5 * u * u * third;
+            const double bend = std::max(std::abs(second - first), std::abs(third - second));
+            if (bend > 0.0) most = std::max(most, bend / speeds[i]);
+        }
+        return half * most;
     }
 
   private:

@@ -9,7 +9,8 @@
 namespace gemelo {
 namespace {
 
-constexpr int kBatch = 32;  // obstacles that go down a tree together; chosen: they stay in the first cache
+constexpr float kRounding = 1e-5f;  // of the most that a part can move: what floats lose in its velocity; chosen
+constexpr int kBatch = 32;          // obstacles that go down a tree together; chosen: they stay in the first cache
 
 class CollisionCheck {
   public:
@@ -18,6 +19,9 @@ class CollisionCheck {
         result_ = {0, 0, -1, -1};
         half_ = load(query.half);
         place_frames(world_, query.joints, frames_);
+        if (query.steps == nullptr) return;
+        twist_frames(world_, query.steps, frames_, twists_);
+        slack_ = load(query.slack) + half_ * kRounding;
     }
 
     void run() {
@@ -60,13 +64,32 @@ class CollisionCheck {
     // Lanes that are already known to be near only want to know of hits.
     void close() { open_ = query_.marks != nullptr ? motion_ : select(spread(result_.near), 0.0f, motion_); }
 
-    void begin(float motion) {
-        motion_ = half_ * motion;
+    void begin(const Lanes& motion) {
+        motion_ = motion;
         close();
     }
 
+    // What a part or a pair moves at most within a lane's stretch [m]: by its velocity in the middle of it, if that is
+    // known to be less.
+    Lanes bounded(const MotionView& most, const Lanes& straight) const {
+        return smaller(half_ * most.travel, straight + slack_ * most.travel + half_ * half_ * most.bend);
+    }
+
+    Lanes moved(int32_t part) const {
+        const Lanes most = half_ * query_.part_motion[part].travel;
+        if (query_.steps == nullptr) return most;
+        const PartView& view = world_.parts[part];
+        return bounded(query_.part_motion[part], travel(twists_[view.frame], roots_[part], view.nodes[0].radius));
+    }
+
+    Lanes moved(int32_t part, int32_t relative_to) const {
+        const PartView& view = world_.parts[part];
+        if (view.frame == relative_to) return 0.0f;
+        return travel(twists_[view.frame] - twists_[relative_to], roots_[part], view.nodes[0].radius);
+    }
+
     void against_obstacles(int32_t part) {
-        begin(query_.part_motion[part]);
+        begin(moved(part));
         const Descent down{world_.parts[part].nodes, &frames_[world_.parts[part].frame], world_.obstacles, part, -1};
         const NodeView& root = down.nodes[0];
         int32_t batch[kBatch];
@@ -92,9 +115,15 @@ class CollisionCheck {
     void against_itself(int32_t pair) {
         const PairView& both = world_.pairs[pair];
         const PartView &first = world_.parts[both.first], &second = world_.parts[both.second];
-        begin(query_.pair_motion[pair]);
+        begin(half_ * query_.pair_motion[pair].travel);
         const float limit = first.nodes[0].radius + second.nodes[0].radius + query_.margin;
-        if (within(squared(roots_[both.first] - roots_[both.second]), limit) == 0) return;
+        const Lanes gap = squared(roots_[both.first] - roots_[both.second]);
+        if (within(gap, limit) == 0) return;
+        if (query_.steps != nullptr) {
+            const Lanes straight = moved(both.first, both.common) + moved(both.second, both.common);
+            begin(bounded(query_.pair_motion[pair], straight));
+            if (within(gap, limit) == 0) return;
+        }
         const Placement seen = relative(frames_[second.frame], frames_[first.frame]);
         const Descent down{first.nodes, &seen, second.solids, both.first, both.second};
         for (int32_t done = 0; done < second.solid_count && !is_over(); done += kBatch) {
@@ -143,7 +172,9 @@ class CollisionCheck {
     Lanes half_;
     Lanes motion_;  // [m] the present part or pair may move within a lane's stretch
     Lanes open_;    // the same, and 0 in lanes that are known to be near
+    Lanes slack_;
     Placement frames_[kMaxFrames];
+    Twist twists_[kMaxFrames];
     Point roots_[kMaxParts];
 };
 

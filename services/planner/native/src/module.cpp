@@ -230,8 +230,13 @@ std::shared_ptr<const World> make_world(std::shared_ptr<const Chain> chain, Part
                                         std::vector<Obstacle> obstacles) {
     require_columns(pairs.shape(1), 2, "pairs");
     std::vector<PairView> both;
-    for (size_t i = 0; i < pairs.shape(0); ++i) both.push_back({pairs(i, 0), pairs(i, 1)});
+    for (size_t i = 0; i < pairs.shape(0); ++i) both.push_back({pairs(i, 0), pairs(i, 1), 0});
     return std::make_shared<const World>(std::move(chain), std::move(parts), std::move(both), std::move(obstacles));
+}
+
+// As many as there are parts or pairs, or more.
+size_t most_things(const World& world) {
+    return std::max<size_t>(kMaxParts, static_cast<size_t>(world.view().pair_count));
 }
 
 // Which rows are free; eight at a time.
@@ -243,7 +248,7 @@ nb::ndarray<nb::numpy, bool> are_free(const World& world, const Kernel& kernel, 
     nb::capsule owner(verdicts, [](void* p) noexcept { delete[] static_cast<bool*>(p); });
     {
         nb::gil_scoped_release release;
-        std::vector<float> still(std::max<size_t>(kMaxParts, static_cast<size_t>(world.view().pair_count)), 0.0f);
+        const std::vector<MotionView> still(most_things(world), MotionView{0.0f, 0.0f});
         float joints[kMaxDof * kLanes];
         const float half[kLanes] = {};
         for (size_t first = 0; first < count; first += kLanes) {
@@ -254,8 +259,8 @@ nb::ndarray<nb::numpy, bool> are_free(const World& world, const Kernel& kernel, 
             }
             CheckResult checked;
             kernel.check(world.view(),
-                         {joints, half, still.data(), still.data(), static_cast<float>(margin), (1u << lanes) - 1,
-                          false, nullptr},
+                         {joints, half, nullptr, nullptr, still.data(), still.data(), static_cast<float>(margin),
+                          (1u << lanes) - 1, false, nullptr},
                          checked);
             for (size_t lane = 0; lane < lanes; ++lane) verdicts[first + lane] = !(checked.hits >> lane & 1u);
         }
@@ -266,7 +271,7 @@ nb::ndarray<nb::numpy, bool> are_free(const World& world, const Kernel& kernel, 
 // Eight paddings at once: the largest in [low, high] with which nothing is near, narrowed eightfold each time.
 nb::tuple clearance(const World& world, const Kernel& kernel, const Row& row, double most) {
     const Joints at = joints_of(row, world);
-    std::vector<float> unit(std::max<size_t>(kMaxParts, static_cast<size_t>(world.view().pair_count)), 1.0f);
+    const std::vector<MotionView> unit(most_things(world), MotionView{1.0f, 0.0f});
     float joints[kMaxDof * kLanes], half[kLanes];
     for (size_t i = 0; i < at.size(); ++i) std::fill_n(joints + i * kLanes, kLanes, static_cast<float>(at[i]));
     double low = 0.0, high = most;
@@ -274,7 +279,9 @@ nb::tuple clearance(const World& world, const Kernel& kernel, const Row& row, do
     while (high - low > 1e-6) {
         for (int lane = 0; lane < kLanes; ++lane)
             half[lane] = static_cast<float>(low + (high - low) * (lane + 1) / kLanes);
-        kernel.check(world.view(), {joints, half, unit.data(), unit.data(), 0.0f, kAllLanes, true, nullptr}, checked);
+        kernel.check(world.view(),
+                     {joints, half, nullptr, nullptr, unit.data(), unit.data(), 0.0f, kAllLanes, true, nullptr},
+                     checked);
         if (checked.hits != 0) return nb::make_tuple(0.0, checked.first, checked.second);
         if (checked.near == 0 && low == 0.0 && high == most) return nb::make_tuple(most, -1, -1);
         int free = 0;

@@ -36,8 +36,9 @@ class MotionValidator {
         ends_.assign(joints, joints + dof());
         ends_.insert(ends_.end(), joints, joints + dof());
         const Polyline point(ends_.data(), 2, dof());
-        const Joints still(dof(), 0.0);
-        world_.bound_motion(still.data(), part_motion_, pair_motion_);
+        const double still[kMaxDof] = {};
+        world_.bound_motion(still, part_motion_, pair_motion_);
+        slowness_.clear();
         return check(point, 0, 1) == 0 && result_.near == 0;
     }
 
@@ -45,6 +46,14 @@ class MotionValidator {
         ends_.assign(from, from + dof());
         ends_.insert(ends_.end(), to, to + dof());
         return look(Polyline(ends_.data(), 2, dof()), stop) == Verdict::kFree;
+    }
+
+    // By way of `at`: both lines together are hardly dearer than one.
+    bool is_free_corner(const double* from, const double* at, const double* to, const StopCondition& stop) {
+        ends_.assign(from, from + dof());
+        ends_.insert(ends_.end(), at, at + dof());
+        ends_.insert(ends_.end(), to, to + dof());
+        return look(Polyline(ends_.data(), 3, dof()), stop) == Verdict::kFree;
     }
 
     Verdict look(const JointPath& path, const StopCondition& stop) {
@@ -137,23 +146,26 @@ class MotionValidator {
     }
 
     size_t dof() const { return static_cast<size_t>(world_.dof()); }
+    double* speed(size_t span) { return speeds_.data() + span * dof(); }
 
     // The bounds for the fastest span, how much of them each span needs, and the first stretches.
     void begin(const JointPath& path) {
         const size_t spans = path.span_count();
-        Joints fastest(dof(), 0.0), speed(dof());
+        double fastest[kMaxDof] = {};
+        speeds_.resize(spans * dof());
         for (size_t span = 0; span < spans; ++span) {
-            path.speed(span, speed.data());
-            for (size_t i = 0; i < dof(); ++i) fastest[i] = std::max(fastest[i], speed[i]);
+            path.speed(span, speed(span));
+            for (size_t i = 0; i < dof(); ++i) fastest[i] = std::max(fastest[i], speed(span)[i]);
         }
-        world_.bound_motion(fastest.data(), part_motion_, pair_motion_);
-        motion_ = *std::max_element(part_motion_.begin(), part_motion_.end());
-        for (float pair : pair_motion_) motion_ = std::max(motion_, static_cast<double>(pair));
+        world_.bound_motion(fastest, part_motion_, pair_motion_);
+        motion_ = 0.0;
+        for (const auto* each : {&part_motion_, &pair_motion_}) {
+            for (const MotionView& most : *each) motion_ = std::max(motion_, static_cast<double>(most.travel));
+        }
         slowness_.assign(spans, 0.0);
         for (size_t span = 0; span < spans; ++span) {
-            path.speed(span, speed.data());
             for (size_t i = 0; i < dof(); ++i) {
-                if (fastest[i] > 0.0) slowness_[span] = std::max(slowness_[span], speed[i] / fastest[i]);
+                if (fastest[i] > 0.0) slowness_[span] = std::max(slowness_[span], speed(span)[i] / fastest[i]);
             }
         }
         first_stretches(spans);
@@ -176,18 +188,24 @@ class MotionValidator {
     // The lanes that touch; the others are not looked at where one does and `is_one_enough`.
     uint32_t check(const JointPath& path, size_t next, size_t count, bool is_one_enough = true,
                    uint8_t* marks = nullptr) {
-        float joints[kMaxDof * kLanes], half[kLanes];
-        double row[kMaxDof];
+        float joints[kMaxDof * kLanes], half[kLanes], steps[kMaxDof * kLanes], slack[kLanes];
+        double row[kMaxDof], rates[kMaxDof];
+        const bool is_moving = !slowness_.empty();
         for (size_t lane = 0; lane < kLanes; ++lane) {
             const Stretch& stretch = stretches_[next + std::min(lane, count - 1)];
             path.at(stretch.span, stretch.middle, row);
             for (size_t i = 0; i < dof(); ++i) joints[i * kLanes + lane] = static_cast<float>(row[i]);
-            half[lane] = rounded_up(stretch.half * (slowness_.empty() ? 0.0 : slowness_[stretch.span]));
+            half[lane] = raised(stretch.half * (is_moving ? slowness_[stretch.span] : 0.0));
+            if (!is_moving) continue;
+            const double off = path.rate(stretch.span, stretch.middle, stretch.half, speed(stretch.span), rates);
+            for (size_t i = 0; i < dof(); ++i) steps[i * kLanes + lane] = static_cast<float>(stretch.half * rates[i]);
+            slack[lane] = raised(off * static_cast<double>(half[lane]));
         }
         const uint32_t lanes = (1u << count) - 1;
         const float margin = static_cast<float>(tolerances_.margin);
         kernel_.check(world_.view(),
-                      {joints, half, part_motion_.data(), pair_motion_.data(), margin, lanes, is_one_enough, marks},
+                      {joints, half, is_moving ? steps : nullptr, slack, part_motion_.data(), pair_motion_.data(),
+                       margin, lanes, is_one_enough, marks},
                       result_);
         checks_ += count;
         return result_.hits;
@@ -212,7 +230,8 @@ class MotionValidator {
     Joints ends_;
     std::vector<Stretch> stretches_;
     std::vector<double> slowness_;
-    std::vector<float> part_motion_, pair_motion_;
+    Joints speeds_;  // by spans
+    std::vector<MotionView> part_motion_, pair_motion_;
 };
 
 }  // namespace gemelo

@@ -88,6 +88,40 @@ inline void move(Placement& at, const FrameView& frame, const Lanes& value) {
     }
 }
 
+inline Point operator+(const Point& a, const Point& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline Point operator*(const Point& a, const Lanes& by) { return {a.x * by, a.y * by, a.z * by}; }
+inline Point cross(const Point& a, const Point& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+// How a frame moves while the joint values go their `steps`, to first order: what is at p goes by shift + turn x p.
+struct Twist {
+    Point turn, shift;
+};
+
+inline Twist operator-(const Twist& a, const Twist& b) { return {a.turn - b.turn, a.shift - b.shift}; }
+
+// How far at most what is within `radius` of `centre` goes.
+inline Lanes travel(const Twist& by, const Point& centre, float radius) {
+    return square_root(squared(by.shift + cross(by.turn, centre))) + square_root(squared(by.turn)) * radius;
+}
+
+inline void twist_frames(const WorldView& world, const float* steps, const Placement* frames, Twist* twists) {
+    twists[0] = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
+    for (int i = 1; i < world.frame_count; ++i) {
+        const FrameView& frame = world.frames[i];
+        const Lanes step = load(steps + frame.drive * kLanes) * frame.multiplier;
+        const Point along = Point{frames[i].r[2], frames[i].r[5], frames[i].r[8]} * step;
+        twists[i] = twists[frame.parent];
+        if (frame.slides) {
+            twists[i].shift = twists[i].shift + along;
+        } else {
+            twists[i].turn = twists[i].turn + along;
+            twists[i].shift = twists[i].shift + cross(frames[i].t, along);
+        }
+    }
+}
+
 inline void place_frames(const WorldView& world, const float* joints, Placement* frames) {
     frames[0] = identity();
     for (int i = 1; i < world.frame_count; ++i) {

@@ -59,8 +59,7 @@ class Shortener {
         const double *before = path[corner - 1].data(), *after = path[corner + 1].data(), *old = path[corner].data();
         const double length = space_.distance(before, old) + space_.distance(old, after);
         if (space_.distance(before, at.data()) + space_.distance(at.data(), after) > kWorthAMove * length) return false;
-        if (!validator_.is_free_line(before, at.data(), stop_)) return false;
-        if (!validator_.is_free_line(at.data(), after, stop_)) return false;
+        if (!validator_.is_free_corner(before, at.data(), after, stop_)) return false;
         path[corner] = at;
         return true;
     }

@@ -20,6 +20,9 @@ inline float rounded_up(double value) {
     return std::nextafter(static_cast<float>(value), std::numeric_limits<float>::infinity());
 }
 
+// The same of what is not negative, quickly, and up to a millionth more.
+inline float raised(double value) { return static_cast<float>(1.000001 * value); }
+
 class SphereTree {
   public:
     explicit SphereTree(const std::vector<Sphere>& spheres) : spheres_(spheres), order_(spheres.size()) {

@@ -79,6 +79,13 @@ struct PartView {
 // Parts that may not touch: the spheres of the first against the solids of the second.
 struct PairView {
     int32_t first, second;
+    int32_t common = 0;  // the last frame that carries both
+};
+
+// How far at most a part, or two together, move [m] while the path's parameter goes on by 1.
+struct MotionView {
+    float travel;
+    float bend;  // half the most that their velocity changes by meanwhile
 };
 
 struct WorldView {
@@ -92,10 +99,12 @@ struct WorldView {
 };
 
 struct CheckQuery {
-    const float* joints;       // [dof][kLanes]
-    const float* half;         // [kLanes] of the curve's parameter that each lane stands for, on both sides
-    const float* part_motion;  // [parts], [pairs]: how far at most they move per unit of the parameter [m]
-    const float* pair_motion;
+    const float* joints;            // [dof][kLanes]
+    const float* half;              // [kLanes] of the curve's parameter that each lane stands for, on both sides
+    const float* steps;             // null, or [dof][kLanes]: the way of each joint value over `half`, from its rate
+    const float* slack;             // [kLanes] of `half`, by how much at most the way differs from that
+    const MotionView* part_motion;  // [parts], [pairs]
+    const MotionView* pair_motion;
     float margin;           // [m] that must stay free
     uint32_t lanes;         // which lanes matter
     bool first_hit_is_all;  // whether one lane's hit ends the question

@@ -1,6 +1,8 @@
 // An arm among obstacles, ready for the check. Never changed once built: whoever plans in it keeps it.
 #pragma once
 
+#include <array>
+
 #include "robot.h"
 
 namespace gemelo {
@@ -14,11 +16,15 @@ class World {
         require_sound();
         for (PairView& pair : pairs_) {
             if (cost(pair.second, pair.first) < cost(pair.first, pair.second)) std::swap(pair.first, pair.second);
+            pair.common = common_frame(pair);
         }
         for (const auto& part : parts_) {
             part_views_.push_back(
                 {part->nodes.data(), part->solid_views.data(), count(part->solid_views), part->frame});
-            reaches_.push_back(reaches(*chain_, *part));
+        }
+        for (int32_t part = 0; part < count(parts_); ++part) carriers_.push_back(carriers(part, 0));
+        for (const PairView& pair : pairs_) {
+            pair_carriers_.push_back({carriers(pair.first, pair.common), carriers(pair.second, pair.common)});
         }
         add_obstacles();
         view_ = {chain_->frames.data(), part_views_.data(), pairs_.data(),         obstacles_.data(),
@@ -36,15 +42,14 @@ class World {
         return sum;
     }
 
-    // How far at most every part and pair moves [m] while each joint value goes its way of `speed` (dof,).
-    void bound_motion(const double* speed, std::vector<float>& part_motion, std::vector<float>& pair_motion) const {
-        part_motion.clear();
-        pair_motion.clear();
-        for (const auto& reach : reaches_) part_motion.push_back(rounded_up(1.0001 * motion(reach, speed)));
-        for (const PairView& pair : pairs_) {
-            const double both =
-                motion(between(pair.first, pair.second), speed) + motion(between(pair.second, pair.first), speed);
-            pair_motion.push_back(rounded_up(1.0001 * both));
+    // How far at most every part and pair moves while each joint value goes its way of `speed` (dof,).
+    void bound_motion(const double* speed, std::vector<MotionView>& parts, std::vector<MotionView>& pairs) const {
+        parts.clear();
+        pairs.clear();
+        for (const Carriers& each : carriers_) parts.push_back(rounded(motion(each, speed)));
+        for (const auto& both : pair_carriers_) {
+            const Motion first = motion(both[0], speed), second = motion(both[1], speed);
+            pairs.push_back(rounded({first.travel + second.travel, first.bend + second.bend}));
         }
     }
 
@@ -76,19 +81,56 @@ class World {
                parts_[static_cast<size_t>(solids)]->solids.size();
     }
 
-    double motion(const std::vector<double>& reach, const double* speed) const {
-        double sum = 0.0;
-        for (size_t i = 1; i < reach.size(); ++i) sum += reach[i] * std::abs(speed[chain_->frames[i].drive]);
+    // A joint that carries a part, and how far it moves and turns it at most for each unit of its joint value.
+    struct Carrier {
+        int32_t drive;
+        double reach;  // [m/rad] or [m/m]
+        double turn;   // [rad/rad]; 0 of a slide
+    };
+    using Carriers = std::vector<Carrier>;  // the nearest to the base first
+
+    struct Motion {
+        double travel, bend;  // [m]
+    };
+
+    static MotionView rounded(const Motion& most) { return {raised(1.0001 * most.travel), raised(1.0001 * most.bend)}; }
+
+    // With p a point of the part: d2p / dqi dqj is zi x (zj x (p - oj)) for a joint i before j or j itself, so at most
+    // what j moves it by where i turns, and nothing where i slides.
+    static Motion motion(const Carriers& carriers, const double* speed) {
+        Motion sum{0.0, 0.0};
+        double turn = 0.0;
+        for (const Carrier& each : carriers) {
+            const double fast = std::abs(speed[each.drive]), travel = each.reach * fast;
+            sum.travel += travel;
+            sum.bend += travel * (turn + 0.5 * each.turn * fast);
+            turn += each.turn * fast;
+        }
         return sum;
     }
 
-    // The reaches of `part` over the joints that do not carry `other` as well.
-    std::vector<double> between(int32_t part, int32_t other) const {
-        std::vector<double> reach = reaches_[static_cast<size_t>(part)];
-        for (int32_t i = parts_[static_cast<size_t>(other)]->frame; i > 0; i = chain_->frame(i).parent) {
-            reach[static_cast<size_t>(i)] = 0.0;
+    // The joints of `part` beyond the frame `from`.
+    Carriers carriers(int32_t part, int32_t from) const {
+        const Part& whole = *parts_[static_cast<size_t>(part)];
+        const std::vector<double> reach = reaches(*chain_, whole);
+        Carriers found;
+        for (int32_t i = whole.frame; i != from; i = chain_->frame(i).parent) {
+            const FrameView& frame = chain_->frame(i);
+            found.push_back(
+                {frame.drive, reach[static_cast<size_t>(i)], frame.slides ? 0.0 : std::abs(double{frame.multiplier})});
         }
-        return reach;
+        std::reverse(found.begin(), found.end());
+        return found;
+    }
+
+    int32_t common_frame(const PairView& pair) const {
+        int32_t first = parts_[static_cast<size_t>(pair.first)]->frame;
+        int32_t second = parts_[static_cast<size_t>(pair.second)]->frame;
+        while (first != second) {  // parents have lower numbers
+            int32_t& later = first > second ? first : second;
+            later = chain_->frame(later).parent;
+        }
+        return first;
     }
 
     void add_obstacles() {
@@ -113,7 +155,8 @@ class World {
     std::vector<PairView> pairs_;
     std::vector<Obstacle> owned_;
     std::vector<PartView> part_views_;
-    std::vector<std::vector<double>> reaches_;
+    std::vector<Carriers> carriers_;
+    std::vector<std::array<Carriers, 2>> pair_carriers_;
     std::vector<ObstacleView> obstacles_;
     std::vector<NodeView> tree_;
     std::vector<int32_t> unbounded_;
