@@ -38,9 +38,9 @@ class ClosedForm:
         self._order = order  # the arm's joints from the base to the tool
         self.turns = FullTurns(arm)
 
-    def configurations(self, position: Array, rotation: Array, near: Array) -> tuple[list[Array], list[Array]]:
-        """Exact solutions (n,) [rad] within the limits, with every full turn, in no order; and EAIK's least-squares
-        ones.
+    def configurations(self, position: Array, rotation: Array, near: Array) -> tuple[Array, list[Array]]:
+        """Exact solutions (m, n) [rad] within the limits, with every full turn, in no order; and EAIK's least-squares
+        ones, (n,) each.
 
         `position` (3,) [m] and `rotation` (3, 3) are the tool's in the base frame; joints without limits stay near
         `near` (n,). Least-squares solutions are out of reach, or, where axes coincide, lack one turn.

@@ -89,31 +89,26 @@ class InverseKinematics:
 
     def _closed_form_solutions(self, target: ToolTarget, near: Array) -> Iterator[Array]:
         """The closed form's configurations, each refined until it meets the target; lazily, the nearest first."""
-        configurations = self._closed_form_configurations(target, near)
-        if not configurations:
-            return
-        rows = np.array(configurations)
+        rows = self._closed_form_configurations(target, near)
         travels = np.abs(rows - near) / self._speed
         for place in np.argsort(travels.max(axis=1), kind="stable").tolist():
             attempt = self._descent.descend(target, rows[place])
             if attempt.is_solution:
                 yield attempt.positions
 
-    def _closed_form_configurations(self, target: ToolTarget, near: Array) -> list[Array]:
+    def _closed_form_configurations(self, target: ToolTarget, near: Array) -> Array:
+        """(m, n) [rad] or [m], in no order."""
         if self._parallel is not None:
             return self._parallel.configurations(target.position, near)
         if self._closed is None:
-            return []
-        configurations: list[Array] = []
+            return near[None][:0]
+        configurations = [near[None][:0]]
         for rotation in self._rotations(target, near):
             exact, guesses = self._closed.configurations(target.position, rotation, near)
-            configurations += exact
-            configurations += [
-                configuration
-                for guess in guesses
-                for configuration in self._from_guess(self._closed, target, guess, near)
-            ]
-        return configurations
+            configurations.append(exact)
+            for guess in guesses:
+                configurations += [row[None] for row in self._from_guess(self._closed, target, guess, near)]
+        return np.concatenate(configurations)
 
     def _at_limits(self, target: ToolTarget, near: Array, found: list[Array]) -> Iterator[Array]:
         """Where nothing was found, for the free turn leaves hardly any configuration within the limits: what those of a

@@ -28,19 +28,19 @@ class FullTurns:
         self._speed = np.array([joint.velocity for joint in arm.joints])
         self._period = np.array([math.tau if joint.unit == "rad" else NEVER for joint in arm.joints])
 
-    def within_limits(self, branches: Array, near: Array) -> list[Array]:
-        """The branches (m, n) or one of them (n,), [rad] or [m], with every full turn within the limits; joints without
-        limits as near to `near` (n,) as they can be."""
+    def within_limits(self, branches: Array, near: Array) -> Array:
+        """The branches (m, n) or one of them (n,), [rad] or [m], with every full turn within the limits, (k, n); joints
+        without limits as near to `near` (n,) as they can be."""
         branches = np.atleast_2d(branches)
         lower = np.where(np.isinf(self._lower), near - 0.5 * self._period, self._lower)
         upper = np.where(np.isinf(self._upper), near + 0.5 * self._period, self._upper)
         first = branches + self._period * np.ceil((lower - branches) / self._period)
         more = np.floor((upper - first) / self._period)
-        configurations: list[Array] = []
-        for values, turns in zip(first, more, strict=True):
-            if turns.min() >= 0.0:  # false for what is not a number, too
-                configurations.extend(_turned(values, turns) if turns.any() else [values])
-        return configurations
+        fits = (more >= 0.0).all(axis=1)  # false for what is not a number, too
+        configurations = [
+            values + _turns(tuple(turns)) for values, turns in zip(first[fits], more[fits].tolist(), strict=True)
+        ]
+        return np.concatenate(configurations) if configurations else first[:0]
 
     def other_ways_round(self, values: Array, near: Array, most: int) -> list[Array]:
         """`values` (n,) [rad] or [m] with a full turn more or less of one or more joints without limits, where the arm
@@ -63,17 +63,13 @@ class FullTurns:
         return middle + away, np.maximum(np.abs(away) - half, 0.0).max(axis=1)
 
 
-def _turned(values: Array, turns: Array) -> list[Array]:
-    """`values` with up to `turns` full turns added to each."""
-    while np.prod(turns + 1.0) > MOST_TURNS:
-        turns = np.minimum(turns, turns.max() - 1.0)
-    return list(values + math.tau * _combinations(tuple(turns.astype(int).tolist())))
-
-
 @lru_cache(maxsize=1024)
-def _combinations(turns: tuple[int, ...]) -> NDArray[np.int64]:
-    """(m, n) every choice of 0 to as many full turns of each joint as `turns` (n,) has."""
-    return np.array(list(product(*(range(most + 1) for most in turns))))
+def _turns(most: tuple[float, ...]) -> Array:
+    """(m, n) [rad] every choice of 0 to `most` full turns of each joint, fewer of those with the most where these are
+    too many."""
+    while math.prod(turns + 1.0 for turns in most) > MOST_TURNS:
+        most = tuple(min(turns, max(most) - 1.0) for turns in most)
+    return math.tau * np.array(list(product(*(range(int(turns) + 1) for turns in most))))
 
 
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)  # standard: the bases of a Halton sequence

@@ -45,15 +45,15 @@ class ParallelAxes:
         self._shoulder, elbow = self._seen(on_axes[self._first]), self._seen(on_axes[self._second])
         self._upper, self._fore = elbow - self._shoulder, self._seen(pose.position) - elbow
 
-    def configurations(self, position: Array, near: Array) -> list[Array]:
-        """Joint values (3,) [rad] and [m] within the limits, with every full turn, in no order, for the tool's
+    def configurations(self, position: Array, near: Array) -> Array:
+        """Joint values (m, 3) [rad] and [m] within the limits, with every full turn, in no order, for the tool's
         `position` (3,) [m] in the base frame. Where the shoulder may turn freely, it stays as in `near` (3,)."""
         out, upper, fore = self._seen(position) - self._shoulder, self._upper, self._fore
         if not math.hypot(out.real, out.imag) <= 2.0 * (abs(upper) + abs(fore)):  # whose square may be no number
-            return []
+            return np.empty((0, JOINTS))
         cosine = (abs(out) ** 2 - abs(upper) ** 2 - abs(fore) ** 2) / (2.0 * abs(upper) * abs(fore))
         if abs(cosine) > 1.0 + STRETCHED:
-            return []
+            return np.empty((0, JOINTS))
         bend, straight = math.acos(min(max(cosine, -1.0), 1.0)), _angle(fore) - _angle(upper)
         branches = []
         for elbow in (bend - straight, -bend - straight):
@@ -95,7 +95,7 @@ def _agrees(arm: Arm, kinematics: Kinematics, solver: ParallelAxes) -> bool:
     lower, upper = one_turn(arm)
     for configuration in np.random.default_rng(1).uniform(lower, upper, (SAMPLES, JOINTS)):
         found = solver.configurations(kinematics.tool(configuration).position, configuration)
-        if not found or min(float(np.abs(each - configuration).max()) for each in found) > AGREEMENT:
+        if not len(found) or min(float(np.abs(each - configuration).max()) for each in found) > AGREEMENT:
             return False
     return True
 
