@@ -24,8 +24,7 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
     """A frozen record with defaults for every field and no NaN or infinity anywhere in it."""
 
     def __post_init__(self) -> None:
-        for field in self.__struct_fields__:
-            value = getattr(self, field)
+        for field, value in zip(self.__struct_fields__, msgspec.structs.astuple(self), strict=True):
             kind = type(value)
             if kind is float:
                 if not math.isfinite(value):

@@ -23,8 +23,7 @@ class TrajectoryPoint(Message, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         """As of any message, by one look at all numbers together: a trajectory has hundreds of points."""
         try:
-            total = sum(self.positions) + sum(self.velocities) + sum(self.accelerations) + self.time_from_start
-            if math.isfinite(total):
+            if math.isfinite(sum(self.positions + self.velocities + self.accelerations, self.time_from_start)):
                 return
         except (TypeError, OverflowError):
             pass

@@ -19,6 +19,7 @@ from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from services.arm.model.description import Arm
 from services.planner.native.compiled import motion, where_built
+from services.planner.request.per_arm import once_per_arm
 
 Array = NDArray[np.float64]
 
@@ -55,10 +56,20 @@ class JointLimits:
 def joint_limits(arm: Arm, velocity_scaling: float = 1.0, acceleration_scaling: float = 1.0) -> JointLimits:
     """The arm's limits (n,), in [rad] or [m] per s, s^2 and s^3; the scalings are dimensionless. The acceleration's
     scaling applies to the jerk as well, so that its ramp keeps its duration."""
+    full = _full_limits(arm)
     return JointLimits(
-        velocity=velocity_scaling * np.array([joint.velocity for joint in arm.joints]),
-        acceleration=acceleration_scaling * np.array([joint.acceleration for joint in arm.joints]),
-        jerk=acceleration_scaling * np.array([joint.jerk for joint in arm.joints]),
+        velocity=velocity_scaling * full.velocity,
+        acceleration=acceleration_scaling * full.acceleration,
+        jerk=acceleration_scaling * full.jerk,
+    )
+
+
+@once_per_arm
+def _full_limits(arm: Arm) -> JointLimits:
+    return JointLimits(
+        velocity=np.array([joint.velocity for joint in arm.joints]),
+        acceleration=np.array([joint.acceleration for joint in arm.joints]),
+        jerk=np.array([joint.jerk for joint in arm.joints]),
     )
 
 
@@ -73,10 +84,10 @@ class States(NamedTuple):
 
 def trajectory_of(names: Sequence[str], states: States) -> JointTrajectory:
     """The states as points."""
-    rows = zip(*(column.tolist() for column in states), strict=True)
+    times, *columns = (column.tolist() for column in states)
     points = [
-        TrajectoryPoint(positions=tuple(p), velocities=tuple(v), accelerations=tuple(a), time_from_start=t)
-        for t, p, v, a in rows
+        TrajectoryPoint(positions=p, velocities=v, accelerations=a, time_from_start=t)
+        for t, p, v, a in zip(times, *(map(tuple, column) for column in columns), strict=True)
     ]
     return JointTrajectory(joint_names=tuple(names), points=tuple(points))
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import repeat
+from typing import NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
@@ -20,6 +21,7 @@ from schemas.planning import PlanCode, Refusal, StepMargin
 from services.arm.model.description import Arm, Joint
 from services.planner.native.compiled import motion, where_built
 from services.planner.request.deadline import NEVER, Deadline
+from services.planner.request.per_arm import once_per_arm
 from services.planner.request.refusals import PlanRefused
 from services.planner.timing.profile import LONGEST, States
 from services.planner.verification.verify import states_at, states_of
@@ -117,14 +119,19 @@ def _stream(arm: Arm, states: States, part: tuple[int, int] | None = None) -> St
 def margins(arm: Arm, stream: StepStream) -> tuple[StepMargin, ...]:
     """How near each stepper comes to what it can do."""
     torques = (_torque_share(joint, index, stream) for index, joint in enumerate(arm.joints))
-    return tuple(map(partial(_margin, arm), arm.joints, stream.peaks.tolist(), torques))
+    return tuple(map(_margin, _rate_limits(arm), stream.peaks.tolist(), torques))
 
 
 def _part_margins(arm: Arm, states: States, part: tuple[int, int]) -> tuple[StepMargin, ...]:
     """The `margins` from one knot to another; without the stream where no motor says how its torque falls."""
-    if any(joint.drive.motor.pull_out is not None for joint in arm.joints):
+    if _has_pull_out(arm):
         return margins(arm, _stream(arm, states, part))
-    return tuple(map(partial(_margin, arm), arm.joints, stream_rates(arm, states, part).tolist(), repeat(0.0)))
+    return tuple(map(_margin, _rate_limits(arm), stream_rates(arm, states, part).tolist(), repeat(0.0)))
+
+
+@once_per_arm
+def _has_pull_out(arm: Arm) -> bool:
+    return any(joint.drive.motor.pull_out is not None for joint in arm.joints)
 
 
 def stream_rates_in_python(arm: Arm, states: States, part: tuple[int, int]) -> Array:
@@ -139,6 +146,7 @@ def stream_rates(arm: Arm, states: States, part: tuple[int, int]) -> Array:
     return motion.stream_rates(*states, _scale(arm), PLACES, *part, last, KNOT, Q8)
 
 
+@once_per_arm
 def _scale(arm: Arm) -> Array:
     """(n,) [1/256 steps per rad or m]."""
     return np.array([joint.steps.per_unit * Q8 for joint in arm.joints])
@@ -252,23 +260,37 @@ def _can(arm: Arm, trajectory: JointTrajectory) -> bool:
     return max(margin.share for margin in found) <= FULL and _queue_share(arm, states) <= 1.0
 
 
-def _margin(arm: Arm, joint: Joint, peak: float, torque: float) -> StepMargin:
+def _margin(most: _RateLimit, peak: float, torque: float) -> StepMargin:
     """Of a rate of `peak` [steps/s], and a share of the pull-out torque."""
-    limit, by = _rate_limit(arm, joint)
+    name, limit, by = most
     share = peak / limit
     if torque > share:
         share, by = torque, "pull-out torque"
-    return StepMargin(name=joint.name, peak_rate=peak, rate_limit=limit, share=share, limited_by=by)
+    return StepMargin(name=name, peak_rate=peak, rate_limit=limit, share=share, limited_by=by)
 
 
-def _rate_limit(arm: Arm, joint: Joint) -> tuple[float, str]:
-    """[steps/s] and what sets it: the joint's own speed, one pulse in two ticks, or the driver's pulse width."""
-    driver = joint.driver
-    return min(
-        (joint.velocity * joint.steps.per_unit, "step rate"),
-        (arm.device.tick_hz / 2.0, "step rate"),
-        (1e6 / (driver.step_high_us + driver.step_low_us), "pulse width"),
-    )
+class _RateLimit(NamedTuple):
+    """The joint's name, [steps/s], and what sets it."""
+
+    name: str
+    limit: float
+    by: str
+
+
+@once_per_arm
+def _rate_limits(arm: Arm) -> list[_RateLimit]:
+    """Of each joint: its own speed, one pulse in two ticks, or the driver's pulse width."""
+    return [
+        _RateLimit(
+            joint.name,
+            *min(
+                (joint.velocity * joint.steps.per_unit, "step rate"),
+                (arm.device.tick_hz / 2.0, "step rate"),
+                (1e6 / (joint.driver.step_high_us + joint.driver.step_low_us), "pulse width"),
+            ),
+        )
+        for joint in arm.joints
+    ]
 
 
 def _torque_share(joint: Joint, index: int, stream: StepStream) -> float:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from schemas.motion import JointTrajectory
 from services.arm.model.description import Arm
 from services.planner.native.compiled import motion, where_built
+from services.planner.request.per_arm import once_per_arm
 from services.planner.timing.profile import JointLimits, States
 
 Array = NDArray[np.float64]
@@ -175,6 +176,7 @@ def require_limits(arm: Arm, states: States, seen: Look, limits: JointLimits, is
             require_jerk(arm, samples, limits)
 
 
+@once_per_arm
 def _bounds(arm: Arm) -> tuple[Array, Array]:
     """Where positions may be, (n,) each [rad] or [m]."""
     lower = np.array([joint.lower for joint in arm.joints]) - ROUNDING
