@@ -1,4 +1,4 @@
-"""What is made once for each arm."""
+"""The cache of what depends on an arm alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is made of an arm's description alone, and kept for the plans to come."""
+"""Cache of what depends on the description of an arm alone, kept for the plans to come."""
 
 from __future__ import annotations
 
