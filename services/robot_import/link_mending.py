@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from services.arm.checks.findings import Finding, error, note
 from services.arm.checks.meshes import SMALLEST, Facts, MeshFacts, is_in_millimetres, link_volume
+from services.arm.checks.units import LARGEST_GYRATION, gyration
 from services.arm.checks.urdf import principal_moments
 from services.arm.model.urdf import Geometry, UrdfLink
 from services.robot_import.mended import Mended, links_of, subject_of
@@ -93,9 +94,11 @@ def inertias(mended: Mended) -> None:
         if inertial is None or known is None or not known.mass > 0.0:
             continue
         low, middle, high = principal_moments(known)
-        if low > 0.0 and low + middle >= high * (1.0 - 1e-6):
+        far = gyration(known, high) > LARGEST_GYRATION
+        if low > 0.0 and low + middle >= high * (1.0 - 1e-6) and not far:
             continue
-        message = f"its principal moments {low:.3g}, {middle:.3g}, {high:.3g} kg m^2 are of no body"
+        unit = " of that mass: they are in another unit" if far else ""
+        message = f"its principal moments {low:.3g}, {middle:.3g}, {high:.3g} kg m^2 are of no body{unit}"
         link.remove(inertial)
         even = _even_density(model, known.mass, mended.facts)
         if even is not None:

@@ -10,7 +10,7 @@ import xml.etree.ElementTree as ET
 from services.arm.errors import DescriptionError
 from services.arm.model.urdf import JointKind, model_of
 from services.arm.model.xml_reader import XmlReader, parse_xml
-from services.robot_import import link_mending
+from services.robot_import import link_mending, unit_mending
 from services.robot_import.joint_mending import fix_free_base, follow_the_motor
 from services.robot_import.mended import Mended, numbers_in
 from services.robot_import.source import RobotSource
@@ -35,7 +35,10 @@ def mend(source: RobotSource) -> Mended:
         _names,
         link_mending.references,
         _free_base,
+        unit_mending.minuses,
         _endless,
+        unit_mending.degrees,
+        unit_mending.lengths,
         _axes,
         _mimics,
         link_mending.millimetres,

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from services.arm.checks.findings import Finding, error, warning
+from services.arm.checks.units import LARGEST_GYRATION, check_units, gyration
 from services.arm.errors import suggestion
 from services.arm.model.urdf import NO_SHAPE, Geometry, Inertial, JointKind, Limit, UrdfJoint, UrdfLink, UrdfModel
 from services.arm.model.xml_reader import XmlFault
@@ -31,7 +32,7 @@ def check_urdf(model: UrdfModel, path: Path, has_meshes: bool = True) -> list[Fi
         findings += _references(joint, model, file)
         if joint.kind is not JointKind.FIXED and joint.mimic is None:
             findings += _limits(joint, file)
-    return findings
+    return [*findings, *check_units(model, file)]
 
 
 def fault_finding(fault: XmlFault, file: str) -> Finding:
@@ -202,6 +203,9 @@ def _inertial(inertial: Inertial, subject: str, file: str, line: int) -> list[Fi
                 line,
             )
         ]
+    if gyration(inertial, high) > LARGEST_GYRATION:
+        message = f"its mass would lie {gyration(inertial, high):.3g} m from its centre by its inertia"
+        return [warning(file, subject, message, "is <inertia> in kg mm^2 or g mm^2? write it in kg m^2", line)]
     return []
 
 

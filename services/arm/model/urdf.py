@@ -83,13 +83,14 @@ class Inertial:
 class Geometry:
     """A shape: its tag ("box", "cylinder", "sphere", "mesh", ...) and, for a mesh, its reference as written.
 
-    `origin` is in the link; `scale` is of a mesh, in m for each of its units.
+    `origin` is in the link; `scale` is of a mesh, in m for each of its units; `size` of the others, as URDF names it.
     """
 
     shape: str
     mesh: str | None = None
     origin: Origin = Origin()
     scale: Triple = (1.0, 1.0, 1.0)
+    size: tuple[float, ...] = ()  # [m] x, y, z; radius; or radius and length
     line: int = field(default=0, compare=False)  # of the file
 
 
@@ -243,16 +244,18 @@ def _geometry(xml: XmlReader, element: ET.Element, where: str) -> Geometry:
     shape, origin = geometry[0], _origin(xml, element, where)
     if shape.tag == "mesh":
         scale = xml.triple(shape, "scale", (1.0, 1.0, 1.0), f"{where}, <mesh>")
-        return Geometry("mesh", xml.text(shape, "filename", f"{where}, <mesh>"), origin, scale, line)
-    _require_sizes(xml, shape, where)
-    return Geometry(shape.tag, origin=origin, line=line)
+        return Geometry("mesh", xml.text(shape, "filename", f"{where}, <mesh>"), origin, scale, line=line)
+    return Geometry(shape.tag, origin=origin, size=_sizes(xml, shape, where), line=line)
 
 
-def _require_sizes(xml: XmlReader, shape: ET.Element, where: str) -> None:
-    """Of a box, a cylinder or a ball."""
+def _sizes(xml: XmlReader, shape: ET.Element, where: str) -> tuple[float, ...]:
+    """[m] of a box, a cylinder or a ball, as far as they can be read."""
+    sizes: list[float] = []
     for name, count in SIZES.get(shape.tag, {}).items():
         text = xml.text(shape, name, f"{where}, <{shape.tag}>")
-        if text and not _are_sizes(text.split(), count):
+        if _are_sizes(text.split(), count):
+            sizes += map(float, text.split())
+        elif text:
             wanted = "a number" if count == 1 else f"{count} numbers"
             xml.fault(
                 shape,
@@ -260,6 +263,7 @@ def _require_sizes(xml: XmlReader, shape: ET.Element, where: str) -> None:
                 f'`{name}` of <{shape.tag}> is "{text}", not {wanted} above 0',
                 "leave it out, or correct it",
             )
+    return tuple(sizes)
 
 
 def _are_sizes(words: list[str], count: int) -> bool:
