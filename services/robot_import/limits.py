@@ -21,10 +21,9 @@ LEAST_SHARE = 0.1  # of the default: a velocity that would be less is no other u
 
 def ask_limits(mended: Mended, questions: Questions) -> None:
     """Completes every joint that moves: what is missing, zero or implausible is asked for."""
-    elements = {joint.get("name"): joint for joint in mended.xml.root.findall("joint")}
-    for joint in mended.model.joints:
+    for element, joint in zip(mended.xml.root.findall("joint"), mended.model.joints, strict=True):
         if joint.kind is not JointKind.FIXED and joint.mimic is None:
-            _complete(joint, elements[joint.name], mended, questions)
+            _complete(joint, element, mended, questions)
 
 
 def _complete(joint: UrdfJoint, element: ET.Element, mended: Mended, questions: Questions) -> None:

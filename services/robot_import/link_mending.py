@@ -125,7 +125,7 @@ def unseen(mended: Mended) -> None:
 
 
 def shapeless(mended: Mended) -> list[Finding]:
-    """A robot without any shape: an error for who would import it."""
+    """A robot without any shape, or a length to draw: an error for who would import it."""
     if any(link.find("visual") is not None for link in mended.xml.root.findall("link")):
         return []
     message = "no link has a <visual> or <collision>: nothing could be drawn, nothing would ever touch"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from services.arm.checks.findings import Finding, Severity, note, warning
+from services.arm.checks.findings import Finding, Severity, note, once, warning
 from services.arm.checks.meshes import MeshFacts, check_meshes, facts_of
 from services.arm.checks.urdf import check_urdf, fault_finding
 from services.arm.model.urdf import Geometry, UrdfLink, UrdfModel, model_of
@@ -36,7 +36,7 @@ class Mended:
         file = self.source.label
         found = [*self.errors, *(fault_finding(fault, file) for fault in faults)]
         found += [*check_urdf(model, Path(file), has_meshes=False), *check_meshes(model, file, self.facts)]
-        return sorted([*found, *self.notes], key=lambda each: list(Severity).index(each.severity))
+        return sorted(once([*found, *self.notes]), key=lambda each: list(Severity).index(each.severity))
 
     def facts(self, geometry: Geometry) -> MeshFacts | str | None:
         """Of its mesh; None where it is none or its file is not there."""

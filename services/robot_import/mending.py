@@ -10,10 +10,11 @@ import xml.etree.ElementTree as ET
 from services.arm.errors import DescriptionError
 from services.arm.model.urdf import JointKind, model_of
 from services.arm.model.xml_reader import XmlReader, parse_xml
-from services.robot_import import link_mending, unit_mending
+from services.robot_import import link_mending, number_mending, unit_mending
 from services.robot_import.joint_mending import fix_free_base, follow_the_motor
 from services.robot_import.mended import Mended, numbers_in
 from services.robot_import.source import RobotSource
+from services.robot_import.stick_figure import sticks
 
 FOREIGN = ("gazebo", "transmission", "ros2_control", "sensor")
 MOVES = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
@@ -33,9 +34,11 @@ def mend(source: RobotSource) -> Mended:
         _foreign,
         _prefixed,
         _names,
+        number_mending.minuses,
+        number_mending.separators,
+        number_mending.capitals,
         link_mending.references,
         _free_base,
-        unit_mending.minuses,
         _endless,
         unit_mending.degrees,
         unit_mending.lengths,
@@ -47,6 +50,7 @@ def mend(source: RobotSource) -> Mended:
         link_mending.frames,
         link_mending.inertias,
         link_mending.unseen,
+        sticks,
     ):
         step(mended)
     return mended

@@ -1,4 +1,4 @@
-"""Repairs of a source in another unit as a whole: lengths in millimetres, turns in degrees, minus signs of print."""
+"""Repairs of a source in another unit as a whole: lengths in millimetres, turns in degrees."""
 
 from __future__ import annotations
 
@@ -21,24 +21,7 @@ MILLIMETRE, DEGREE = 0.001, math.pi / 180.0  # [m], [rad]
 LEAST_TRAVEL = 1.0  # in the file's unit: a slide's travel below it is in metres, whatever the rest is in
 ANGLES = math.pi / 12.0  # [rad] 15 degrees: what is a multiple of it is in radians
 ANGLE_TOLERANCE = 2e-3  # [rad]
-MINUSES = str.maketrans({"\u2212": "-", "\u2013": "-", "\u2012": "-", "\ufe63": "-", "\uff0d": "-"})
-TEXTS = ("name", "link", "joint", "type", "filename", "rgba")  # attributes that are no numbers, or not of the arm
 SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
-
-
-def minuses(mended: Mended) -> None:
-    """Minus signs as word processors print them, which no program reads."""
-    found: list[tuple[ET.Element, str]] = []
-    for element in mended.xml.root.iter():
-        for key, text in element.items():
-            plain = text.translate(MINUSES)
-            if key not in TEXTS and plain != text and numbers_in(plain) is not None:
-                found.append((element, text))
-                element.set(key, plain)
-    if found:
-        element, text = found[0]
-        message = f'"{text}" has a minus sign of print, as {len(found)} of its numbers have'
-        mended.say(element, f"<{element.tag}>", message, f'"{text.translate(MINUSES)}"')
 
 
 def degrees(mended: Mended) -> None:

@@ -22,6 +22,7 @@ from services.robot_import.source import find_source
 from tests.arm.bare_arm import write_bare_arm
 from tests.robot_import.exports import LIMIT, joint, link, mesh, write
 
+BOX = '<visual><geometry><box size="0.06 0.06 0.2"/></geometry></visual>'
 INERTIAL = (
     '<inertial><origin xyz="0 0 {half}"/><mass value="0.9"/>'
     '<inertia ixx="{i}" ixy="0" ixz="0" iyy="{i}" iyz="0" izz="{i}"/></inertial>'
@@ -139,7 +140,7 @@ def test_check_of_a_robot_says_that_it_is_in_millimetres(tmp_path: Path):
 
 def turned(folder: Path, *turns: str) -> Mended:
     """An arm whose joints' origins are turned so."""
-    links = [f'<link name="l{number}"/>' for number in range(len(turns) + 1)]
+    links = [f'<link name="l{number}">{BOX}</link>' for number in range(len(turns) + 1)]
     joints = [
         joint(f"j{number}", f"l{number}", f"l{number + 1}").replace('rpy="0 0 0"', f'rpy="{turn}"')
         for number, turn in enumerate(turns)
@@ -180,7 +181,8 @@ def test_moments_in_gram_millimetres_are_those_of_no_body(tmp_path: Path):
 @pytest.mark.parametrize("minus", ["\u2212", "\u2013"])
 def test_a_minus_sign_of_print_is_one(tmp_path: Path, minus: str):
     limit = f'<limit lower="{minus}1.5" upper="1.5" effort="1" velocity="1"/>'
-    parts = ('<link name="a"/><link name="b"/>', joint("one", "a", "b", axis=f"0 {minus}1 0", rest=limit))
+    links = f'<link name="a">{BOX}</link><link name="b">{BOX}</link>'
+    parts = (links, joint("one", "a", "b", axis=f"0 {minus}1 0", rest=limit))
     found = mend(find_source(write(tmp_path / "minus.urdf", f"a{minus}b", *parts)))
     (said,) = map(str, found.findings())
     assert "has a minus sign of print, as 2 of its numbers have" in said

@@ -180,10 +180,11 @@ def test_a_robot_without_a_joint_that_moves_is_refused(tmp_path: Path, capsys: p
     assert "no joint that moves" in capsys.readouterr().err
 
 
-def test_a_robot_without_any_shape_is_refused_by_import_and_check(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    path = write(
-        tmp_path / "robot.urdf", "robot", '<link name="base"/>', '<link name="arm"/>', joint("j", "base", "arm")
-    )
+def test_a_robot_without_any_shape_or_length_is_refused_by_import_and_check(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    parts = ('<link name="base"/>', '<link name="arm"/>', joint("j", "base", "arm", z=0.0))
+    path = write(tmp_path / "robot.urdf", "robot", *parts)
     for command in (["import", str(path), "--yes", "--output", str(tmp_path / "urdf")], ["check", str(path)]):
         assert run(command) is not ExitCode.OK
         assert "no link has a <visual> or <collision>" in "".join(capsys.readouterr())

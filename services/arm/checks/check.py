@@ -9,7 +9,7 @@ import msgspec
 from schemas.robot import RobotFile
 from services.arm.checks.cross_check import check_with_yourdfpy
 from services.arm.checks.device import check_device
-from services.arm.checks.findings import Finding, Severity, error, note
+from services.arm.checks.findings import Finding, Severity, error, note, once
 from services.arm.checks.homing import check_homing
 from services.arm.checks.meshes import check_meshes, mesh_facts
 from services.arm.checks.motors import check_motors
@@ -68,7 +68,7 @@ def check(folder: Path) -> list[Finding]:
         findings += _cross_checks(folder)
     if is_bare:
         findings.append(note(ROBOT_FILE, "robot", NO_MOTORS, TO_DRIVE))
-    return sorted(findings, key=lambda finding: list(Severity).index(finding.severity))
+    return sorted(once(findings), key=lambda finding: list(Severity).index(finding.severity))
 
 
 def _unknown_keys(data: dict[str, object], text: str) -> list[Finding]:

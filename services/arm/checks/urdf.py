@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +19,10 @@ from services.arm.model.xml_reader import XmlFault
 COLLISION_REMEDY = "add a box or a cylinder, or let `gemelo collision fit --meshes` fit some"
 SHAPES = ("box", "cylinder", "sphere", "mesh")
 MOST_TRAVEL = {JointKind.REVOLUTE: 4.01 * math.tau, JointKind.PRISMATIC: 5.0}  # [rad] or [m]
+LEAST_TURN = 0.99 * math.tau  # [rad] of a continuous joint: limits of a whole turn say nothing
 MOST_VELOCITY = {JointKind.REVOLUTE: 50.0, JointKind.CONTINUOUS: 50.0, JointKind.PRISMATIC: 10.0}  # [rad/s] or [m/s]
 FRAME_REMEDY = "leave <inertial> out where the link is a mere frame, else give a mass above 0"
+LEADER_REMEDY = "name the joint that has the motor in <mimic>"
 PLACEHOLDER_EFFORTS = (100.0, 300.0, 1000.0)  # what exporters write when nobody thought about it
 
 
@@ -45,24 +49,56 @@ def _tree(model: UrdfModel, file: str) -> list[Finding]:
     findings = []
     things: dict[str, tuple[UrdfLink | UrdfJoint, ...]] = {"link": model.links, "joint": model.joints}
     for what, named in things.items():
-        for name, count in Counter(thing.name for thing in named).items():
-            if count > 1:
-                line = [thing.line for thing in named if thing.name == name][-1]
-                findings.append(error(file, f'{what} "{name}"', f"is there {count} times", "names are unique", line))
-    children = [joint.child for joint in model.joints]
-    for name, count in Counter(children).items():
-        if count > 1:
-            findings.append(error(file, f'link "{name}"', f"is the child of {count} joints", "a link has one parent"))
-    roots = [name for name in model.link_names if name not in children]
-    if len(roots) != 1:
+        lines = defaultdict[str, list[int]](list)
+        for thing in named:
+            lines[thing.name].append(thing.line)
+        for name, found in lines.items():
+            if len(found) > 1 and name:
+                subject, message = f'{what} "{name}"', f"is there {len(found)} times"
+                findings.append(_at(found, file, subject, message, "names are unique: rename or remove one"))
+    above = defaultdict[str, list[UrdfJoint]](list)
+    for joint in model.joints:
+        above[joint.child].append(joint)
+    for name, joints in above.items():
+        if len(joints) > 1 and name:
+            message = f"is the child of {len(joints)} joints: {_quoted(joints)}"
+            remedy = "a link has one parent: remove one of these joints, as no loop is followed"
+            findings.append(_at([joint.line for joint in joints], file, f'link "{name}"', message, remedy))
+    roots = [link for link in model.links if link.name not in above]
+    if len(roots) > 1:
+        message = f"has {len(roots)} roots ({', '.join(root.name for root in roots)})"
         remedy = "join them with a fixed joint, or remove what is no part of the arm"
-        lines = [link.line for link in model.links if link.name in roots]
-        findings.append(
-            error(file, "tree", f"has {len(roots)} roots ({', '.join(roots)})", remedy, lines[-1] if lines else 0)
-        )
-    loose = sorted(set(model.link_names) - _connected(model, roots))
-    findings += [error(file, f'link "{x}"', "is not connected to a root: its joints form a ring") for x in loose]
-    return findings
+        findings.append(_at([root.line for root in roots], file, "tree", message, remedy))
+    return [*findings, *_rings(model, above, file)]
+
+
+def _rings(model: UrdfModel, above: dict[str, list[UrdfJoint]], file: str) -> Iterator[Finding]:
+    """Of joints that carry each other, each once."""
+    connected = _connected(model, [name for name in model.link_names if name not in above])
+    said: set[str] = set()
+    for name in model.link_names:
+        passed: list[UrdfJoint] = []
+        link = name
+        while link not in connected and link in above and above[link][-1] not in passed:
+            passed.append(above[link][-1])
+            link = passed[-1].parent
+        if link in connected or link not in above or passed[-1].name in said:
+            continue
+        ring = passed[passed.index(above[link][-1]) :][::-1]
+        said |= {joint.name for joint in passed}
+        message = f"is not connected to a root: its joints form a ring, {_quoted(ring)}"
+        remedy = "correct <parent> or <child> of the joint that closes it, or remove that joint"
+        yield _at([joint.line for joint in ring], file, f'link "{link}"', message, remedy)
+
+
+def _at(lines: list[int], file: str, subject: str, message: str, remedy: str) -> Finding:
+    """An error in several lines."""
+    first, *others = sorted(set(lines))
+    return replace(error(file, subject, message, remedy, first), also=tuple(others))
+
+
+def _quoted(joints: list[UrdfJoint]) -> str:
+    return ", ".join(f'"{joint.name}"' for joint in joints)
 
 
 def _connected(model: UrdfModel, roots: list[str]) -> set[str]:
@@ -80,10 +116,11 @@ def _connected(model: UrdfModel, roots: list[str]) -> set[str]:
 def _references(joint: UrdfJoint, model: UrdfModel, file: str) -> list[Finding]:
     findings = []
     for role, link in (("parent", joint.parent), ("child", joint.child)):
-        if link not in model.link_names:
+        if link and link not in model.link_names:
             hint = suggestion(link, model.link_names)
             message = f'its {role} "{link}" is no link{hint}'
-            findings.append(error(file, f'joint "{joint.name}"', message, line=joint.line))
+            remedy = f"write the name of a link in <{role}>"
+            findings.append(error(file, f'joint "{joint.name}"', message, remedy, joint.line))
     return [*findings, *_mimic(joint, model, file)]
 
 
@@ -93,21 +130,13 @@ def _mimic(joint: UrdfJoint, model: UrdfModel, file: str) -> list[Finding]:
         return []
     subject, name = f'joint "{joint.name}"', joint.mimic.joint
     if name not in model.joint_names:
-        return [
-            error(
-                file,
-                subject,
-                f'mimics "{name}", which is no joint{suggestion(name, model.joint_names)}',
-                "",
-                joint.line,
-            )
-        ]
+        message = f'mimics "{name}", which is no joint{suggestion(name, model.joint_names)}'
+        return [error(file, subject, message, LEADER_REMEDY, joint.line)]
     leader = model.joint(name)
     if leader.kind is JointKind.FIXED or leader.mimic is not None:
         how = "is fixed" if leader.kind is JointKind.FIXED else "follows another itself"
         how = "is this very joint" if name == joint.name else how
-        remedy = "name the joint that has the motor in <mimic>"
-        return [error(file, subject, f'mimics "{name}", which {how}', remedy, joint.line)]
+        return [error(file, subject, f'mimics "{name}", which {how}', LEADER_REMEDY, joint.line)]
     return []
 
 
@@ -158,7 +187,7 @@ def _limits(joint: UrdfJoint, file: str) -> list[Finding]:
     subject, limit, line = f'joint "{joint.name}"', joint.limit, joint.line
     if limit is None:
         return [error(file, subject, "has no <limit>", "give lower, upper, effort and velocity", line)]
-    findings = [] if joint.kind is JointKind.CONTINUOUS else _travel(joint.kind, limit, subject, file, line)
+    findings = _travel(joint.kind, limit, subject, file, line)
     for name, value in (("velocity", limit.velocity), ("effort", limit.effort)):
         if not value > 0.0:
             findings.append(error(file, subject, f"its {name} limit is {value:g}", "give a value above 0", line))
@@ -175,6 +204,11 @@ def _limits(joint: UrdfJoint, file: str) -> list[Finding]:
 
 def _travel(kind: JointKind, limit: Limit, subject: str, file: str, line: int) -> list[Finding]:
     travel = limit.upper - limit.lower
+    if kind is JointKind.CONTINUOUS:
+        if not 0.0 < travel < LEAST_TURN:
+            return []
+        message = f"is continuous, which turns beyond its limits {limit.lower:g} to {limit.upper:g}"
+        return [warning(file, subject, message, 'write type="revolute" where it must stay within them', line)]
     if not travel > 0.0:
         message = f"limits {limit.lower:g} to {limit.upper:g} leave no travel"
         return [error(file, subject, message, "give lower < upper", line)]

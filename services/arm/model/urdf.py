@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
-from services.arm.errors import DescriptionError
+from services.arm.errors import DescriptionError, nearest_name
 from services.arm.model.robot_file import read_text
 from services.arm.model.xml_reader import Triple as Triple
 from services.arm.model.xml_reader import XmlFault, XmlReader, joined, parse_xml
@@ -158,7 +158,7 @@ def urdf_of(text: str) -> tuple[UrdfModel, list[XmlFault]]:
 def model_of(xml: XmlReader) -> tuple[UrdfModel, list[XmlFault]]:
     """As `urdf_of`, of elements that are parsed."""
     if xml.root.tag != "robot":
-        raise DescriptionError(f"the root element is <{xml.root.tag}>, it must be <robot>")
+        raise DescriptionError(f"the root element is <{xml.root.tag}>, it must be <robot>: export it as URDF")
     links = tuple(_link(xml, element) for element in xml.root.findall("link"))
     joints = tuple(_joint(xml, element) for element in xml.root.findall("joint"))
     return UrdfModel(xml.root.get("name", ""), links, joints), xml.faults
@@ -198,7 +198,9 @@ def _kind(xml: XmlReader, element: ET.Element, where: str) -> JointKind:
     kind = element.get("type", "")
     if kind in set(JointKind):
         return JointKind(kind)
-    remedy = "make it fixed, or of several revolute and prismatic ones" if kind in ("floating", "planar") else ""
+    near = nearest_name(kind.lower(), JointKind) or JointKind.REVOLUTE
+    free = kind in ("floating", "planar")
+    remedy = "make it fixed, or of several revolute and prismatic ones" if free else f'write type="{near}"'
     xml.fault(element, where, f'type "{kind}" is not one of {", ".join(JointKind)}', remedy)
     return JointKind.FIXED
 
@@ -239,7 +241,8 @@ def _geometry(xml: XmlReader, element: ET.Element, where: str) -> Geometry:
     geometry, line = xml.child(element, "geometry", f"{where}, <{element.tag}>"), xml.lines.get(element, 0)
     if len(geometry) != 1:
         if xml.lines.get(geometry):
-            xml.fault(element, where, f"a <geometry> has {len(geometry)} shapes, it must have one")
+            remedy = f"give each a <{element.tag}> of its own" if len(geometry) else "add a box, or leave it out"
+            xml.fault(element, where, f"a <geometry> has {len(geometry)} shapes, it must have one", remedy)
         return Geometry(NO_SHAPE, line=line)
     shape, origin = geometry[0], _origin(xml, element, where)
     if shape.tag == "mesh":

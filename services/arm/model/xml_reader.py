@@ -11,6 +11,7 @@ from xml.parsers import expat
 from services.arm.errors import DescriptionError
 
 Triple = tuple[float, float, float]
+MINUSES = str.maketrans({"\u2212": "-", "\u2013": "-", "\u2012": "-", "\ufe63": "-", "\uff0d": "-"})  # of print
 
 
 @dataclass(frozen=True)
@@ -71,26 +72,46 @@ class XmlReader:
             return default
         words = text.split()
         if len(words) != 3:
-            self.fault(element, where, f'"{text}" must be three numbers')
+            self.fault(element, where, f'"{text}" must be three numbers', _three(words, default))
             return default
         x, y, z = (self._finite(element, word, f"{where}: `{name}` of <{element.tag}>") for word in words)
         return x, y, z
 
     def _missing(self, element: ET.Element, name: str, where: str) -> None:
         if self.lines.get(element) != 0:
-            self.fault(element, where, f"attribute `{name}` of <{element.tag}> is missing")
+            self.fault(element, where, f"attribute `{name}` of <{element.tag}> is missing", "add it")
 
     def _finite(self, element: ET.Element, text: str, where: str) -> float:
         try:
             value = float(text)
         except ValueError:
-            comma = f'write "{text.replace(",", ".")}"' if "," in text else ""
-            self.fault(element, where, f'"{text}" is not a number', comma)
+            self.fault(element, where, f'"{text}" is not a number', _number_remedy(text))
             return 0.0
         if not math.isfinite(value):
             self.fault(element, where, f"{text} is not finite", "write a number")
             return 0.0
         return value
+
+
+def _number_remedy(text: str) -> str:
+    """What `text`, which is no number, was probably meant to be."""
+    plain = text.strip(",;").replace(",", ".").translate(MINUSES)
+    return f'write "{plain}"' if _is_number(plain) else "write a number"
+
+
+def _three(words: list[str], default: Triple) -> str:
+    """What three numbers these `words` were probably meant to be."""
+    apart = ",".join(words).replace(";", ",").split(",")
+    apart = apart * 3 if len(set(default)) == len(apart) == 1 and default[0] else [word for word in apart if word]
+    known = len(apart) == 3 and all(map(_is_number, apart))
+    return f'write "{" ".join(apart)}"' if known else "write x, y and z with blanks between them"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def parse_xml(text: str) -> XmlReader:
@@ -108,7 +129,7 @@ def parse_xml(text: str) -> XmlReader:
         # Whatever encoding the declaration names, the text is decoded, and is UTF-8 here.
         parser.Parse(text.encode("utf-8"), True)
     except expat.ExpatError as error:
-        raise DescriptionError(f"not XML: {error}") from error
+        raise DescriptionError(f"not XML: {error}: correct that place, or export it again") from error
     return XmlReader(builder.close(), lines)
 
 
