@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from services.collision_fitting.clipping import heights_of
 from services.collision_fitting.fitting import axes_of, spread
 from services.collision_fitting.mesh_part import MeshPart
 
@@ -126,7 +125,7 @@ def _crossed(part: MeshPart) -> Iterator[_Cut]:
 def _cut_by(part: MeshPart, planes: Array, rough: int = 1, enough: float = np.inf) -> _Cut:
     """By all of the planes (k, 4), judged by places on it and in the cuts, so many times fewer where it is `rough`; no
     more sides are looked at once more than `enough` stands out."""
-    sections = [_some(_section(part.corners, plane), rough) for plane in planes]
+    sections = [_some(_section(part, plane), rough) for plane in planes]
     sides = [np.vstack((_some(part.places, rough), *sections))]
     for *normal, offset in planes:
         heights = [side @ np.array(normal) - offset for side in sides]
@@ -165,11 +164,11 @@ def _outside(part: MeshPart, places: Array, planes: Array, rough: int = 1) -> Ou
     return Outside(float(far.sum() * areas[-1] / count), float(hull.volume))
 
 
-def _section(corners: Array, plane: Array) -> Array:
-    """(k, 3) [m] where edges of triangles (f, 3, 3) [m] cross a plane (4,)."""
-    heights = heights_of(corners, plane[:3]) - plane[3]
-    crossed = (heights.min(axis=1) <= 0.0) & (heights.max(axis=1) > 0.0)
-    corners, heights = corners[crossed], heights[crossed]
+def _section(part: MeshPart, plane: Array) -> Array:
+    """(k, 3) [m] where edges of the part's triangles cross a plane (4,)."""
+    along = part.along(plane[:3])
+    crossed = np.flatnonzero((along.low <= plane[3]) & (along.high > plane[3]))
+    corners, heights = part.corners[crossed], along.heights[crossed] - plane[3]
     ends, high = np.roll(corners, -1, axis=1), np.roll(heights, -1, axis=1)
     crosses = (heights <= 0.0) != (high <= 0.0)
     share = heights[crosses] / (heights[crosses] - high[crosses])

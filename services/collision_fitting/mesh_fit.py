@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -25,7 +27,9 @@ from services.planner.collision_geometry.shapes import TriangleMesh
 WITHIN = 0.005  # [m] of the mesh, where `SHARE` of the shapes' outer surface is to be
 WITHIN_SHARE = 0.01  # of the longest side of a link for which that is more
 MOST = 40  # shapes of a link
-ALONE = 3.0  # [s] of the CPU, after which other processes are started: each needs a second or two for that
+# [s] of the CPU, after which other processes are started: a spawned one loads all libraries anew, for some 4 s, and a
+# forked one has them.
+ALONE = {"spawn": 8.0, "fork": 0.5}
 
 _Wanted = tuple[str, TriangleMesh, float, int]  # what `_fit` is given
 
@@ -85,14 +89,20 @@ def fit_links(
 
 def _on_all_cores(wanted: Sequence[_Wanted]) -> Iterator[tuple[LinkFit, float]]:
     """Each fit with how long it took [s], in their order; in processes of their own once they have taken `ALONE`."""
-    began, number = time.process_time(), 0
-    while number < len(wanted) and time.process_time() < began + ALONE:
+    began, number, method = time.process_time(), 0, _start_method()
+    while number < len(wanted) and time.process_time() < began + ALONE[method]:
         yield _timed_fit(wanted[number])
         number += 1
     if number < len(wanted):
         count = min(len(wanted) - number, os.cpu_count() or 1)
-        with ProcessPoolExecutor(count, get_context("spawn")) as others:
+        with ProcessPoolExecutor(count, get_context(method)) as others:
             yield from others.map(_timed_fit, wanted[number:])
+
+
+def _start_method() -> str:
+    """Forked only as on the command line: what other threads, also Zenoh's own, have locked stays so in a fork."""
+    is_alone = threading.active_count() == 1 and "zenoh" not in sys.modules
+    return "fork" if is_alone and sys.platform == "linux" else "spawn"
 
 
 def _timed_fit(wanted: _Wanted) -> tuple[LinkFit, float]:

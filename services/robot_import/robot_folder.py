@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -25,6 +26,8 @@ from services.robot_import.poses import named_states, srdf_text, zero_state
 # [m] chosen: what shapes that are fitted to meshes may stand beyond them. Links that are never farther apart than this
 # beyond the clearance are parts of one hinge, whose true distance such shapes cannot tell.
 EXCESS, EXCESS_SHARE = 0.005, 0.01  # the latter of the longest mesh
+# Of the steps in processes of their own: with matrices of three columns the threads of BLAS cost a fourth more CPU.
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
 COMMAND_LINE = "services.cli.main"  # its steps in a process of their own: they load the planner
 
 
@@ -120,7 +123,8 @@ def _longest(mended: Mended, model: UrdfModel) -> float:
 
 def _run(*words: str) -> None:
     """A command of the command line; what it says is shown where it fails."""
-    done = subprocess.run([sys.executable, "-m", COMMAND_LINE, *words], stdout=subprocess.PIPE, text=True, check=False)
+    command, environment = [sys.executable, "-m", COMMAND_LINE, *words], {**ONE_THREAD, **os.environ}
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False, env=environment)
     if done.returncode:
         raise DescriptionError(f"gemelo {' '.join(words)} failed: {done.stdout.strip() or 'see above'}")
 

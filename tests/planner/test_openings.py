@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import threading
+
 import numpy as np
 import pytest
 import trimesh
@@ -95,8 +99,31 @@ def test_a_heavy_mesh_with_all_that_cad_draws_needs_few_shapes():
 
 @pytest.mark.parametrize("alone", [0.0, 1e9])
 def test_links_are_fitted_alike_by_one_process_and_by_several(alone: float, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(mesh_fit, "ALONE", alone)
+    monkeypatch.setattr(mesh_fit, "ALONE", {"spawn": alone, "fork": alone})
     wanted = [(name, as_mesh(cup(sections)), WITHIN, 4) for name, sections in (("a", 24), ("b", 32), ("c", 48))]
     found = [fit for fit, _ in mesh_fit._on_all_cores(wanted)]
     assert [fit.link for fit in found] == ["a", "b", "c"]
     assert [fit.shapes for fit in found] == [mesh_fit._fit(*each).shapes for each in wanted]
+
+
+FORKED = """
+import numpy as np
+from services.collision_fitting import mesh_fit
+from tests.planner.test_openings import as_mesh, cup
+mesh_fit.ALONE["fork"] = 0.0
+wanted = [(name, as_mesh(cup(sections)), mesh_fit.WITHIN, 4) for name, sections in (("a", 24), ("b", 32))]
+found = [fit for fit, _ in mesh_fit._on_all_cores(wanted)]
+assert [fit.shapes for fit in found] == [mesh_fit._fit(*each).shapes for each in wanted]
+print(mesh_fit._start_method())
+"""
+
+
+def test_only_a_process_without_other_threads_forks_and_fits_alike():
+    done = subprocess.run([sys.executable, "-c", FORKED], check=True, stdout=subprocess.PIPE, text=True)
+    assert done.stdout.strip() == ("fork" if sys.platform == "linux" else "spawn")
+    stop = threading.Event()
+    other = threading.Thread(target=stop.wait)
+    other.start()
+    assert mesh_fit._start_method() == "spawn"
+    stop.set()
+    other.join()
