@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
+from services.arm.checks import meshes
 from services.arm.checks.meshes import MeshFacts, facts_of
 from services.arm.errors import DescriptionError
 from services.arm.model.urdf import Limit
@@ -93,3 +94,18 @@ def test_blank_lines_before_the_first_are_no_fault_and_count(tmp_path: Path):
     path.write_text(f'\n\n<?xml version="1.0"?>\n<robot name="a">{TREE}</robot>')
     (said,) = (str(each) for each in mend(find_source(path)).findings() if "blanks" in str(each))
     assert "robot.urdf, line 4" in said
+
+
+def test_a_copy_of_a_mesh_is_not_read_again_and_a_changed_one_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    body = trimesh.creation.box((0.1, 0.2, 0.31))
+    for name in ("one.stl", "copy.STL"):
+        (tmp_path / name).write_bytes(trimesh.exchange.stl.export_stl(body))
+    known = facts_of(tmp_path / "one.stl")
+    with monkeypatch.context() as patched:
+        patched.setattr(meshes, "scene_of", None)  # what would be read now would be an error
+        assert facts_of(tmp_path / "copy.STL") == known
+    body.apply_scale(2.0)
+    (tmp_path / "one.stl").write_bytes(trimesh.exchange.stl.export_stl(body))
+    changed = facts_of(tmp_path / "one.stl")
+    assert isinstance(changed, MeshFacts)
+    assert changed.longest == pytest.approx(0.62)

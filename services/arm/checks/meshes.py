@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,7 @@ FLAT = 1e-3  # thickness as a share of the longest side below which a mesh bound
 LIGHTEST, HEAVIEST = 15.0, 20_000.0  # [kg/m^3] light foam, tungsten: no part of an arm is beyond
 COLLADA_UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([0-9.eE+-]+)")
 LFS_POINTER, IS_POINTER = b"version https://git-lfs", "it is not the mesh, but a pointer to it of Git LFS"
+ALONE, MOST_KNOWN = (".stl", ".ply", ".glb"), 256  # formats of one file; of how many files facts are kept
 MILLIMETRE_REMEDY = 'write scale="0.001 0.001 0.001"'
 
 
@@ -42,6 +44,7 @@ class MeshFacts:
         return self.thickness < FLAT * self.longest
 
 
+_KNOWN: dict[tuple[str, bytes], MeshFacts | str] = {}  # by format and content
 Facts = Callable[[Geometry], MeshFacts | str | None]
 
 
@@ -76,9 +79,20 @@ def scene_of(file: Path) -> trimesh.Scene:
 
 
 def facts_of(file: Path) -> MeshFacts | str:
-    """Of a mesh file, or why it cannot be read."""
+    """Of a mesh file, or why it cannot be read; a copy of a file that stands alone is not read again."""
     if _is_pointer(file):
         return IS_POINTER
+    if file.suffix.lower() not in ALONE or not file.is_file():
+        return _read_facts(file)
+    key = (file.suffix.lower(), sha256(file.read_bytes()).digest())
+    if key not in _KNOWN:
+        if len(_KNOWN) >= MOST_KNOWN:
+            _KNOWN.clear()
+        _KNOWN[key] = _read_facts(file)
+    return _KNOWN[key]
+
+
+def _read_facts(file: Path) -> MeshFacts | str:
     try:
         mesh = scene_of(file).to_mesh()
     except ImportError as problem:
