@@ -45,10 +45,10 @@ class Panel:
         self._texts_at = -1.0 / TEXTS  # [s] monotonic
         self.operator = Operator(arm)
         with contextlib.redirect_stdout(None), own_pages_only(deployment.panel.host):  # without its own greeting
-            self._server = viser.ViserServer(deployment.panel.host, deployment.panel.port, verbose=False)
-        self._world = DrawnWorld(self._server, self.operator)
-        self._server.on_client_connect(self._open)
-        self._server.on_client_disconnect(self._close)
+            self.server = viser.ViserServer(deployment.panel.host, deployment.panel.port, verbose=False)
+        self.world = DrawnWorld(self.server, self.operator)
+        self.server.on_client_connect(self._open)
+        self.server.on_client_disconnect(self._close)
         log.info(f"page: http://{deployment.panel.host}:{deployment.panel.port}")
 
     def run(self, stop: ShutdownRequest) -> None:
@@ -58,7 +58,7 @@ class Panel:
             followed = 0.0  # [s] monotonic, of the last picture that somebody asked for
             while not stop.is_set:
                 self.draw(time.monotonic())
-                if self.operator.wait(min(1.0 / TEXTS, self._world.period)):
+                if self.operator.wait(min(1.0 / TEXTS, self.world.period)):
                     time.sleep(max(0.0, followed + APART - time.monotonic()))
                     followed = time.monotonic()
         finally:
@@ -69,9 +69,9 @@ class Panel:
         bus = self.operator.bus
         self._arm.node.set_ready(bus.is_live, "" if bus.is_live else "no fresh joint_states")
         joints = bus.joints
-        with self._server.atomic():  # one message for all of it
-            self._world.update(joints)
-        self._server.flush()  # else viser waits for a sixtieth of a second
+        with self.server.atomic():  # one message for all of it
+            self.world.update(joints)
+        self.server.flush()  # else viser waits for a sixtieth of a second
         bus.pace.drawn(tuple(joints.values()), now)
         if now - self._texts_at >= 1.0 / TEXTS:
             self._texts_at, readings = now, bus.read()
@@ -81,7 +81,7 @@ class Panel:
     def close(self) -> None:
         """Ends the server; the arm brakes where the page has led it."""
         self.operator.close()
-        self._server.stop()
+        self.server.stop()
 
     def _refresh(self, page: Page, readings: Readings, now: float) -> None:
         """A browser may go at any moment, with everything that was built for it."""
@@ -98,7 +98,7 @@ class Panel:
             return list(self._pages.values())
 
     def _open(self, client: viser.ClientHandle) -> None:
-        page = Page(client, self.operator, self._world, self._arms)
+        page = Page(client, self.operator, self.world, self._arms)
         with self._lock:
             self._pages[client.client_id] = page
         self._log.info(f"browser {client.client_id} is here; {len(self.pages())} in all")

@@ -45,7 +45,7 @@ class Gateway:
     def __init__(self, node: Node, planner: Node, arm: Description) -> None:
         self.stops: list[DeviceStopRequest] = []
         self.joints = {joint.name: joint.clamp(0.1) for joint in arm.joints}
-        self._arm, self._node = arm, node
+        self.node, self._arm = node, arm
         self._states, self._errors = node.publisher(JOINT_STATES), node.publisher(STEP_ERRORS)
         self._device = node.publisher(DEVICE_STATE)
         node.publisher(DEVICE_STATUS).put(DeviceStatus(online=True, device="test", virtual=True))
@@ -59,7 +59,7 @@ class Gateway:
 
     def say(self) -> None:
         """One state of everything."""
-        names, now = self._arm.joint_names, self._node.now()
+        names, now = self._arm.joint_names, self.node.now()
         still = (0.0,) * len(names)
         self._states.put(JointState(stamp=now, name=names, position=tuple(self.joints.values()), velocity=still))
         self._errors.put(StepErrors(stamp=now, name=names, error=still))
@@ -118,7 +118,7 @@ class MemoryPage:
         """What the browser has got since the last call: all that was sent before this one."""
         [page] = self.panel.pages()
         names = {f"/mark/{next(self._number)}", f"/mark/{next(self._number)}"}
-        for scene, name in zip((self.panel._server.scene, page.client.scene), names, strict=True):
+        for scene, name in zip((self.panel.server.scene, page.client.scene), names, strict=True):
             scene.add_frame(name, show_axes=False)
         assert until(lambda: names <= self._marks, 20.0)
         said, self.said = self.said, Counter()

@@ -29,7 +29,7 @@ class Served:
 
     def __init__(self, panel: Panel) -> None:
         self.operator, self.panel = panel.operator, panel
-        self.address = f"127.0.0.1:{panel._server.get_port()}"
+        self.address = f"127.0.0.1:{panel.server.get_port()}"
         self.labels: dict[str, str] = {}  # in the drawing, by their node
 
     def hear(self, said: Said, at: float) -> None:
@@ -47,7 +47,7 @@ class Served:
     @property
     def world(self) -> DrawnWorld:
         """What is drawn."""
-        return self.panel._world
+        return self.panel.world
 
     @property
     def said(self) -> tuple[object, ...]:
@@ -68,7 +68,7 @@ class Served:
 
     def told(self, text: str) -> None:
         """Waits until the page has a problem that says so."""
-        until(lambda: self.page._problem.content, lambda content: text in content)
+        until(lambda: self.page.problem.content, lambda content: text in content)
 
     def holds(self, label: str, until_this: Callable[[], bool]) -> None:
         """Holds the button of that label until it is so, and lets it go."""

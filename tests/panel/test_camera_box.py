@@ -37,7 +37,7 @@ def page(server: viser.ViserServer):
 def opened(server: viser.ViserServer, places: tuple[str, ...]):
     handlers = {}
     node = SimpleNamespace(subscribe=lambda topic, handler: handlers.update({topic.key: handler}))
-    pictures = CameraPictures(SimpleNamespace(node=node), ("above", "side"))
+    pictures = CameraPictures(SimpleNamespace(node=node), ("above", "side"), period=0.0)
     picks = SimpleNamespace(things=("cup", "bolt"), places=places, lines=(), look=print, pick=print)
     operator = SimpleNamespace(cameras=pictures, picks=picks, tell=print)
     server.gui.reset()
@@ -50,7 +50,7 @@ def opened(server: viser.ViserServer, places: tuple[str, ...]):
         handlers[f"camera/{name}/detections"](Detections(camera=name, items=items))
         handlers[f"camera/{name}/image"](CameraImage(camera=name, width=640, height=480, data=b"0"))
     return SimpleNamespace(
-        box=box, picks=box._picks, html=lambda: " ".join(each.content for each in lines), handlers=handlers,
+        box=box, picks=box.picks, html=lambda: " ".join(each.content for each in lines), handlers=handlers,
         pictures=pictures,
     )  # fmt: skip
 

@@ -56,7 +56,6 @@ def show(page: SimpleNamespace) -> None:
     """A new image of each camera, which takes the place of the one before."""
     page.stamp += 1
     for name in ("above", "side"):
-        page.pictures._taken.clear()
         message = CameraImage(stamp=page.stamp, camera=name, width=640, height=480, data=JPEG + b"%d" % page.stamp)
         page.handlers[f"camera/{name}/image"](message)
     page.box.refresh()

@@ -48,12 +48,12 @@ def stands_free(arm: gemelo.Arm) -> None:
 def test_what_a_dragged_goal_would_touch_is_named_with_how_deep_and_drawn_red_and_the_nearest_that_can_is_free(
     served: Served, arm: gemelo.Arm
 ) -> None:
-    goal, move = served.operator.goal, served.page._move
+    goal, move = served.operator.goal, served.page.move
     inside = arm.fk(BEHIND)
     arm.scene.add_box("post", **POST)
     until(lambda: [item.name for item in served.operator.bus.scene.objects], lambda names: "post" in names)
     goal.set_pose(inside)  # as the gizmo does
-    said = until(lambda: move._problem.content, lambda content: "post would touch: " in content)
+    said = until(lambda: move.problem.content, lambda content: "post would touch: " in content)
     assert "<b>Something is in the way</b>" in said
     assert " mm of one inside the other." in said
     assert "joints=" not in said
@@ -63,17 +63,17 @@ def test_what_a_dragged_goal_would_touch_is_named_with_how_deep_and_drawn_red_an
     assert any("post" in name for name in named)
     obstacles = served.world.obstacles
     until(lambda: set(served.labels.values()), lambda texts: texts == named)
-    assert "post" in obstacles._red
-    assert served.world._bad_goal.is_visible
+    assert "post" in obstacles.red
+    assert served.world.bad_goal.is_visible
     served.press("plan")
-    until(lambda: served.page._problem.content, lambda content: "post would touch: " in content)
-    until(lambda: move._problem.content, lambda content: content == "")  # once is enough
+    until(lambda: served.page.problem.content, lambda content: "post would touch: " in content)
+    until(lambda: move.problem.content, lambda content: content == "")  # once is enough
     served.browser.press_exactly(ENGLISH["take_nearest"], 0)
     until(lambda: goal.goal, lambda now: now.problem is None and now.version > 0)
     arm.check(goal.goal.joints)
-    until(lambda: (obstacles._red, served.labels), lambda now: not any(now))
-    assert not served.world._bad_goal.is_visible
-    assert move._problem.content == ""
+    until(lambda: (obstacles.red, served.labels), lambda now: not any(now))
+    assert not served.world.bad_goal.is_visible
+    assert move.problem.content == ""
 
 
 def test_a_goal_is_checked_anew_when_anybody_changes_what_stands_around(served: Served, arm: gemelo.Arm) -> None:
@@ -81,12 +81,12 @@ def test_a_goal_is_checked_anew_when_anybody_changes_what_stands_around(served: 
     served.operator.set_goal(BEHIND)
     until(lambda: goal.goal, lambda now: now.joints == BEHIND and now.problem is None)
     arm.scene.add_box("late_post", **POST)  # over another connection than the page's
-    said = until(lambda: served.page._move._problem.content, lambda content: "late_post would touch: " in content)
+    said = until(lambda: served.page.move.problem.content, lambda content: "late_post would touch: " in content)
     assert "<b>Something is in the way</b>" in said
-    until(lambda: served.world._bad_goal.is_visible, bool)
+    until(lambda: served.world.bad_goal.is_visible, bool)
     arm.scene.remove("late_post")
     until(lambda: goal.goal.problem, lambda problem: problem is None)
-    until(lambda: served.page._move._problem.content, lambda content: content == "")
+    until(lambda: served.page.move.problem.content, lambda content: content == "")
     assert goal.goal.joints == BEHIND
 
 
@@ -107,7 +107,7 @@ def test_a_pose_out_of_reach_stays_wanted_when_the_scene_changes(served: Served,
 def test_a_drag_that_only_another_configuration_can_follow_says_so_and_a_far_goal_does_not(
     served: Served, arm: gemelo.Arm
 ) -> None:
-    goal, move = served.operator.goal, served.page._move
+    goal, move = served.operator.goal, served.page.move
     near_the_end = {ARM: radians(168.0), FOREARM: radians(40.0), LIFT: 0.1}
     served.operator.set_goal(near_the_end)
     until(lambda: goal.goal, lambda now: now.pose.position == pytest.approx(arm.fk(near_the_end).position, abs=1e-6))
@@ -116,11 +116,11 @@ def test_a_drag_that_only_another_configuration_can_follow_says_so_and_a_far_goa
     goal.set_pose(gemelo.Pose((x * cos(turn) - y * sin(turn), x * sin(turn) + y * cos(turn), z), (0.0, 0.0, 0.0, 1.0)))
     until(lambda: goal.goal.joints[FOREARM], lambda at: at < 0.0)
     assert FOREARM in goal.goal.jumped
-    until(lambda: move._problem.content, lambda content: "Only another configuration reaches there: " in content)
+    until(lambda: move.problem.content, lambda content: "Only another configuration reaches there: " in content)
     goal.set_pose(arm.fk(arm.states["right"]))  # as a click far away, or typed numbers
     far = arm.fk(arm.states["right"]).position
     until(lambda: goal.goal, lambda now: now.pose.position == pytest.approx(far, abs=1e-4) and now.jumped == ())
-    until(lambda: move._problem.content, lambda content: content == "")
+    until(lambda: move.problem.content, lambda content: content == "")
 
 
 def test_a_line_the_speed_and_the_planner_are_those_that_are_chosen(served: Served, arm: gemelo.Arm) -> None:
@@ -208,8 +208,8 @@ def test_a_stop_starts_nothing_also_where_the_goal_is_found_long_after_it(
         served.press("plan_and_execute")
         until(lambda: motions.is_planning, bool)
         served.press("stop")
-        until(lambda: motions._has_just_stopped(), bool)
-        until(lambda: motions._has_just_stopped(), lambda has_just_stopped: not has_just_stopped)
+        until(lambda: motions.has_just_stopped, bool)
+        until(lambda: motions.has_just_stopped, lambda has_just_stopped: not has_just_stopped)
         found.set()
         until(lambda: motions.is_planning, lambda is_planning: not is_planning)
         assert motions.plan is not None
@@ -244,7 +244,7 @@ def test_the_ghost_stands_where_its_time_is_set_to(served: Served, arm: gemelo.A
         served.browser.slide(ENGLISH["scrub"], share)
         wanted = configuration_at(plan, share / 100.0 * plan.duration)
         until(lambda: shown_by_the_ghost(served), lambda shown, at=wanted: shown == pytest.approx(at, abs=1e-3))
-        assert world._ghost.is_visible
+        assert world.ghost.is_visible
     served.choose("play", True)
     before = shown_by_the_ghost(served)
     until(lambda: shown_by_the_ghost(served), lambda shown: shown != before)
@@ -252,14 +252,14 @@ def test_the_ghost_stands_where_its_time_is_set_to(served: Served, arm: gemelo.A
 
 
 def shown_by_the_ghost(served: Served) -> dict[str, float]:
-    return {each.joint.name: each.shown or 0.0 for each in served.world._ghost._joints if each.joint.name in BEHIND}
+    return {each.joint.name: each.shown or 0.0 for each in served.world.ghost.joints if each.joint.name in BEHIND}
 
 
 def test_a_jog_goes_along_the_tool_s_axes_by_steps_and_says_what_slows_it(served: Served, arm: gemelo.Arm) -> None:
     served.choose("along_axes", ENGLISH["tool_axes"])
     served.choose("jog_mode", "10 mm / 10°")
-    tab = served.page._jog
-    until(lambda: (tab._frame_name, tab._step), lambda now: now == (arm.tool_frame, 10.0))
+    tab = served.page.jog
+    until(lambda: (tab.frame_name, tab.step), lambda now: now == (arm.tool_frame, 10.0))
     served.browser.press("z -")  # the tool's z axis points down
     until(lambda: arm.joints[LIFT], lambda at: at == pytest.approx(0.01, abs=5e-4))
     rests(arm)
@@ -268,52 +268,52 @@ def test_a_jog_goes_along_the_tool_s_axes_by_steps_and_says_what_slows_it(served
     rests(arm)
     served.choose("along_axes", ENGLISH["base_axes"])
     served.choose("jog_mode", ENGLISH["continuous"])
-    until(lambda: (tab._frame_name, tab._step), lambda now: now == ("", 0.0))
+    until(lambda: (tab.frame_name, tab.step), lambda now: now == ("", 0.0))
     served.holds("z +", lambda: arm.joints[LIFT] > 0.03)
     rests(arm)
     arm.move(joints={ARM: 0.0, LIFT: 0.0})
     arm.scene.add_box("post", **POST)
-    served.holds(f"{ARM} +", lambda: "collision of antebrazo_link and post (" in tab._status.content)
-    assert "% of the speed is left" in tab._status.content
-    served.holds(f"{ARM} +", lambda: "<b>0 % of the speed is left</b>" in tab._status.content)
+    served.holds(f"{ARM} +", lambda: "collision of antebrazo_link and post (" in tab.status.content)
+    assert "% of the speed is left" in tab.status.content
+    served.holds(f"{ARM} +", lambda: "<b>0 % of the speed is left</b>" in tab.status.content)
     stands_free(arm)
-    until(lambda: tab._status.content, lambda content: content == "")
+    until(lambda: tab.status.content, lambda content: content == "")
 
 
 def test_live_sliders_stop_before_a_box_and_say_that_it_is_watched(served: Served, arm: gemelo.Arm) -> None:
     arm.scene.add_box("post", **POST)
-    move = served.page._move
+    move = served.page.move
     served.choose("live", True)
-    until(lambda: move._watched.content, lambda content: ENGLISH["live_hint"] in content)
+    until(lambda: move.watched.content, lambda content: ENGLISH["live_hint"] in content)
     with passed(arm, ARM) as seen:
         until(lambda: len(seen), lambda number: number > 10)
     assert np.ptp(seen) == 0.0  # it does not jump when it is switched on
     served.browser.slide(f"{ARM} [°]", degrees(BEHIND[ARM]))
-    until(lambda: move._watched.content, lambda content: "collision of antebrazo_link and post (" in content)
-    until(lambda: move._watched.content, lambda content: "<b>0 % of the speed is left</b>" in content)
+    until(lambda: move.watched.content, lambda content: "collision of antebrazo_link and post (" in content)
+    until(lambda: move.watched.content, lambda content: "<b>0 % of the speed is left</b>" in content)
     stands_free(arm)
     served.press("stop")
     until(lambda: served.operator.live.is_on, lambda on: not on)
-    until(lambda: (move._live.value, move._watched.content), lambda now: now == (False, ""))
+    until(lambda: (move.live.value, move.watched.content), lambda now: now == (False, ""))
     stands_free(arm)
 
 
 def test_outputs_and_mishaps_are_the_device_s_and_what_cannot_be_done_is_grey_with_its_reason(
     served: Served, arm: gemelo.Arm
 ) -> None:
-    device = served.page._device
+    device = served.page.device
     for on in (True, False):
         served.browser.choose(f"{ENGLISH['output']} avanzar", on)
         until(lambda: "avanzar" in arm.device.state.outputs, lambda is_on, wanted=on: is_on is wanted)
     arm.output("avanzar", True)  # by somebody else
-    until(lambda: device._outputs["avanzar"]._handle.value, bool)
+    until(lambda: device.outputs["avanzar"].handle.value, bool)
     arm.output("avanzar", False)
     until(lambda: grey(served), lambda names: names == {"arm", "reset", "hold", "resume"})
     until(lambda: reasons(served)["arm"], lambda why: "Switch the drivers on: they are on already" in why)
     served.press("estop_press")
     until(lambda: grey(served), lambda names: {"move", "jog", "home", "reference"} <= names and "reset" not in names)
     until(lambda: reasons(served)["move"], lambda why: "the device is in ESTOP: reset it first" in why)
-    until(lambda: device._facts.content, lambda content: ENGLISH["mode_estop"] in content)
+    until(lambda: device.facts.content, lambda content: ENGLISH["mode_estop"] in content)
     served.press("estop_release")
     until(lambda: arm.device.state.inputs, lambda inputs: "estop" not in inputs)
     served.press("reset")
@@ -325,46 +325,46 @@ def test_outputs_and_mishaps_are_the_device_s_and_what_cannot_be_done_is_grey_wi
 
 def grey(served: Served) -> set[str]:
     """What cannot be done now: of which all buttons are greyed."""
-    gated = served.page._kit._gated
+    gated = served.page.kit.gated
     return {name for name in {name for _, name in gated} if all(each.disabled for each, of in gated if of == name)}
 
 
 def reasons(served: Served) -> dict[str, str]:
     """Each line of a place for reasons, by the first of its actions."""
-    places = served.page._kit._reasons
+    places = served.page.kit.reason_places
     return {name: place.content for place, titles in places for name in titles if place.content}
 
 
 def test_the_state_is_told_in_rows_of_its_own(served: Served, arm: gemelo.Arm) -> None:
     arm.move(joints={ARM: 0.5, LIFT: 0.05})
-    state, device = served.page._state, served.page._device
+    state, device = served.page.state, served.page.device
     steps = dict(zip(arm.device.state.name, arm.device.state.steps, strict=True))
     wanted = arm.description.joint(ARM).steps.to_steps(0.5)
     expected = {f">{steps[ARM]}<", "28.6", f">{wanted:.1f}<"}  # what was commanded comes over a topic of its own
-    rows = until(lambda: state._joints.content, lambda content: all(each in content for each in expected))
+    rows = until(lambda: state.joints.content, lambda content: all(each in content for each in expected))
     for word in ("measured", "steps_off", "commanded", "executed"):
         assert ENGLISH[word] in rows
-    tool, (x, y, z) = state._tool.content, arm.pose().position
-    until(lambda: state._tool.content, lambda content: f"{1e3 * x:.1f}, {1e3 * y:.1f}, {1e3 * z:.1f} mm" in content)
+    tool, (x, y, z) = state.tool.content, arm.pose().position
+    until(lambda: state.tool.content, lambda content: f"{1e3 * x:.1f}, {1e3 * y:.1f}, {1e3 * z:.1f} mm" in content)
     for sensor in arm.description.sensors:
         assert f">{sensor.name}<" in tool
-    until(lambda: state._log.content, lambda content: "stepper_gateway: motion finished: at brazo_joint" in content)
-    until(lambda: device._facts.content, lambda content: ENGLISH["link"] in content and " ms<" in content)
+    until(lambda: state.log.content, lambda content: "stepper_gateway: motion finished: at brazo_joint" in content)
+    until(lambda: device.facts.content, lambda content: ENGLISH["link"] in content and " ms<" in content)
 
 
 def test_spheres_and_cylinders_are_added_and_resized(served: Served, arm: gemelo.Arm) -> None:
-    tab, scene = served.page._scene, arm.scene
+    tab, scene = served.page.scene, arm.scene
     for kind in ("sphere", "cylinder"):
         served.choose("shape", ENGLISH[kind])
-        tab._name.value, tab._size.value, tab._at.value = f"my {kind}", (40.0, 40.0, 60.0), (0.0, 350.0, 100.0)
-        until(lambda: tab._shape.value, lambda shape, wanted=kind: shape == ENGLISH[wanted])
+        tab.name.value, tab.size.value, tab.at.value = f"my {kind}", (40.0, 40.0, 60.0), (0.0, 350.0, 100.0)
+        until(lambda: tab.shape.value, lambda shape, wanted=kind: shape == ENGLISH[wanted])
         served.press("add")
         until(lambda: tuple(scene.objects), lambda names, name=f"my {kind}": name in names)
-        until(lambda: tab._chosen.value, lambda chosen, name=f"my {kind}": chosen == name)
+        until(lambda: tab.chosen.value, lambda chosen, name=f"my {kind}": chosen == name)
     assert scene.objects["my sphere"].shape == SphereShape(radius=0.02)
     assert scene.objects["my cylinder"].shape == CylinderShape(radius=0.02, length=0.06)
-    until(lambda: tuple(tab._size.value), lambda size: size == pytest.approx((40.0, 40.0, 60.0)))
-    tab._size.value = (30.0, 30.0, 20.0)
+    until(lambda: tuple(tab.size.value), lambda size: size == pytest.approx((40.0, 40.0, 60.0)))
+    tab.size.value = (30.0, 30.0, 20.0)
     served.press("apply")
     until(lambda: scene.objects["my cylinder"].shape, lambda shape: shape == CylinderShape(radius=0.015, length=0.02))
     assert scene.objects["my cylinder"].pose.translation == pytest.approx((0.0, 0.35, 0.1))
@@ -373,7 +373,8 @@ def test_spheres_and_cylinders_are_added_and_resized(served: Served, arm: gemelo
 def test_for_a_browser_that_does_not_keep_up_only_the_newest_of_each_joint_is_kept(
     served: Served, arm: gemelo.Arm
 ) -> None:
-    reads, buffer = threading.Event(), served.panel._server._websock_server._broadcast_buffer
+    reads = threading.Event()
+    buffer = served.panel.server._websock_server._broadcast_buffer  # viser tells nobody what it keeps
 
     def kept() -> Counter[str]:
         """Of what is drawn of the measured arm, the messages that wait for browsers, by node and kind."""

@@ -33,7 +33,7 @@ class Opened:
         before = self.memory.panel.pages()
         window.goto(f"http://127.0.0.1:{port}")
         [self.page] = until(self._drawn_beside(before), lambda pages: len(pages) == 1, OPENING / 1e3)
-        until(self._built, lambda built: built is not None and built == self.page._wanted and self.page._was_chosen)
+        until(self.built, lambda built: built is not None and built == self.page.wanted and self.page.was_chosen)
         window.get_by_role("button", name=STOP_SIGN).wait_for(timeout=OPENING)
 
     def _drawn_beside(self, before: list[Page]):
@@ -43,9 +43,9 @@ class Opened:
 
         return pages
 
-    def _built(self):
+    def built(self):
         self.draw()
-        return self.page._built
+        return self.page.built
 
     def draw(self) -> None:
         self.memory.draw()
@@ -73,8 +73,8 @@ def test_a_stop_that_is_called_by_a_button_that_the_page_has_just_replaced_is_ca
     opened: Opened, by: str
 ) -> None:
     opened.link.is_stalled = True
-    opened.page._wanted = replace(opened.page._wanted, is_dark=not opened.page._wanted.is_dark)
-    until(opened._built, lambda built: built == opened.page._wanted)
+    opened.page.wanted = replace(opened.page.wanted, is_dark=not opened.page.wanted.is_dark)
+    until(opened.built, lambda built: built == opened.page.wanted)
     if by == "space":
         opened.window.keyboard.press("Space")
     else:

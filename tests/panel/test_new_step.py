@@ -9,20 +9,25 @@ import pytest
 
 from gemelo.programs import Grip, Line, Repeat, Speed, Wait
 from services.panel.view.tabs.new_step import NewStep
-from tests.panel.memory_page import memory_page
+from tests.panel.memory_page import MemoryPage, memory_page
 
 
 @pytest.fixture(scope="module")
-def form(tmp_path_factory: pytest.TempPathFactory) -> Iterator[NewStep]:
+def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MemoryPage]:
     folder: Path = tmp_path_factory.mktemp("page")
     with memory_page("rm1", folder) as page:
         page.draw(5)
-        [shown] = page.panel.pages()
-        yield shown._programs._form
+        yield page
+
+
+@pytest.fixture
+def form(page: MemoryPage) -> NewStep:
+    [shown] = page.panel.pages()
+    return shown.programs.form
 
 
 def chooses(form: NewStep, kind: str) -> None:
-    form._kind.value = next(title for title, each in form._titles.items() if each == kind)
+    form.kind.value = next(title for title, each in form.titles.items() if each == kind)
     form.refresh()
 
 
@@ -42,9 +47,10 @@ def test_the_number_that_a_kind_of_step_begins_with_is_a_usual_one(form: NewStep
     assert form.make() == step
 
 
-def test_a_number_that_was_typed_stays_while_the_lists_of_names_change(form: NewStep):
+def test_a_number_that_was_typed_stays_while_the_lists_of_names_change(form: NewStep, page: MemoryPage):
     chooses(form, "wait")
-    form._number.value = 7.5
-    form._seen = None
+    form.number.value = 7.5
+    page.panel.operator.teaching.remember("one more")
     form.refresh()
+    assert "one more" in form.target.options
     assert form.make() == Wait(time=7.5)

@@ -29,11 +29,11 @@ def shown(page: MemoryPage) -> Page:
 def test_a_program_that_ends_while_the_page_is_looking_is_not_shown_as_running(
     page: MemoryPage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    teaching, tab = page.panel.operator.teaching, shown(page)._programs
-    monkeypatch.setattr(teaching, "_run", SimpleNamespace(state=RunState("one", RunStatus.RUNNING), stop=lambda: None))
-    teaching._changed()
+    teaching, tab = page.panel.operator.teaching, shown(page).programs
+    monkeypatch.setattr(teaching, "run", SimpleNamespace(state=RunState("one", RunStatus.RUNNING), stop=lambda: None))
+    teaching.changed()
     page.draw(2)
-    assert ENGLISH["run_running"] in tab._state.content
+    assert ENGLISH["run_running"] in tab.state.content
     folder = teaching.programs
 
     class Slow:
@@ -41,31 +41,36 @@ def test_a_program_that_ends_while_the_page_is_looking_is_not_shown_as_running(
 
         def __iter__(self) -> Iterator[str]:
             monkeypatch.setattr(teaching, "programs", folder)
-            teaching._run.state = RunState("one", RunStatus.DONE)
-            teaching._changed()
+            teaching.run.state = RunState("one", RunStatus.DONE)
+            teaching.changed()
             return iter(folder)
 
     monkeypatch.setattr(teaching, "programs", Slow())
     page.draw(2)
-    assert ENGLISH["run_done"] in tab._state.content
+    assert ENGLISH["run_done"] in tab.state.content
 
 
-def test_the_point_that_was_taught_is_chosen_at_once(page: MemoryPage) -> None:
-    tab = shown(page)._teach
-    tab._drawn = lambda: None  # type: ignore[method-assign]
-    tab._name.value = "new"
-    tab._remember()
-    assert tab._chosen.value == "new"
+def test_the_point_that_was_taught_is_chosen_at_once(page: MemoryPage, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shown(page).client, "get_render", draws_nothing)
+    tab = shown(page).teach
+    tab.name.value = "new"
+    tab.remember()
+    assert tab.chosen.value == "new"
+
+
+def draws_nothing(*size: int, timeout: float) -> None:
+    """As a browser that has not drawn after `timeout` [s]."""
+    raise TimeoutError
 
 
 def test_a_point_is_removed_once_a_person_has_said_so(page: MemoryPage) -> None:
     assert page.browser is not None
-    teaching, tab = page.panel.operator.teaching, shown(page)._teach
+    teaching, tab = page.panel.operator.teaching, shown(page).teach
     teaching.remember("old")
     page.draw(2)
-    assert tab._chosen.value == "old"
+    assert tab.chosen.value == "old"
     for answer in ("cancel", "remove_point"):
-        tab._remove()
+        tab.remove()
         page.sent()  # the browser has the question
         assert "old" in teaching.points
         page.browser.press(ENGLISH[answer])

@@ -64,7 +64,7 @@ def test_every_tab_is_there_with_a_slider_and_two_jog_buttons_for_each_joint(pag
     assert bool(z) is page.panel.operator.goal.turns.along_base[2]
     assert ENGLISH["plan_and_execute"] in labels
     [shown_page] = page.panel.pages()
-    sliders = shown_page._move._sliders
+    sliders = shown_page.move.sliders
     assert set(sliders) == set(arm.joint_names)
     for joint in arm.joints:
         slider = sliders[joint.name]

@@ -27,7 +27,7 @@ class Watched:
 
     def __init__(self, page: MemoryPage) -> None:
         self.page, self.drawn = page, 0
-        [self._joint, *_] = page.panel._world.measured._joints
+        [self._joint, *_] = page.panel.world.measured.joints
         self._numbers: dict[tuple[float, ...], int] = {}  # of the pictures, by the orientation
 
     def draw(self, pictures: int) -> None:
@@ -48,7 +48,8 @@ class Watched:
 
     def buffered(self) -> int:
         """Messages that the page keeps for the newest browser alone."""
-        states = self.page.panel._server._websock_server._client_state_from_id
+        # viser tells nobody what it keeps for a browser.
+        states = self.page.panel.server._websock_server._client_state_from_id
         return len(states[max(states)].message_buffer.message_from_id)
 
 

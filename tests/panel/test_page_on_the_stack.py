@@ -27,12 +27,12 @@ def processes() -> tuple[str, ...]:
 
 def says(served: Served, text: str) -> None:
     """Waits until the program's state says so."""
-    until(lambda: served.page._programs._state.content, lambda content: text in content)
+    until(lambda: served.page.programs.state.content, lambda content: text in content)
 
 
 def chooses_step(served: Served, number: int) -> None:
     """Of the open program, counted from 1; 0 is its beginning."""
-    steps = served.page._programs._step
+    steps = served.page.programs.step
     steps.value = tuple(steps.options)[number]
 
 
@@ -45,7 +45,7 @@ def runs_step_two(served: Served, arm: gemelo.Arm) -> None:
 
 def lit(served: Served) -> list[str]:
     """The numbers of the steps that are lit."""
-    rows = served.page._programs._list.content.split("<div ")[2:]
+    rows = served.page.programs.steps.content.split("<div ")[2:]
     return [found[1] for row in rows if LIT in row and (found := re.search(r"<span>([\d.]+)&nbsp;", row))]
 
 
@@ -59,10 +59,10 @@ def tour(served: Served, arm: gemelo.Arm) -> None:
         teaching.remove_point(name)
     for name, state in POINTS.items():
         teaching.points.remember(name, arm.states[state])
-    teaching._edit(Program("tour", ()), is_saved=True)
+    teaching.edit(Program("tour", ()), is_saved=True)
     for name in POINTS:
         teaching.insert(Go(point=name), ())
-    until(lambda: tuple(served.page._programs._step.options), lambda options: len(options) == 4)
+    until(lambda: tuple(served.page.programs.step.options), lambda options: len(options) == 4)
     chooses_step(served, 0)
 
 
@@ -73,29 +73,29 @@ def stands_at(arm: gemelo.Arm, name: str) -> None:
 
 
 def test_a_point_is_gone_to_overwritten_renamed_and_removed(served: Served, arm: gemelo.Arm, tour: None) -> None:
-    tab, teaching = served.page._teach, served.operator.teaching
-    tab._chosen.value = "P0"
+    tab, teaching = served.page.teach, served.operator.teaching
+    tab.chosen.value = "P0"
     served.press("go_there")
     stands_at(arm, "P0")
     assert served.operator.goal.goal.joints == teaching.points["P0"].joints
-    tab._chosen.value = "P2"
+    tab.chosen.value = "P2"
     served.press("as_goal")
     until(lambda: served.operator.goal.goal.joints, lambda joints: joints == teaching.points["P2"].joints)
     stands_at(arm, "P0")
     served.press("overwrite")
     until(lambda: teaching.points["P2"].joints, lambda joints: joints == arm.joints)
-    tab._name.value = "P0"
+    tab.name.value = "P0"
     served.press("rename")
     served.told("there is a point &quot;P0&quot;")
-    tab._name.value = "by the wall"
+    tab.name.value = "by the wall"
     served.press("rename")
     until(lambda: list(teaching.points), lambda names: names == ["P0", "P1", "by the wall"])
-    until(lambda: tab._chosen.value, lambda chosen: chosen == "by the wall")
-    until(lambda: served.page._problem.content, lambda content: content == "")
+    until(lambda: tab.chosen.value, lambda chosen: chosen == "by the wall")
+    until(lambda: served.page.problem.content, lambda content: content == "")
     served.browser.press_exactly(ENGLISH["remove"], 0)  # the tab of the scene has one too
     served.browser.press(ENGLISH["remove_point"])  # it asks first
     until(lambda: list(teaching.points), lambda names: names == ["P0", "P1"])
-    until(lambda: tab._chosen.value, lambda chosen: chosen == ENGLISH["none"])
+    until(lambda: tab.chosen.value, lambda chosen: chosen == ENGLISH["none"])
     served.press("go_there")
     served.told(ENGLISH["choose_point"])
     rests(arm)
@@ -109,12 +109,12 @@ def test_steps_are_put_in_order_stepped_paused_and_run_from_any_and_the_running_
     for order in (["P0", "P2", "P1"], ["P2", "P0", "P1"]):
         served.press("step_up")
         until(lambda: [step.point for step in teaching.program.steps], order.__eq__)
-    until(lambda: served.page._programs._step.value, lambda chosen: chosen == "1  go to P2")
+    until(lambda: served.page.programs.step.value, lambda chosen: chosen == "1  go to P2")
     served.press("step_down")
     until(lambda: [step.point for step in teaching.program.steps], lambda now: now == ["P0", "P2", "P1"])
     served.press("check")
     says(served, "The whole program can run")
-    assert served.page._programs._list.content.count(" s · ") == 3  # each with its time and its margin
+    assert served.page.programs.steps.content.count(" s · ") == 3  # each with its time and its margin
     chooses_step(served, 2)
     served.press("one_step")
     until(lambda: lit(served), lambda now: now == ["2"])
@@ -129,10 +129,10 @@ def test_steps_are_put_in_order_stepped_paused_and_run_from_any_and_the_running_
     chooses_step(served, 0)
     served.press("run_from")
     until(lambda: lit(served), lambda now: now == ["1"])
-    until(lambda: served.page._programs._pause.visible, bool)
+    until(lambda: served.page.programs.pause.visible, bool)
     served.press("pause")
     says(served, "Paused.")
-    assert served.page._programs._resume.visible
+    assert served.page.programs.resume.visible
     arm.speed(1.0)
     served.press("resume")
     says(served, "Done.")

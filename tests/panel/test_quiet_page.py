@@ -71,15 +71,20 @@ def test_a_browser_that_tells_its_frame_rate_later_has_the_lag_that_it_had(page:
     [shown] = page.panel.pages()
     assert shown.browser is not None
     lag, sent = shown.lag, shown.browser.sent
-    shown._hear(f'{CHANNEL} {{"sent": {sent}, "language": "en", "rate": 5.0}}')
+    shown.hear(f'{CHANNEL} {{"sent": {sent}, "language": "en", "rate": 5.0}}')
     assert (shown.lag, shown.browser.rate) == (lag, 5.0)
 
 
 def test_a_long_lag_is_measured_again_though_nothing_else_changes(page: MemoryPage):
     [shown] = page.panel.pages()
-    shown.lag, shown._marked = 0.7, page.now  # a browser that compiles its shaders has just said so, of this mark
-    page.browser._answered = f"{1000 * (page.now - shown._began):.0f}"
-    page.draw(round(LATE_AGAIN * TEXTS) + 2)
+    shown.lag = 3.0
+    page.draw()  # says so, with a new mark
+    assert until(lambda: shown.lag < LATE)
+    shown.lag = 0.7  # as of a browser that compiles its shaders, for the same mark
+    page.draw(round(LATE_AGAIN * TEXTS) - 2)
+    page.sent()
+    assert shown.lag == 0.7
+    page.draw(4)
     assert until(lambda: shown.lag < LATE)
     settle(page)
     page.draw(round(2.0 * LATE_AGAIN * TEXTS))
@@ -88,27 +93,27 @@ def test_a_long_lag_is_measured_again_though_nothing_else_changes(page: MemoryPa
 
 def test_the_lag_of_a_page_that_was_loading_is_not_shown_for_ever(page: MemoryPage, monkeypatch: pytest.MonkeyPatch):
     [shown] = page.panel.pages()
-    monkeypatch.setattr(shown, "_hear", lambda text: None)  # the browser tells nothing besides
+    monkeypatch.setattr(shown, "hear", lambda text: None)  # the browser tells nothing besides
     for lag, told in ((4.7, "4700 ms"), (0.03, "30 ms"), (0.04, "30 ms"), (0.2, "200 ms")):
         shown.lag = lag
         page.draw(2)
-        assert told in shown._header.content
+        assert told in shown.header.content
 
 
 def test_in_a_narrow_picture_the_camera_stands_farther_away_on_the_same_line_and_in_a_wide_one_it_stays(
     page: MemoryPage,
 ):
     [shown] = page.panel.pages()
-    world, camera = page.panel._world, shown.client.camera
+    world, camera = page.panel.world, shown.client.camera
     before = np.array(camera.position)
     world.step_back(shown.client, 1.5)
     assert np.array(camera.position) == pytest.approx(before)
     away = []
     for aspect in (1.0, 0.5, 0.1):
         world.step_back(shown.client, aspect)
-        line = np.array(camera.position) - world._seen
-        away.append(np.linalg.norm(line) / np.linalg.norm(world._eye - world._seen))
-        assert np.cross(line, world._eye - world._seen) == pytest.approx(np.zeros(3), abs=1e-9)
+        line = np.array(camera.position) - world.seen
+        away.append(np.linalg.norm(line) / np.linalg.norm(world.eye - world.seen))
+        assert np.cross(line, world.eye - world.seen) == pytest.approx(np.zeros(3), abs=1e-9)
     assert away == pytest.approx([ASPECT, 2 * ASPECT, FARTHEST])
 
 
@@ -146,7 +151,7 @@ def test_the_drawn_arm_stands_as_the_urdf_says(robot: str, drawn_arms: dict[str,
     drawn.show(joints)
     model.update_cfg(np.array([joints.get(name, 0.0) for name in model.actuated_joint_names]))
     for joint in arm.model.joints:
-        node = drawn._nodes[joint.child]
+        node = drawn.nodes[joint.child]
         wanted = model.get_transform(joint.child, joint.parent)
         w, x, y, z = node.wxyz
         assert rotation(w, x, y, z) == pytest.approx(wanted[:3, :3], abs=1e-4)
@@ -159,7 +164,7 @@ def test_the_drawn_arm_stands_as_the_urdf_says(robot: str, drawn_arms: dict[str,
 def drawn_arms(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, DrawnArm]]:
     with memory_page("rm1", tmp_path_factory.mktemp("page")) as page:
         arms = {name: load_arm(ROOT / "urdf" / name) for name in ("rm1", "parol6")}
-        yield {name: DrawnArm(page.panel._server, arm, f"/test_{name}") for name, arm in arms.items()}
+        yield {name: DrawnArm(page.panel.server, arm, f"/test_{name}") for name, arm in arms.items()}
 
 
 def rotation(w: float, x: float, y: float, z: float) -> np.ndarray:

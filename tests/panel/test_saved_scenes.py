@@ -29,13 +29,13 @@ def test_a_scene_that_is_saved_is_offered_at_once_and_chosen_by_its_name(
         assert until(lambda: len(page.panel.operator.bus.scene.objects) == 1)
         page.draw(5)
         [shown] = page.panel.pages()
-        tab = shown._scene
+        tab = shown.scene
         for name in ("table", "post"):
-            tab._file.value = name
-            tab._save()
-        assert tab._saved.options == ("choose ...", "post.json", "table.json")
-        tab._saved.value = "table.json"
-        tab._take_name()
-        assert tab._path() == tmp_path / "scenes/table.json"
+            tab.file.value = name
+            tab.save()
+        assert tab.saved.options == ("choose ...", "post.json", "table.json")
+        tab.saved.value = "table.json"
+        tab.take_name()
+        assert tab.path() == tmp_path / "scenes/table.json"
     assert POST.name in (tmp_path / "scenes/table.json").read_text().replace("\\", "")
     assert scene_tab.saved_scenes() == ("post.json", "table.json")

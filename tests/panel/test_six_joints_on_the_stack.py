@@ -45,7 +45,7 @@ def turned_by(one: gemelo.Pose, other: gemelo.Pose) -> float:
 def test_the_gizmo_leads_the_goal_in_six_directions_and_a_plan_goes_exactly_there(
     served: Served, arm: gemelo.Arm
 ) -> None:
-    goal, [gizmo] = served.operator.goal, served.world._gizmos  # arrows and rings in one
+    goal, [gizmo] = served.operator.goal, served.world.gizmos  # arrows and rings in one
     assert goal.turns.rings == goal.turns.arrows == ALL_RINGS
     assert not gizmo.disable_rotations
     for axis in range(6):
@@ -63,8 +63,8 @@ def test_the_gizmo_leads_the_goal_in_six_directions_and_a_plan_goes_exactly_ther
         assert turned_by(reached, wanted) < 0.05
     served.press("plan")
     until(lambda: served.operator.motions.plan, lambda plan: plan is not None)
-    until(lambda: served.page._move._plan.content, lambda content: ENGLISH["duration"] in content)
-    assert all(joint in served.page._move._plan.content for joint in arm.joint_names)
+    until(lambda: served.page.move.plan.content, lambda content: ENGLISH["duration"] in content)
+    assert all(joint in served.page.move.plan.content for joint in arm.joint_names)
     served.press("execute")
     until(lambda: arm.pose().position, lambda at: at == pytest.approx(goal.goal.pose.position, abs=1e-3))
     rests(arm)
@@ -76,12 +76,12 @@ def test_a_jog_turns_the_tool_where_it_is_and_a_program_of_points_and_lines_runs
 ) -> None:
     before = arm.pose()
     served.choose("along_axes", ENGLISH["tool_axes"])
-    until(lambda: served.page._jog._frame_name, bool)
+    until(lambda: served.page.jog.frame_name, bool)
     served.holds("rz +", lambda: turned_by(arm.pose(), before) > 3.0)
     rests(arm)
     assert arm.pose().position == pytest.approx(before.position, abs=1e-3)
     served.choose("jog_mode", "10 mm / 10°")
-    until(lambda: served.page._jog._step, lambda step: step == 10.0)
+    until(lambda: served.page.jog.step, lambda step: step == 10.0)
     turned = arm.pose()
     served.browser.press("ry -")
     until(lambda: turned_by(arm.pose(), turned), lambda by: by == pytest.approx(10.0, abs=0.2))
@@ -92,9 +92,9 @@ def test_a_jog_turns_the_tool_where_it_is_and_a_program_of_points_and_lines_runs
     until(lambda: list(teaching.points), bool)
     [name] = teaching.points
     arm.move(named="home")
-    teaching._edit(Program("six", (Go(point=name), Line(offset=(0.0, 0.0, 0.03)))), is_saved=True)
+    teaching.edit(Program("six", (Go(point=name), Line(offset=(0.0, 0.0, 0.03)))), is_saved=True)
     served.press("run_from")
-    state = served.page._programs._state
+    state = served.page.programs.state
     until(lambda: state.content, lambda content: ENGLISH["run_done"] in content, said=lambda: served.said)
     x, y, z = arm.fk(teaching.points[name].joints).position
     assert arm.pose().position == pytest.approx((x, y, z + 0.03), abs=2e-3)

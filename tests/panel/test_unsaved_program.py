@@ -29,19 +29,19 @@ def page(tmp_path: Path) -> Iterator[MemoryPage]:
 
 def tab(page: MemoryPage) -> ProgramsTab:
     [shown] = page.panel.pages()
-    return shown._programs
+    return shown.programs
 
 
 def chooses_old(page: MemoryPage) -> None:
-    tab(page)._file.value = "old"
-    tab(page)._open()
+    tab(page).file.value = "old"
+    tab(page).open()
 
 
 def test_the_open_program_stays_until_a_person_says_what_becomes_of_its_steps(page: MemoryPage):
     teaching = page.panel.operator.teaching
     chooses_old(page)
     assert (teaching.program.name, len(teaching.program.steps)) == ("fresh", 1)
-    assert tab(page)._file.value == "none"
+    assert tab(page).file.value == "none"
 
 
 @pytest.mark.parametrize(("answer", "kept"), [("save_first", {"fresh", "old"}), ("discard", {"old"})])
@@ -52,13 +52,13 @@ def test_it_is_saved_or_left_as_the_person_says(page: MemoryPage, answer: str, k
     assert until(lambda: teaching.program.name == "old")
     assert teaching.program.steps == (Wait(time=1.0),)
     assert set(teaching.programs) == kept
-    assert until(lambda: tab(page)._name.value == "old")
+    assert until(lambda: tab(page).name.value == "old")
 
 
 def test_a_new_one_asks_too_and_where_all_is_saved_nothing_is_asked(page: MemoryPage):
     teaching = page.panel.operator.teaching
-    tab(page)._name.value = "third"
-    tab(page)._new()
+    tab(page).name.value = "third"
+    tab(page).new()
     assert teaching.program.name == "fresh"
     page.browser.press(ENGLISH["save_first"])
     assert until(lambda: teaching.program.name == "third")
@@ -73,17 +73,17 @@ def test_a_program_that_is_written_beside_the_page_is_offered_and_a_broken_one_s
     file = teaching.programs.file("broken")
     file.write_text('version = 1\nsteps = [\n  {do = "wait", time = -2.0},\n  {do = "fly"},\n]\n')
     page.draw(2)
-    assert "broken" in tab(page)._file.options
-    tab(page)._file.value = "broken"
-    tab(page)._open()
-    assert tab(page)._file.value == teaching.program.name == "fresh"
+    assert "broken" in tab(page).file.options
+    tab(page).file.value = "broken"
+    tab(page).open()
+    assert tab(page).file.value == teaching.program.name == "fresh"
     [shown] = page.panel.pages()
     page.draw(2)
-    lines = shown._problem.content.partition("<br>")[2].splitlines()
+    lines = shown.problem.content.partition("<br>")[2].splitlines()
     assert [line.partition("broken.toml, ")[2][:7] for line in lines] == ["line 3:", "line 4:"]
     file.unlink()
     page.draw(2)
-    assert "broken" not in tab(page)._file.options
+    assert "broken" not in tab(page).file.options
 
 
 def test_a_refusal_is_gone_once_the_next_press_has_done_its_work(page: MemoryPage):

@@ -35,8 +35,9 @@ NONE = Picture()
 class CameraPictures:
     """Of the cell's own cameras; only of what was allowed to be shown as JPEG. Any thread may call it."""
 
-    def __init__(self, arm: gemelo.Arm, cameras: tuple[str, ...]) -> None:
-        self.names = cameras
+    def __init__(self, arm: gemelo.Arm, cameras: tuple[str, ...], period: float = PERIOD) -> None:
+        """`period` [s] is the shortest between two images of a camera."""
+        self.names, self._period = cameras, period
         self._pictures: dict[str, Picture] = {}
         self._detections: dict[str, Detections] = {}
         self._taken: dict[str, float] = {}  # [s] monotonic
@@ -66,7 +67,7 @@ class CameraPictures:
 
     def _on_image(self, image: CameraImage) -> None:
         now = time.monotonic()
-        is_due = now - self._taken.get(image.camera, 0.0) >= PERIOD
+        is_due = now - self._taken.get(image.camera, 0.0) >= self._period
         if is_due and image.camera in self.names and image.encoding == "jpeg" and len(image.data) <= LARGEST:
             self._taken[image.camera] = now
             address = f"data:image/jpeg;base64,{b64encode(image.data).decode()}"

@@ -100,7 +100,7 @@ class Motions:
 
         Where one is being made it is waited for; why there is none is told by then.
         """
-        if self._has_just_stopped():
+        if self.has_just_stopped:
             return None
         stops, had_to_wait = self._stops, self.is_planning
         with self._news:
@@ -116,7 +116,7 @@ class Motions:
 
     def make_and_execute(self, target: gemelo.Target) -> gemelo.Motion | None:
         """Both; a Stop meanwhile ends it before it moves."""
-        if self._has_just_stopped():
+        if self.has_just_stopped:
             return None
         stops = self._stops
         plan = self.make(target)
@@ -124,7 +124,7 @@ class Motions:
 
     def make_asked_and_execute(self, target: Callable[[], gemelo.Target]) -> gemelo.Motion | None:
         """As `make_and_execute`, of the target that there is by then, for one `ask`."""
-        stops, has_just_stopped, plan = self._stops, self._has_just_stopped(), None
+        stops, has_just_stopped, plan = self._stops, self.has_just_stopped, None
         try:
             made = self.make(target())
             if not has_just_stopped and stops == self._stops:  # else the plan is only shown
@@ -143,7 +143,9 @@ class Motions:
         self.plan = None
         self._changed()
 
-    def _has_just_stopped(self) -> bool:
+    @property
+    def has_just_stopped(self) -> bool:
+        """True for a moment after a Stop, in which no press starts anything."""
         return time.monotonic() - self._stopped < AFTER_STOP
 
     def _made(self, led: gemelo.Plan | None = None) -> None:

@@ -44,14 +44,14 @@ class Teaching:
         self.is_saved = True
         self.check: ProgramCheck | None = None
         self.is_checking = False
-        self._run: ProgramRun | None = None
+        self.run: ProgramRun | None = None  # the newest
         self._stops = 0
         self.version = 0  # +1 with every change
 
     @property
     def state(self) -> RunState | None:
         """How the newest run stands."""
-        return self._run.state if self._run is not None else None
+        return self.run.state if self.run is not None else None
 
     @property
     def is_running(self) -> bool:
@@ -78,19 +78,19 @@ class Teaching:
 
     def _points_changed(self) -> None:
         self.points_error = None  # each change reads the file first
-        self._changed()
+        self.changed()
 
     # The program that is open
 
     def open(self, name: str) -> None:
         """Reads it from its file."""
-        self._edit(self.programs.require(name), is_saved=True)
+        self.edit(self.programs.require(name), is_saved=True)
 
     def new(self, name: str) -> None:
         """An empty one, which no file has yet."""
         if name in self.programs:
             raise gemelo.BadArgument(f'there is a program "{name}": open it, or take another name')
-        self._edit(Program(name, ()), is_saved=False)
+        self.edit(Program(name, ()), is_saved=False)
 
     def save(self, name: str) -> None:
         """Writes it, under its own or another name."""
@@ -99,12 +99,12 @@ class Teaching:
                 raise gemelo.BadArgument(f'there is a program "{name}": remove it first, or take another name')
             program = replace(self.program, name=name)
             program.save(self.programs.folder)
-            self._edit(program, is_saved=True, keep_check=True)
+            self.edit(program, is_saved=True, keep_check=True)
 
     def remove(self, name: str) -> None:
         """Deletes its file."""
         self.programs.remove(name)
-        self._edit(Program(NEW, ()), is_saved=True)
+        self.edit(Program(NEW, ()), is_saved=True)
 
     def insert(self, step: AnyStep, after: StepPath) -> StepPath:
         """Puts a step behind the one at `after`, or at the end where that is empty; the path where it stands."""
@@ -136,12 +136,12 @@ class Teaching:
     def plan_all(self, first: StepPath = ()) -> None:
         """Checks the whole program: every leg is planned from the end of the one before."""
         self.is_checking, self.check = True, None
-        self._changed()
+        self.changed()
         try:
             self.check = check_program(self._arm, self.program, self.points, self.programs, first=first)
         finally:
             self.is_checking = False
-            self._changed()
+            self.changed()
 
     def start(self, first: StepPath, *, one_step: bool = False) -> None:
         """Runs it from a step on. Only a person says so: nothing of the page starts it anew by itself."""
@@ -150,16 +150,16 @@ class Teaching:
             if self.is_running:
                 raise gemelo.Error(f'program "{self.program.name}" runs already')
             run = ProgramRun(
-                self._arm, self.program, self.points, self.programs, on_change=lambda state: self._changed()
+                self._arm, self.program, self.points, self.programs, on_change=lambda state: self.changed()
             )
-            self._run = run
+            self.run = run
         run.start(first, one_step=one_step)
         if stops != self._stops:
             run.stop()
 
     def step(self, first: StepPath) -> None:
         """One step, then it pauses."""
-        run = self._run
+        run = self.run
         if run is not None and run.state.status is RunStatus.PAUSED:
             run.step()
         else:
@@ -176,28 +176,30 @@ class Teaching:
     def stop(self) -> None:
         """Ends the run, also one that is just being started; the arm decelerates."""
         self._stops += 1
-        run = self._run
+        run = self.run
         if run is not None:
             run.stop()
 
     def _require_run(self) -> ProgramRun:
-        if self._run is None or self._run.state.status.is_over:
+        if self.run is None or self.run.state.status.is_over:
             raise gemelo.Error("no program runs")
-        return self._run
+        return self.run
 
     def _edit_steps(self, steps: tuple[AnyStep, ...]) -> None:
-        self._edit(replace(self.program, steps=steps, lines={}), is_saved=False)
+        self.edit(replace(self.program, steps=steps, lines={}), is_saved=False)
 
-    def _edit(self, program: Program, *, is_saved: bool, keep_check: bool = False) -> None:
+    def edit(self, program: Program, *, is_saved: bool, keep_check: bool = False) -> None:
+        """Another program in the place of the open one; `is_saved` says if its file is like it."""
         with self._lock:
             if self.is_running:
                 raise gemelo.Error(f'program "{self.program.name}" runs: stop it before it is changed')
             self.program, self.is_saved = program, is_saved
             if not keep_check:
                 self.check = None
-        self._changed()
+        self.changed()
 
-    def _changed(self) -> None:
+    def changed(self) -> None:
+        """To be called once something of it is new, as a run does with each of its states."""
         self.version += 1
         self._on_change()
 

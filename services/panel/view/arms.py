@@ -50,9 +50,9 @@ class DrawnArm:
         self._root = server.scene.add_frame(name, show_axes=False)
         drawn = JointFrames(server, load_model(arm.urdf_path), root_node_name=name, mesh_color_override=color)
         drawn.update_cfg(np.zeros(len(drawn.get_actuated_joint_names())))  # what is fixed is placed here only
-        self._nodes = drawn.by_link()
-        self._joints = [
-            DrawnJoint(joint, origin_of(joint), self._nodes[joint.child])
+        self.nodes = drawn.by_link()  # the pose of each is the one in its parent link
+        self.joints = [  # with what each is drawn at
+            DrawnJoint(joint, origin_of(joint), self.nodes[joint.child])
             for joint in arm.model.joints
             if joint.kind is not JointKind.FIXED
         ]
@@ -74,7 +74,7 @@ class DrawnArm:
         """
         positions = complete(self._model, joints)
         moved = False
-        for drawn in self._joints:
+        for drawn in self.joints:
             at = positions.get(drawn.joint.name, 0.0)
             if drawn.shown is not None and abs(at - drawn.shown) < UNSEEN:
                 continue
@@ -94,7 +94,7 @@ class DrawnArm:
 
     def node_of(self, link: str) -> str:
         """The scene's node that moves with `link`: what hangs on it needs not be sent while the arm moves."""
-        node = self._nodes.get(link)
+        node = self.nodes.get(link)
         return f"{self._name}/visual" if node is None else str(node.name)
 
 

@@ -30,7 +30,7 @@ class CameraBox:
             self._images[name], self._said[name] = kit.line(), kit.line()
         self._shown: dict[str, tuple[Picture, str]] = {}
         self._click: Click | None = None
-        self._picks = PickBox(kit) if picks.things and picks.places else None
+        self.picks = PickBox(kit) if picks.things and picks.places else None
 
     def point(self, click: Click) -> None:
         """Somebody has clicked into an image; `refresh` takes it up. Any thread may call it."""
@@ -39,19 +39,19 @@ class CameraBox:
     def refresh(self) -> None:
         """The newest images, what a click has chosen, and what the pick is at."""
         click, self._click = self._click, None
-        if click is not None and click.camera in self._images and self._picks is not None:
-            self._take_up(click, self._picks)
-        chosen = self._picks.thing if self._picks is not None else ""
+        if click is not None and click.camera in self._images and self.picks is not None:
+            self._take_up(click, self.picks)
+        chosen = self.picks.thing if self.picks is not None else ""
         for name, line in self._images.items():
             picture = self._cameras.picture(name)
             if picture is not NONE and self._shown.get(name) != (picture, chosen):
                 self._shown[name] = picture, chosen
                 line.content = image_html(name, picture, chosen, self._caption(name))
-        if self._picks is not None:
-            self._picks.refresh()
+        if self.picks is not None:
+            self.picks.refresh()
 
     def _caption(self, camera: str) -> str:
-        return f"{camera}: {self._kit.words('click_a_thing')}" if self._picks is not None else camera
+        return f"{camera}: {self._kit.words('click_a_thing')}" if self.picks is not None else camera
 
     def _take_up(self, click: Click, picks: PickBox) -> None:
         pointed = self._cameras.pointed_at(click.camera, click.x, click.y, self._things)

@@ -22,8 +22,8 @@ class Kit:
 
     def __init__(self, client: viser.ClientHandle, operator: Operator, words: Words) -> None:
         self.client, self.gui, self.operator, self.words = client, client.gui, operator, words
-        self._gated: list[tuple[viser.GuiButtonHandle, str]] = []
-        self._reasons: list[tuple[viser.GuiHtmlHandle, dict[str, str]]] = []
+        self.gated: list[tuple[viser.GuiButtonHandle, str]] = []
+        self.reason_places: list[tuple[viser.GuiHtmlHandle, dict[str, str]]] = []
 
     def button(
         self,
@@ -49,7 +49,7 @@ class Kit:
 
         handle.on_click(without_event(reporting(self.operator.tell, act)))
         if needs:
-            self._gated.append((handle, needs))
+            self.gated.append((handle, needs))
         return handle
 
     def urgent(self, label: str, action: Callable[[], object], *, color: Color) -> viser.GuiButtonHandle:
@@ -63,12 +63,12 @@ class Kit:
         handle = self.gui.add_button(label, color="gray")
         handle.on_hold(without_event(action), callback_hz=rate)
         if needs:
-            self._gated.append((handle, needs))
+            self.gated.append((handle, needs))
         return handle
 
     def reasons(self, **titles: str) -> None:
         """A place for the reasons why actions cannot be done now: by action, what it is called."""
-        self._reasons.append((self.gui.add_html(""), titles))
+        self.reason_places.append((self.gui.add_html(""), titles))
 
     def line(self, content: str = "") -> viser.GuiHtmlHandle:
         """A piece of HTML."""
@@ -76,9 +76,9 @@ class Kit:
 
     def refresh(self, reasons: dict[str, Reason]) -> None:
         """Greys what cannot be done now, and says why."""
-        for button, name in self._gated:
+        for button, name in self.gated:
             set_if_new(button, "disabled", reasons.get(name) is not None)
-        for place, titles in self._reasons:
+        for place, titles in self.reason_places:
             told: dict[str, list[str]] = {}
             for name, title in titles.items():
                 why = self.words.reason(reasons.get(name))
@@ -110,13 +110,13 @@ class Mirror:
     """Shows in an input what the twin says, only when that changes: what a person has just set stays until then."""
 
     def __init__(self, handle: object) -> None:
-        self._handle, self._shown = handle, object()
+        self.handle, self._shown = handle, object()
 
     def show(self, value: object) -> None:
         """The newest of what the twin says."""
         if value != self._shown:
             self._shown = value
-            set_if_new(self._handle, "value", value)
+            set_if_new(self.handle, "value", value)
 
 
 class Steady:

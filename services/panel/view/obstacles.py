@@ -30,7 +30,7 @@ class DrawnObstacles:
         self._drawn: dict[str, tuple[SceneObject, viser.MeshHandle]] = {}
         self._meshes: dict[str, trimesh.Trimesh] = {}
         self._items: tuple[SceneObject, ...] = ()
-        self._red: frozenset[str] = frozenset()
+        self.red: frozenset[str] = frozenset()
         self._contacts: tuple[Contact, ...] = ()
         self._dots: list[viser.SceneNodeHandle] = []
 
@@ -45,7 +45,7 @@ class DrawnObstacles:
         for name, item in present.items():
             if name not in self._drawn:
                 self._draw(item, name in red, f"{node_of(item.frame)}/carried" if item.attached else "/scene")
-        self._items, self._red = tuple(items), red
+        self._items, self.red = tuple(items), red
         self._show_contacts(tuple(contacts))
 
     def under_the_cursor(self, origin: Array, direction: Array) -> Array | None:
@@ -61,7 +61,7 @@ class DrawnObstacles:
         return origin + min(distances) * direction if distances else None
 
     def _is_stale(self, drawn: SceneObject, item: SceneObject | None, red: frozenset[str]) -> bool:
-        return drawn != item or (drawn.name in red) != (drawn.name in self._red)
+        return drawn != item or (drawn.name in red) != (drawn.name in self.red)
 
     def _draw(self, item: SceneObject, is_red: bool, below: str) -> None:
         mesh = self._mesh(item)

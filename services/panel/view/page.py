@@ -46,7 +46,8 @@ class Look:
 
 
 class Page:
-    """Built anew when the language or the colours change."""
+    """Built anew when the language or the colours change; its tabs and controls have the names by which a person knows
+    them."""
 
     def __init__(
         self, client: viser.ClientHandle, operator: Operator, world: DrawnWorld, arms: tuple[ArmPage, ...] = ()
@@ -57,9 +58,9 @@ class Page:
         self.lag = float("nan")  # [s] from a header that was sent to the word that it is drawn
         self._began = time.monotonic()
         self._marked = 0.0
-        self._wanted = Look()
-        self._was_chosen = False
-        self._built: Look | None = None
+        self.wanted = Look()  # set by any thread: `refresh` builds it
+        self.was_chosen = False  # by the browser's own settings, or by a person
+        self.built: Look | None = None
         self._is_plain = False  # drawn without shadows
         self._told = 0
         self._stops = Stops()
@@ -69,36 +70,36 @@ class Page:
     def refresh(self, readings: Readings, now: float) -> None:
         """Shows what has changed, at `now` [s] monotonic. All is built in here, by one thread: callbacks only say what
         is wanted."""
-        if self._built != self._wanted:
-            self._rebuild(self._wanted)
-        self._kit.refresh(reasons(self._operator.arm, readings))
+        if self.built != self.wanted:
+            self._rebuild(self.wanted)
+        self.kit.refresh(reasons(self._operator.arm, readings))
         is_held = readings.state is not None and readings.state.mode is DeviceMode.HOLD
-        set_if_new(self._hold, "visible", not is_held)
-        set_if_new(self._resume, "visible", is_held)
+        set_if_new(self.hold, "visible", not is_held)
+        set_if_new(self.resume, "visible", is_held)
         self._show_header(readings, now)
-        self._control.refresh(readings)
+        self.control.refresh(readings)
         self._show_problem()
-        self._move.refresh(readings)
-        self._jog.refresh(readings)
-        self._device.refresh(readings)
-        self._scene.refresh(readings)
-        self._cameras.refresh()
-        self._teach.refresh(readings)
-        self._programs.refresh(readings)
+        self.move.refresh(readings)
+        self.jog.refresh(readings)
+        self.device.refresh(readings)
+        self.scene.refresh(readings)
+        self.cameras.refresh()
+        self.teach.refresh(readings)
+        self.programs.refresh(readings)
         pose = self._world.tool_pose
-        self._state.refresh(readings, self.browser, self.lag, (*pose.position, *pose.orientation))
+        self.state.refresh(readings, self.browser, self.lag, (*pose.position, *pose.orientation))
         if readings.state is not None:
             self._shown_speed.show(round(100.0 * readings.state.speed))
 
     def close(self) -> None:
         """Takes away what it has put into the scene."""
-        if self._built is not None:
-            self._scene.close()
+        if self.built is not None:
+            self.scene.close()
 
     def _build(self, look: Look) -> None:
         joints = {joint.name: joint for joint in self._operator.arm.description.joints}
         self._words = words = Words(look.language, joints)
-        self._kit = kit = Kit(self.client, self._operator, words)
+        self.kit = kit = Kit(self.client, self._operator, words)
         gui = self.client.gui
         gui.configure_theme(dark_mode=look.is_dark, show_logo=False, show_share_button=False, brand_color=BRAND)
         gui.set_panel_label(f"gemelo · {self._operator.arm.name}")
@@ -107,40 +108,40 @@ class Page:
         kit.line(script_html())
         if self._arms:
             kit.line(arms_line(self._arms, self._operator.arm.name, words))
-        self._header = kit.line()
+        self.header = kit.line()
         kit.urgent(f"{STOP_SIGN} {words('stop')}", self._stop, color="red")
-        self._hold = kit.button(words("hold"), self._operator.arm.hold, color="gray", needs="hold")
-        self._resume = kit.button(words("resume"), self._operator.arm.resume, color="gray", needs="resume")
-        self._speed = gui.add_slider(words("speed"), 0, 100, 1, 100)
-        self._shown_speed = Mirror(self._speed)
-        self._speed.on_update(
+        self.hold = kit.button(words("hold"), self._operator.arm.hold, color="gray", needs="hold")
+        self.resume = kit.button(words("resume"), self._operator.arm.resume, color="gray", needs="resume")
+        self.speed = gui.add_slider(words("speed"), 0, 100, 1, 100)
+        self._shown_speed = Mirror(self.speed)
+        self.speed.on_update(
             lambda event: self._operator.set_speed(event.target.value / 100.0) if event.client_id is not None else None
         )
-        self._control = ControlBox(kit)
-        self._problem = kit.line()
-        self._nearest = kit.button(words("take_nearest"), self._take_nearest, color="orange")
-        self._read = kit.button(words("understood"), self._operator.forget_problem, color="gray")
+        self.control = ControlBox(kit)
+        self.problem = kit.line()
+        self.nearest = kit.button(words("take_nearest"), self._take_nearest, color="orange")
+        self.understood = kit.button(words("understood"), self._operator.forget_problem, color="gray")
         tabs = gui.add_tab_group()
         with tabs.add_tab(words("tab_move")):
-            self._move = MoveTab(kit, self._world)
+            self.move = MoveTab(kit, self._world)
         with tabs.add_tab(words("tab_jog")):
-            self._jog = JogTab(kit)
+            self.jog = JogTab(kit)
         with tabs.add_tab(words("tab_device")):
-            self._device = DeviceTab(kit)
+            self.device = DeviceTab(kit)
         with tabs.add_tab(words("tab_teach")):
-            self._teach = TeachTab(kit)
+            self.teach = TeachTab(kit)
         with tabs.add_tab(words("tab_programs")):
-            self._programs = ProgramsTab(kit)
+            self.programs = ProgramsTab(kit)
         with tabs.add_tab(words("tab_scene")):
-            self._scene = SceneTab(kit, self._world)
-            self._cameras = CameraBox(kit)
+            self.scene = SceneTab(kit, self._world)
+            self.cameras = CameraBox(kit)
         with tabs.add_tab(words("tab_state")):
-            self._state = StateTab(kit)
+            self.state = StateTab(kit)
             self._settings(look)
         self._add_commands()
         self._channel = gui.add_text(CHANNEL, CHANNEL)
         self._channel.on_update(at_once(self._hear_stops))  # before all that a thread is needed for
-        self._channel.on_update(lambda event: self._hear(event.target.value))
+        self._channel.on_update(lambda event: self.hear(event.target.value))
 
     def _settings(self, look: Look) -> None:
         words, gui = self._words, self.client.gui
@@ -151,14 +152,14 @@ class Page:
         def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
             if event.client_id is not None:
                 [chosen] = [key for key, name in NAMES.items() if name == event.target.value]
-                self._was_chosen = True
-                self._wanted = replace(self._wanted, language=chosen)
+                self.was_chosen = True
+                self.wanted = replace(self.wanted, language=chosen)
 
         @dark.on_update
         def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
             if event.client_id is not None:
-                self._was_chosen = True
-                self._wanted = replace(self._wanted, is_dark=event.target.value)
+                self.was_chosen = True
+                self.wanted = replace(self.wanted, is_dark=event.target.value)
 
     def _add_commands(self) -> None:
         """The same by keys, and in the palette that Ctrl-K opens."""
@@ -180,15 +181,16 @@ class Page:
         self.client.gui.reset()
         self._told, self._said = 0, ""
         self._build(look)
-        self._built = look
+        self.built = look
 
-    def _hear(self, text: str) -> None:
+    def hear(self, text: str) -> None:
+        """What the browser tells of itself, as its script writes it into the hidden field."""
         browser = read_browser(text)
         if browser is None:
             return
         previous, self.browser = self.browser, browser
         if browser.clicked is not None and previous is not None and browser.clicked != previous.clicked:
-            self._cameras.point(browser.clicked)
+            self.cameras.point(browser.clicked)
         if browser.too_large:
             self._operator.guarded(lambda: require_small(browser.too_large, self._words))
         if 0.0 < browser.rate < SLOW and not self._is_plain:
@@ -198,9 +200,9 @@ class Page:
             self.lag = max(0.0, time.monotonic() - self._began - browser.sent / 1000.0)
         if previous is None and browser.height:
             self._world.step_back(self.client, max(1.0, browser.width - WIDTH) / browser.height)
-        if not self._was_chosen:
-            self._was_chosen = True
-            self._wanted = Look(language_of(browser.language), browser.dark)
+        if not self.was_chosen:
+            self.was_chosen = True
+            self.wanted = Look(language_of(browser.language), browser.dark)
 
     def _stop(self) -> None:
         self._stops.come += 1
@@ -223,7 +225,7 @@ class Page:
         if now - self._marked > MARK:
             self._marked = now
         mark = f'<span data-gemelo-sent="{1000 * (self._marked - self._began):.0f}"></span>'
-        set_if_new(self._header, "content", mark + box(text, color))
+        set_if_new(self.header, "content", mark + box(text, color))
 
     def _header_text(self, readings: Readings, lag: str) -> tuple[str, str]:
         """What it says, and its colour."""
@@ -244,18 +246,18 @@ class Page:
     def _show_problem(self) -> None:
         told = self._operator.newest_problem
         number = told.number if told is not None else 0
-        if (number == self._told and self._told != 0) or (number == 0 and self._problem.content == ""):
-            set_if_new(self._read, "visible", number != 0)
-            set_if_new(self._nearest, "visible", told is not None and told.problem.has_nearest)
+        if (number == self._told and self._told != 0) or (number == 0 and self.problem.content == ""):
+            set_if_new(self.understood, "visible", number != 0)
+            set_if_new(self.nearest, "visible", told is not None and told.problem.has_nearest)
             return
         self._told = number
         content = ""
         if told is not None:
             heading, text = self._words.problem(told.problem)
             content = box(f"<b>{esc(heading)}</b><br>{esc(text)}", BAD)
-        set_if_new(self._problem, "content", content)
-        set_if_new(self._read, "visible", number != 0)
-        set_if_new(self._nearest, "visible", told is not None and told.problem.has_nearest)
+        set_if_new(self.problem, "content", content)
+        set_if_new(self.understood, "visible", number != 0)
+        set_if_new(self.nearest, "visible", told is not None and told.problem.has_nearest)
 
     def _take_nearest(self) -> None:
         told = self._operator.newest_problem

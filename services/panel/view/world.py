@@ -32,25 +32,26 @@ GHOST_RATE = 20.0  # [Hz] of the plan that is played
 
 
 class DrawnWorld:
-    """Everything drawn under the server's scene; `update` is called again and again, and draws what has changed."""
+    """Everything drawn under the server's scene, each part with a name for what it shows; `update` is called again and
+    again, and draws what has changed."""
 
     def __init__(self, server: viser.ViserServer, operator: Operator) -> None:
         arm = operator.arm.description
         self._operator, self._scene = operator, server.scene
         self._base, self._tool = arm.base_frame, arm.tool_frame
         self.measured = DrawnArm(server, arm, "/measured")
-        self._goal = DrawnArm(server, arm, "/goal", GOAL)
-        self._bad_goal = DrawnArm(server, arm, "/bad_goal", BAD_GOAL)
-        self._ghost = DrawnArm(server, arm, "/ghost", GHOST)
+        self.goal = DrawnArm(server, arm, "/goal", GOAL)
+        self.bad_goal = DrawnArm(server, arm, "/bad_goal", BAD_GOAL)
+        self.ghost = DrawnArm(server, arm, "/ghost", GHOST)
         self.obstacles = DrawnObstacles(server, (project_root(), arm.folder))
         reach = max(0.3, float(np.linalg.norm(operator.goal.goal.pose.position)))
         self._set_stage(server, reach)
-        self._gizmos = self._make_gizmos(0.35 * reach, operator.goal.turns)
+        self.gizmos = self._make_gizmos(0.35 * reach, operator.goal.turns)
         on_tool = f"{self.measured.node_of(self._tool)}/axes"
         self._scene.add_frame(on_tool, axes_length=0.12 * reach, axes_radius=0.004 * reach)
         self._dragged: viser.TransformControlsHandle | None = None
         self._tool_pose = operator.goal.goal.pose
-        for gizmo in self._gizmos:
+        for gizmo in self.gizmos:
             self._follow(gizmo)
         self._goal_version = -1
         self._trail: deque[Array] = deque(maxlen=TRAIL)
@@ -73,7 +74,7 @@ class DrawnWorld:
     @property
     def period(self) -> float:
         """[s] after which it wants to be drawn again, though nobody has said anything new."""
-        return 1.0 / GHOST_RATE if self._ghost.is_visible and self.is_playing else float("inf")
+        return 1.0 / GHOST_RATE if self.ghost.is_visible and self.is_playing else float("inf")
 
     @property
     def tool_pose(self) -> gemelo.Pose:
@@ -91,8 +92,8 @@ class DrawnWorld:
     def step_back(self, client: viser.ClientHandle, aspect: float) -> None:
         """Shows all of the arm in a narrow picture; `aspect` is the ratio of its width to its height."""
         if aspect < ASPECT:
-            client.camera.position = self._seen + min(FARTHEST, ASPECT / aspect) * (self._eye - self._seen)
-            client.camera.look_at = self._seen  # which viser has led along with the position
+            client.camera.position = self.seen + min(FARTHEST, ASPECT / aspect) * (self.eye - self.seen)
+            client.camera.look_at = self.seen  # which viser has led along with the position
 
     def _set_stage(self, server: viser.ViserServer, reach: float) -> None:
         size = 2.0 * ceil(4.0 * reach) / 2.0
@@ -100,8 +101,8 @@ class DrawnWorld:
         self._scene.configure_environment_map(None)
         self._scene.configure_default_lights(True)
         self._scene.add_light_ambient("/lights/ambient", intensity=0.9)
-        self._eye, self._seen = (reach * np.array(point) for point in (EYE, SEEN))
-        server.initial_camera.position, server.initial_camera.look_at = self._eye, self._seen
+        self.eye, self.seen = (reach * np.array(point) for point in (EYE, SEEN))
+        server.initial_camera.position, server.initial_camera.look_at = self.eye, self.seen
 
     def _make_gizmos(self, scale: float, turns: ToolTurns) -> list[viser.TransformControlsHandle]:
         """Arrows and rings; where not all rings are to be had, which viser has together with the arrows only, two."""
@@ -128,19 +129,19 @@ class DrawnWorld:
             x, y, z = (float(value) for value in event.target.position)
             pose = gemelo.Pose((x, y, z), (a, b, c, w))
             source = event.client_id if event.client_id is not None else -1
-            self._operator.goal.set_pose(pose, source, is_turned=gizmo is not self._gizmos[0])
+            self._operator.goal.set_pose(pose, source, is_turned=gizmo is not self.gizmos[0])
 
     def _show_goal(self, goal: GoalState, measured: Mapping[str, float]) -> None:
         apart = any(abs(at - measured.get(name, at)) > APART for name, at in goal.joints.items())
         is_bad = goal.problem is not None and goal.wanted is None
-        self._goal.is_visible = apart and not is_bad
-        self._bad_goal.is_visible = is_bad
+        self.goal.is_visible = apart and not is_bad
+        self.bad_goal.is_visible = is_bad
         if goal.version == self._goal_version:
             return
         self._goal_version = goal.version
-        (self._bad_goal if is_bad else self._goal).show(goal.joints)
+        (self.bad_goal if is_bad else self.goal).show(goal.joints)
         a, b, c, w = goal.pose.orientation
-        for gizmo in self._gizmos:
+        for gizmo in self.gizmos:
             if gizmo is not self._dragged:
                 gizmo.position = goal.pose.position
                 gizmo.wxyz = (w, a, b, c)
@@ -151,15 +152,15 @@ class DrawnWorld:
             self._path_stamp = path.stamp
             self._draw_line("/planned", np.array(path.points), PLANNED)
         plan = motions.plan
-        self._ghost.is_visible = plan is not None and motions.shows_plan and not motions.is_moving
-        if plan is None or not self._ghost.is_visible:
+        self.ghost.is_visible = plan is not None and motions.shows_plan and not motions.is_moving
+        if plan is None or not self.ghost.is_visible:
             return
         now = time.monotonic()
         if now - self._played_at < 1.0 / GHOST_RATE:
             return
         self._played_at = now
         at = now % (plan.duration + 0.7) if self.is_playing else self.scrubbed
-        self._ghost.show(configuration_at(plan, at))
+        self.ghost.show(configuration_at(plan, at))
 
     def _tool_moved(self) -> None:
         point, orientation = self.measured.pose(self._tool)

@@ -18,21 +18,21 @@ class DeviceTab:
     def __init__(self, kit: Kit) -> None:
         self._kit, self._operator = kit, kit.operator
         words, arm = kit.words, kit.operator.arm
-        self._facts = kit.line()
+        self.facts = kit.line()
         self._round_trip = Steady(share=0.5, least=0.002)  # [s]
         kit.button(words("arm"), arm.device.arm, color="green", needs="arm")
         kit.button(words("disarm"), arm.device.disarm, color="orange", needs="disarm")
         kit.button(words("home"), self._operator.home, color="blue", needs="home")
         kit.button(words("reference"), self._ask_reference, color="blue", needs="reference")
         kit.button(words("reset"), arm.device.reset, color="orange", needs="reset")
-        self._homing = kit.line()
+        self.homing = kit.line()
         kit.reasons(
             arm=words("arm"), disarm=words("disarm"), home=words("home"), reference=words("reference"),
             reset=words("reset"),
         )  # fmt: skip
-        self._outputs = {output.name: Mirror(self._output(output.name)) for output in arm.description.outputs}
+        self.outputs = {output.name: Mirror(self._output(output.name)) for output in arm.description.outputs}
         gripper = arm.description.gripper
-        self._gripper = GripperBox(kit, gripper) if gripper is not None else None
+        self.gripper = GripperBox(kit, gripper) if gripper is not None else None
         with kit.gui.add_folder(words("virtual"), expand_by_default=False):
             for key, value in (("estop_press", 1.0), ("estop_release", 0.0)):
                 kit.button(words(key), partial(arm.device.inject, "estop", value=value), needs="inject")
@@ -51,13 +51,13 @@ class DeviceTab:
             rows.append((esc(words("mode")), esc(words(f"mode_{state.mode.name.lower()}"))))
             rows.append((esc(words("inputs")), esc(", ".join(state.inputs) or "-")))
             rows.append((esc(words("link")), f"{1000 * self._round_trip.of(state.round_trip):.0f} ms"))
-            for name, handle in self._outputs.items():
+            for name, handle in self.outputs.items():
                 handle.show(name in state.outputs)
-        set_if_new(self._facts, "content", table(rows) if rows else "")
-        if self._gripper is not None:
-            self._gripper.refresh(readings)
+        set_if_new(self.facts, "content", table(rows) if rows else "")
+        if self.gripper is not None:
+            self.gripper.refresh(readings)
         phases = ", ".join(f"{joint}: {words.value('phase', phase)}" for joint, phase in self._operator.homing.items())
-        set_if_new(self._homing, "content", box(esc(words("homing", phases=phases)), "#1c7ed6") if phases else "")
+        set_if_new(self.homing, "content", box(esc(words("homing", phases=phases)), "#1c7ed6") if phases else "")
 
     def _output(self, name: str) -> viser.GuiCheckboxHandle:
         handle = self._kit.gui.add_checkbox(f"{self._kit.words('output')} {name}", False)

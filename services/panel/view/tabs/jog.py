@@ -35,10 +35,10 @@ class JogTab:
         self._kit, self._operator = kit, kit.operator
         words, gui = kit.words, kit.gui
         self._modes = (words("continuous"), *(f"{step:g} mm / {step:g}°" for step in STEPS))
-        self._mode = gui.add_dropdown(words("jog_mode"), self._modes)
-        self._speed = gui.add_slider(words("jog_speed"), 1, 100, 1, 25)
-        self._frame = gui.add_dropdown(words("along_axes"), (words("base_axes"), words("tool_axes")))
-        self._status = kit.line()
+        self.mode = gui.add_dropdown(words("jog_mode"), self._modes)
+        self.speed = gui.add_slider(words("jog_speed"), 1, 100, 1, 25)
+        self.frame = gui.add_dropdown(words("along_axes"), (words("base_axes"), words("tool_axes")))
+        self.status = kit.line()
         with gui.add_folder(words("tool")):
             kit.line(note(esc(words("keys_note"))))
             turns = self._operator.goal.turns
@@ -56,21 +56,21 @@ class JogTab:
 
     def refresh(self, readings: Readings) -> None:
         """What slows the jog."""
-        set_if_new(self._status, "content", jog_text(self._operator, self._kit.words))
+        set_if_new(self.status, "content", jog_text(self._operator, self._kit.words))
 
     @property
-    def _step(self) -> float:
+    def step(self) -> float:
         """[mm] or [deg] of one press; 0 while continuous."""
-        place = self._modes.index(self._mode.value)
+        place = self._modes.index(self.mode.value)
         return STEPS[place - 1] if place else 0.0
 
     def _joint_button(self, joint: Joint, sign: int) -> None:
         def hold() -> None:
-            speed = sign * jog_speed(joint, self._speed.value / 100.0)
+            speed = sign * jog_speed(joint, self.speed.value / 100.0)
             self._operator.jogging.hold(JogWish(joints={joint.name: speed}))
 
         def step() -> None:
-            size = radians(self._step) if joint.unit == "rad" else self._step / 1000.0
+            size = radians(self.step) if joint.unit == "rad" else self.step / 1000.0
             at = self._operator.arm.joints[joint.name] + sign * size
             self._operator.step(gemelo.Target(joints={joint.name: joint.clamp(at)}))
 
@@ -83,17 +83,17 @@ class JogTab:
             return tuple(sign * size if index == place else 0.0 for index in range(3))
 
         def hold() -> None:
-            share = self._speed.value / 100.0
+            share = self.speed.value / 100.0
             still = (0.0, 0.0, 0.0)
             twist = (*still, *vector(share * ANGULAR)) if turn else (*vector(share * LINEAR), *still)
-            self._operator.jogging.hold(JogWish(twist=twist, frame=self._frame_name))
+            self._operator.jogging.hold(JogWish(twist=twist, frame=self.frame_name))
 
         def step() -> None:
             if turn:
-                self._turn(vector(radians(self._step)))
+                self._turn(vector(radians(self.step)))
             else:
-                offset = vector(self._step / 1000.0)
-                self._operator.step(gemelo.Target(offset=offset, line=True, frame=self._frame_name))
+                offset = vector(self.step / 1000.0)
+                self._operator.step(gemelo.Target(offset=offset, line=True, frame=self.frame_name))
 
         key = f"  {KEYS[axis, sign]}" if not turn else ""
         self._add(f"{turn}{axis} {'+' if sign > 0 else '-'}{key}", hold, step)
@@ -102,24 +102,25 @@ class JogTab:
         """The tool turned by roll, pitch or yaw [rad] about the chosen axes, where it is."""
         pose, (roll, pitch, yaw) = self._operator.arm.pose(), angles
         turned = from_rpy(roll, pitch, yaw)
-        in_tool = bool(self._frame_name)
+        in_tool = bool(self.frame_name)
         orientation = multiply(pose.orientation, turned) if in_tool else multiply(turned, pose.orientation)
         self._operator.step(gemelo.Target(pose=gemelo.Pose(pose.position, orientation)))
 
     @property
-    def _frame_name(self) -> str:
-        is_tool = self._frame.value == self._kit.words("tool_axes")
+    def frame_name(self) -> str:
+        """Along whose axes the tool goes: its own frame, or empty for the base."""
+        is_tool = self.frame.value == self._kit.words("tool_axes")
         return self._operator.arm.tool_frame if is_tool else ""
 
     def _add(self, label: str, hold: Callable[[], object], step: Callable[[], object]) -> None:
         """A press is a step, or a hold, as the mode says."""
 
         def keep() -> None:
-            if not self._step:
+            if not self.step:
                 hold()
 
         def press() -> None:
-            if self._step:
+            if self.step:
                 self._operator.guarded(step)
             else:
                 self._operator.jogging.release()

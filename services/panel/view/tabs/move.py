@@ -20,7 +20,10 @@ SCRUB = 100.0  # parts of the plan's duration
 
 
 class MoveTab:
-    """A slider for each joint, named states, Plan, Execute, and what is known of the plan."""
+    """A slider for each joint, named states, Plan, Execute, and what is known of the plan.
+
+    Here as in each tab the attributes without an underscore are the controls as a person sees them.
+    """
 
     def __init__(self, kit: Kit, world: DrawnWorld) -> None:
         self._kit, self._world, self._operator = kit, world, kit.operator
@@ -28,10 +31,10 @@ class MoveTab:
         self._touched = 0.0  # [s] monotonic, of this browser's last slider
         self._goal_version = self._plan_version = -1
         words = kit.words
-        self._problem = kit.line()
-        self._nearest = kit.button(words("take_nearest"), self._take_nearest, color="orange")
-        self._sliders = {joint.name: self._slider(joint) for joint in self._operator.arm.description.joints}
-        self._tool = ToolFields(kit)
+        self.problem = kit.line()
+        self.nearest = kit.button(words("take_nearest"), self._take_nearest, color="orange")
+        self.sliders = {joint.name: self._slider(joint) for joint in self._operator.arm.description.joints}
+        self.tool = ToolFields(kit)
         self._state_names = tuple(self._operator.arm.states)
         if self._state_names:
             named = kit.gui.add_dropdown(words("named_state"), (words("choose"), *self._state_names))
@@ -41,18 +44,18 @@ class MoveTab:
         kit.button(words("execute"), self._operator.execute, color="green", needs="move")
         kit.button(words("plan_and_execute"), self._operator.plan_and_execute, color="green", needs="move", first=ask)
         kit.reasons(move=words("execute"))
-        self._plan = kit.line()
-        self._play = kit.gui.add_checkbox(words("play"), True)
-        self._scrub = kit.gui.add_slider(words("scrub"), 0.0, SCRUB, 0.5, 0.0)
-        self._scrub.on_update(lambda event: self._show_moment(False) if event.client_id is not None else None)
-        self._play.on_update(lambda event: self._show_moment(self._play.value))
+        self.plan = kit.line()
+        self.play = kit.gui.add_checkbox(words("play"), True)
+        self.scrub = kit.gui.add_slider(words("scrub"), 0.0, SCRUB, 0.5, 0.0)
+        self.scrub.on_update(lambda event: self._show_moment(False) if event.client_id is not None else None)
+        self.play.on_update(lambda event: self._show_moment(self.play.value))
         kit.button(words("goal_is_measured"), self._operator.follow_measured, color="gray")
         by_click = kit.gui.add_checkbox(words("click_goal"), False, hint=words("click_hint"))
         by_click.on_update(lambda event: self._set_by_click(event.target.value))
-        self._live = kit.gui.add_checkbox(words("live"), False, hint=words("live_hint"))
-        self._shown_live = Mirror(self._live)
-        self._live.on_update(lambda event: self._switch_live(event))
-        self._watched = kit.line()
+        self.live = kit.gui.add_checkbox(words("live"), False, hint=words("live_hint"))
+        self._shown_live = Mirror(self.live)
+        self.live.on_update(lambda event: self._switch_live(event))
+        self.watched = kit.line()
         with kit.gui.add_folder(words("how"), expand_by_default=False):
             self._choices()
 
@@ -65,13 +68,13 @@ class MoveTab:
                 self._write_sliders()
         elif goal.source == self._client and time.monotonic() - self._touched > OWN_CHANGE:
             self._write_sliders()
-        self._tool.show(goal)
+        self.tool.show(goal)
         self._show_problem()
         self._show_live()
         if motions.version != self._plan_version or motions.is_moving or motions.is_planning:
             self._plan_version = motions.version
-            set_if_new(self._plan, "content", self._plan_text())
-            for handle in (self._scrub, self._play):
+            set_if_new(self.plan, "content", self._plan_text())
+            for handle in (self.scrub, self.play):
                 set_if_new(handle, "visible", motions.plan is not None)
 
     def _slider(self, joint: Joint) -> viser.GuiSliderHandle[float]:
@@ -90,7 +93,7 @@ class MoveTab:
 
     def _write_sliders(self) -> None:
         for joint in self._operator.arm.description.joints:
-            slider = self._sliders[joint.name]
+            slider = self.sliders[joint.name]
             at = slider_value(joint, self._operator.goal.goal.joints[joint.name])
             if abs(slider.value - at) > STEP[joint.unit] / 2.0:
                 set_if_new(slider, "value", at)
@@ -126,7 +129,7 @@ class MoveTab:
         operator, words = self._operator, self._kit.words
         self._shown_live.show(operator.live.is_on)
         told = (jog_text(operator, words) or note(esc(words("live_hint")))) if operator.live.is_on else ""
-        set_if_new(self._watched, "content", told)
+        set_if_new(self.watched, "content", told)
 
     def _set_by_click(self, is_wanted: bool) -> None:
         """Without a key, for this browser: a finger on a tablet has none."""
@@ -144,9 +147,9 @@ class MoveTab:
     def _show_moment(self, is_playing: bool) -> None:
         plan = self._operator.motions.plan
         if plan is not None:
-            set_if_new(self._play, "value", is_playing)
+            set_if_new(self.play, "value", is_playing)
             self._operator.motions.shows_plan = True
-            self._world.is_playing, self._world.scrubbed = is_playing, self._scrub.value / SCRUB * plan.duration
+            self._world.is_playing, self._world.scrubbed = is_playing, self.scrub.value / SCRUB * plan.duration
 
     def _show_problem(self) -> None:
         """What is wrong with the goal, unless the same is told above the tabs already."""
@@ -158,9 +161,9 @@ class MoveTab:
             content = box(f"<b>{esc(heading)}</b><br>{esc(text)}", "#d9480f")
         elif goal.jumped and goal.problem is None:
             content = box(esc(words("jumped", joints=", ".join(goal.jumped))), "#f59f00")
-        set_if_new(self._problem, "content", content)
+        set_if_new(self.problem, "content", content)
         has_nearest = goal.problem is not None and goal.problem.has_nearest
-        set_if_new(self._nearest, "visible", has_nearest and not is_told)
+        set_if_new(self.nearest, "visible", has_nearest and not is_told)
 
     def _plan_text(self) -> str:
         words, motions = self._kit.words, self._operator.motions

@@ -65,15 +65,15 @@ class NewStep:
     def __init__(self, kit: Kit) -> None:
         self._kit, self._operator = kit, kit.operator
         words, gui = kit.words, kit.gui
-        self._titles = {words(f"step_{kind}"): kind for kind in KINDS}
-        self._kind = gui.add_dropdown(words("step_kind"), tuple(self._titles))
-        self._kind.on_update(lambda event: self.refresh())
-        self._target = gui.add_dropdown(words("target"), (words("none"),))
-        self._through = gui.add_dropdown(words("through"), (words("none"),))
-        self._name = gui.add_dropdown(words("name"), (words("none"),))
-        self._on = gui.add_checkbox(words("on"), True)
-        self._number = gui.add_number(words("number"), 1.0, step=0.1)
-        self._blend = gui.add_number(words("blend_mm"), 0.0, min=0.0, step=1.0)
+        self.titles = {words(f"step_{kind}"): kind for kind in KINDS}
+        self.kind = gui.add_dropdown(words("step_kind"), tuple(self.titles))
+        self.kind.on_update(lambda event: self.refresh())
+        self.target = gui.add_dropdown(words("target"), (words("none"),))
+        self.through = gui.add_dropdown(words("through"), (words("none"),))
+        self.name = gui.add_dropdown(words("name"), (words("none"),))
+        self.on = gui.add_checkbox(words("on"), True)
+        self.number = gui.add_number(words("number"), 1.0, step=0.1)
+        self.blend = gui.add_number(words("blend_mm"), 0.0, min=0.0, step=1.0)
         self._seen: object = None
         self._kind_shown = ""
         self.refresh()
@@ -88,40 +88,38 @@ class NewStep:
         self._seen = seen
         if kind != self._kind_shown:
             self._kind_shown = kind
-            set_if_new(self._number, "value", USUAL.get(kind, 0.0))
+            set_if_new(self.number, "value", USUAL.get(kind, 0.0))
         fields: dict[str, object] = {
-            "target": self._target,
-            "through": self._through,
-            "name": self._name,
-            "on": self._on,
+            "target": self.target,
+            "through": self.through,
+            "name": self.name,
+            "on": self.on,
         }
-        fields |= {"number": self._number, "blend": self._blend}
+        fields |= {"number": self.number, "blend": self.blend}
         for name, handle in fields.items():
             set_if_new(handle, "visible", name in SHOWN[kind])
-        for dropdown in (self._target, self._through):
+        for dropdown in (self.target, self.through):
             _offer(dropdown, targets or (words("none"),))
-        _offer(self._name, self._names(kind) or (words("none"),))
+        _offer(self.name, self._names(kind) or (words("none"),))
+        set_if_new(self.number, "label", words(LABELS[kind] if LABELS.get(kind, "").startswith("number") else "number"))
         set_if_new(
-            self._number, "label", words(LABELS[kind] if LABELS.get(kind, "").startswith("number") else "number")
+            self.name, "label", words(LABELS[kind] if LABELS.get(kind, "").startswith("name") else "name_sensor")
         )
-        set_if_new(
-            self._name, "label", words(LABELS[kind] if LABELS.get(kind, "").startswith("name") else "name_sensor")
-        )
-        set_if_new(self._target, "label", words("name_place" if kind == "pick" else "target"))
-        set_if_new(self._on, "label", words("above_limit" if kind == "wait_for" else "on"))
+        set_if_new(self.target, "label", words("name_place" if kind == "pick" else "target"))
+        set_if_new(self.on, "label", words("above_limit" if kind == "wait_for" else "on"))
 
     def make(self) -> AnyStep:
         """The step."""
-        number, name = float(self._number.value), str(self._name.value)
+        number, name = float(self.number.value), str(self.name.value)
         makers: dict[str, Callable[[], AnyStep]] = {
             "go": lambda: self._with_goal(Go()),
             "line": lambda: self._with_goal(Line(tool_speed=max(0.0, number / 1000.0))),
             "arc": lambda: self._with_goal(Arc(through=self._through_point(), tool_speed=max(0.0, number / 1000.0))),
-            "output": lambda: Output(name=self._known(name), on=self._on.value),
+            "output": lambda: Output(name=self._known(name), on=self.on.value),
             "grip": lambda: Grip(to=number / 1000.0),
-            "pick": lambda: Pick(thing=self._known(name), place=self._known(str(self._target.value))),
+            "pick": lambda: Pick(thing=self._known(name), place=self._known(str(self.target.value))),
             "wait": lambda: Wait(time=number),
-            "wait_for": lambda: WaitFor(sensor=self._known(name), **{"above" if self._on.value else "below": number}),
+            "wait_for": lambda: WaitFor(sensor=self._known(name), **{"above" if self.on.value else "below": number}),
             "speed": lambda: Speed(share=number / 100.0),
             "attach": lambda: Attach(object=self._known(name), touch=self._holders()),
             "detach": lambda: Detach(object=self._known(name)),
@@ -132,7 +130,7 @@ class NewStep:
 
     @property
     def _chosen_kind(self) -> str:
-        return self._titles[str(self._kind.value)]
+        return self.titles[str(self.kind.value)]
 
     def _targets(self, kind: str) -> tuple[str, ...]:
         if kind == "pick":
@@ -155,13 +153,13 @@ class NewStep:
         return ()
 
     def _with_goal(self, step: Go | Line | Arc) -> AnyStep:
-        chosen = self._known(str(self._target.value))
+        chosen = self._known(str(self.target.value))
         goal = {"point" if chosen in self._operator.teaching.points else "state": chosen}
-        return replace(step, **goal, blend=max(0.0, float(self._blend.value)) / 1000.0)
+        return replace(step, **goal, blend=max(0.0, float(self.blend.value)) / 1000.0)
 
     def _through_point(self) -> tuple[float, float, float]:
         """[m] where the tool is at the point that the arc leads through."""
-        chosen, teaching = self._known(str(self._through.value)), self._operator.teaching
+        chosen, teaching = self._known(str(self.through.value)), self._operator.teaching
         joints = teaching.points[chosen].joints if chosen in teaching.points else self._operator.arm.states[chosen]
         return self._operator.arm.fk(joints).position
 

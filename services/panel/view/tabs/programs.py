@@ -35,25 +35,25 @@ class ProgramsTab:
         self._version = -1
         self._files: tuple[str, ...] = ()
         self._paths: dict[str, StepPath] = {}
-        self._file = gui.add_dropdown(words("program"), (words("none"),))
-        self._file.on_update(lambda event: self._open() if event.client_id is not None else None)
-        self._name = gui.add_text(words("name"), self._teaching.program.name)
-        kit.button(words("save"), lambda: self._teaching.save(self._name.value), color="blue")
-        kit.button(words("new_program"), self._new, color="gray")
-        self._state = kit.line()
-        self._list = kit.line()
-        self._step = gui.add_dropdown(words("step"), (words("whole_program"),))
+        self.file = gui.add_dropdown(words("program"), (words("none"),))
+        self.file.on_update(lambda event: self.open() if event.client_id is not None else None)
+        self.name = gui.add_text(words("name"), self._teaching.program.name)
+        kit.button(words("save"), lambda: self._teaching.save(self.name.value), color="blue")
+        kit.button(words("new_program"), self.new, color="gray")
+        self.state = kit.line()
+        self.steps = kit.line()
+        self.step = gui.add_dropdown(words("step"), (words("whole_program"),))
         kit.button(words("check"), self._check, color="blue")
         kit.button(words("run_from"), self._run, color="green", needs="move")
         kit.button(words("one_step"), lambda: self._teaching.step(self._first()), color="teal", needs="move")
-        self._pause = kit.button(words("pause"), self._teaching.pause, color="orange")
-        self._resume = kit.button(words("resume"), self._teaching.resume, color="green")
+        self.pause = kit.button(words("pause"), self._teaching.pause, color="orange")
+        self.resume = kit.button(words("resume"), self._teaching.resume, color="green")
         kit.reasons(move=words("run_from"))
         with gui.add_folder(words("edit")):
-            self._form = NewStep(kit)
+            self.form = NewStep(kit)
             kit.button(words("add_step"), self._add, color="green")
             kit.button(
-                words("change_step"), lambda: self._teaching.change(self._chosen(), self._form.make()), color="gray"
+                words("change_step"), lambda: self._teaching.change(self._chosen(), self.form.make()), color="gray"
             )
             kit.button(words("step_up"), lambda: self._shift(-1), color="gray")
             kit.button(words("step_down"), lambda: self._shift(1), color="gray")
@@ -65,32 +65,32 @@ class ProgramsTab:
     def refresh(self, readings: Readings) -> None:
         """The steps with what their check and the run say of them."""
         teaching, words = self._teaching, self._kit.words
-        self._form.refresh()
+        self.form.refresh()
         version, state = teaching.version, teaching.state  # in this order: what changes meanwhile is shown next time
-        set_if_new(self._pause, "visible", state is not None and state.status is RunStatus.RUNNING)
-        set_if_new(self._resume, "visible", state is not None and state.status is RunStatus.PAUSED)
+        set_if_new(self.pause, "visible", state is not None and state.status is RunStatus.RUNNING)
+        set_if_new(self.resume, "visible", state is not None and state.status is RunStatus.PAUSED)
         files = tuple(teaching.programs)  # also those that an editor or the command line has written
         if (version, files) == (self._version, self._files):
             return
         self._version, self._files = version, files
-        if tuple(self._file.options) != (words("none"), *files):
-            self._file.options = (words("none"), *files)
+        if tuple(self.file.options) != (words("none"), *files):
+            self.file.options = (words("none"), *files)
         self._show_open()
         self._show_steps()
-        set_if_new(self._state, "content", self._state_text(state))
-        set_if_new(self._list, "content", self._list_text(state))
+        set_if_new(self.state, "content", self._state_text(state))
+        set_if_new(self.steps, "content", self._list_text(state))
 
     def _show_steps(self) -> None:
         """The list to choose from; the chosen place stays where it can."""
-        chosen = self._paths.get(str(self._step.value), ())
+        chosen = self._paths.get(str(self.step.value), ())
         steps = self._teaching.program.all_steps()
         self._paths = {self._kit.words("whole_program"): ()}
         self._paths |= {f"{path_text(path)}  {step_text(step, self._kit.words)}"[:60]: path for path, step in steps}
         options = tuple(self._paths)
-        if tuple(self._step.options) != options:
-            self._step.options = options
+        if tuple(self.step.options) != options:
+            self.step.options = options
         kept = next((text for text, path in self._paths.items() if path == chosen), options[0])
-        set_if_new(self._step, "value", kept)
+        set_if_new(self.step, "value", kept)
 
     def _state_text(self, state: RunState | None) -> str:
         teaching, words = self._teaching, self._kit.words
@@ -156,20 +156,22 @@ class ProgramsTab:
             f'justify-content:space-between"><span>{path_text(path)}&nbsp; {esc(text)}</span><span>{about}</span></div>'
         )
 
-    def _open(self) -> None:
-        chosen = str(self._file.value)
+    def open(self) -> None:
+        """The chosen program, once a person has said what becomes of unsaved steps."""
+        chosen = str(self.file.value)
         if chosen in self._teaching.programs and chosen != self._teaching.program.name:
             self._leave(lambda: self._teaching.open(chosen))
         self._show_open()
-        set_if_new(self._name, "value", self._teaching.program.name)
+        set_if_new(self.name, "value", self._teaching.program.name)
 
     def _show_open(self) -> None:
         """Chooses the program that is open: one that could not be opened is not."""
         name = self._teaching.program.name
-        set_if_new(self._file, "value", name if name in self._teaching.programs else self._kit.words("none"))
+        set_if_new(self.file, "value", name if name in self._teaching.programs else self._kit.words("none"))
 
-    def _new(self) -> None:
-        name = str(self._name.value)
+    def new(self) -> None:
+        """An empty one with the name in the field; asks as `open` does."""
+        name = str(self.name.value)
         self._leave(lambda: self._teaching.new(name))
 
     def _leave(self, action: Callable[[], object]) -> None:
@@ -178,7 +180,7 @@ class ProgramsTab:
 
         def go_on() -> None:
             if self._operator.guarded(action):
-                set_if_new(self._name, "value", teaching.program.name)
+                set_if_new(self.name, "value", teaching.program.name)
 
         if teaching.is_saved or not teaching.program.steps:
             return go_on()
@@ -208,7 +210,7 @@ class ProgramsTab:
 
     def _first(self) -> StepPath:
         """The chosen step; empty for the program's beginning."""
-        return self._paths.get(str(self._step.value), ())
+        return self._paths.get(str(self.step.value), ())
 
     def _check(self) -> None:
         self._teaching.plan_all()
@@ -219,7 +221,7 @@ class ProgramsTab:
 
     def _add(self) -> None:
         after = self._first()
-        place = self._teaching.insert(self._form.make(), after)
+        place = self._teaching.insert(self.form.make(), after)
         self._choose(place if after else ())
 
     def _shift(self, by: int) -> None:
@@ -229,7 +231,7 @@ class ProgramsTab:
         self._show_steps()
         text = next((text for text, each in self._paths.items() if each == path), None)
         if text is not None:
-            set_if_new(self._step, "value", text)
+            set_if_new(self.step, "value", text)
 
     def _export(self) -> None:
         text = export_script(self._teaching.program, self._teaching.points, self._teaching.programs)

@@ -30,29 +30,29 @@ class SceneTab:
         words, gui, scene = kit.words, kit.gui, kit.operator.arm.scene
         self._names: tuple[str, ...] = ()
         self._shown: SceneObject | None = None
-        self._gizmo: viser.TransformControlsHandle | None = None
-        self._chosen = gui.add_dropdown(words("object"), (words("none"),))
-        self._chosen.on_update(lambda event: self._choose() if event.client_id is not None else None)
-        self._facts = kit.line()
-        self._size = gui.add_vector3(words("size_mm"), SIZE, min=(0.1, 0.1, 0.1), step=1.0)
-        self._at = gui.add_vector3(words("at_mm"), (250.0, 150.0, 20.0), step=1.0)
+        self.gizmo: viser.TransformControlsHandle | None = None
+        self.chosen = gui.add_dropdown(words("object"), (words("none"),))
+        self.chosen.on_update(lambda event: self._choose() if event.client_id is not None else None)
+        self.facts = kit.line()
+        self.size = gui.add_vector3(words("size_mm"), SIZE, min=(0.1, 0.1, 0.1), step=1.0)
+        self.at = gui.add_vector3(words("at_mm"), (250.0, 150.0, 20.0), step=1.0)
         kit.button(words("apply"), self._apply, color="blue")
         kit.button(words("attach"), self._attach, color="gray")
         kit.button(words("detach"), lambda: self._with_chosen(scene.detach), color="gray")
         kit.button(words("remove"), lambda: self._with_chosen(scene.remove), color="orange")
         with gui.add_folder(words("new_object")):
-            self._name = gui.add_text(words("name"), "box_1")
-            self._shape = gui.add_dropdown(words("shape"), tuple(words(shape) for shape in SHAPES))
+            self.name = gui.add_text(words("name"), "box_1")
+            self.shape = gui.add_dropdown(words("shape"), tuple(words(shape) for shape in SHAPES))
             kit.button(words("add"), self._add, color="green")
-            self._unit = gui.add_dropdown(words("mesh_unit"), ("mm", "m"))
+            self.unit = gui.add_dropdown(words("mesh_unit"), ("mm", "m"))
             upload = gui.add_upload_button(words("upload"), mime_type=".stl")
             upload.on_upload(lambda event: self._upload(event.target.value))
         with gui.add_folder(words("file"), expand_by_default=False):
-            self._saved = gui.add_dropdown(words("saved_scenes"), (words("choose"), *saved_scenes()))
-            self._saved.on_update(lambda event: self._take_name() if event.client_id is not None else None)
-            self._file = gui.add_text(words("file_name"), "cell.json")
-            kit.button(words("save"), self._save, color="gray")
-            kit.button(words("load"), lambda: scene.load(self._path()), color="gray")
+            self.saved = gui.add_dropdown(words("saved_scenes"), (words("choose"), *saved_scenes()))
+            self.saved.on_update(lambda event: self.take_name() if event.client_id is not None else None)
+            self.file = gui.add_text(words("file_name"), "cell.json")
+            kit.button(words("save"), self.save, color="gray")
+            kit.button(words("load"), lambda: scene.load(self.path()), color="gray")
             kit.button(words("clear"), scene.clear, color="red")
 
     def refresh(self, readings: Readings) -> None:
@@ -61,34 +61,34 @@ class SceneTab:
         names = tuple(objects)
         if names != self._names:
             self._names = names
-            chosen = self._chosen.value if self._chosen.value in names else self._kit.words("none")
-            self._chosen.options = (self._kit.words("none"), *names)
-            set_if_new(self._chosen, "value", chosen)
-        item = objects.get(self._chosen.value)
+            chosen = self.chosen.value if self.chosen.value in names else self._kit.words("none")
+            self.chosen.options = (self._kit.words("none"), *names)
+            set_if_new(self.chosen, "value", chosen)
+        item = objects.get(self.chosen.value)
         if item != self._shown:
             self._shown = item
             self._show(item)
 
     def close(self) -> None:
         """Takes its gizmo away."""
-        if self._gizmo is not None:
-            self._gizmo.remove()
-            self._gizmo = None
+        if self.gizmo is not None:
+            self.gizmo.remove()
+            self.gizmo = None
 
     def _choose(self) -> None:
         self._shown = None
 
     def _show(self, item: SceneObject | None) -> None:
         self.close()
-        set_if_new(self._facts, "content", "" if item is None else note(esc(self._about(item))))
+        set_if_new(self.facts, "content", "" if item is None else note(esc(self._about(item))))
         if item is None:
             return
-        set_if_new(self._size, "value", _size_of(item.shape) or SIZE)
+        set_if_new(self.size, "value", _size_of(item.shape) or SIZE)
         if len(item.pose.translation) == 3:
             x, y, z = (1000.0 * value for value in item.pose.translation)
-            set_if_new(self._at, "value", (x, y, z))
+            set_if_new(self.at, "value", (x, y, z))
             if not item.attached:
-                self._gizmo = self._make_gizmo(item)
+                self.gizmo = self._make_gizmo(item)
 
     def _about(self, item: SceneObject) -> str:
         carried = self._kit.words("carried_by", link=item.frame) if item.attached else self._kit.words("stands")
@@ -117,9 +117,9 @@ class SceneTab:
         action(name)
 
     def _require_chosen(self) -> str:
-        if self._chosen.value not in self._names:
+        if self.chosen.value not in self._names:
             raise gemelo.BadArgument(self._kit.words("choose_object"))
-        return str(self._chosen.value)
+        return str(self.chosen.value)
 
     def _attach(self) -> None:
         """To the tool, whose neighbours it may touch."""
@@ -130,18 +130,18 @@ class SceneTab:
     def _apply(self) -> None:
         name, scene = self._require_chosen(), self._operator.arm.scene
         item = scene.objects[name]
-        shape = _resized(item.shape, self._size.value)
-        at = tuple(value / 1000.0 for value in self._at.value)  # read before the fields are written for the new size
+        shape = _resized(item.shape, self.size.value)
+        at = tuple(value / 1000.0 for value in self.at.value)  # read before the fields are written for the new size
         if shape != item.shape:
             scene.resize(name, shape)
         if at != item.pose.translation and not item.attached:
             scene.move(name, at, item.pose.rotation or Transform().rotation)
 
     def _add(self) -> None:
-        kind = SHAPES[[self._kit.words(shape) for shape in SHAPES].index(self._shape.value)]
-        scene, (x, y, z) = self._operator.arm.scene, (value / 1000.0 for value in self._size.value)
-        at = tuple(value / 1000.0 for value in self._at.value)
-        name = self._free_name(self._name.value.strip() or kind)
+        kind = SHAPES[[self._kit.words(shape) for shape in SHAPES].index(self.shape.value)]
+        scene, (x, y, z) = self._operator.arm.scene, (value / 1000.0 for value in self.size.value)
+        at = tuple(value / 1000.0 for value in self.at.value)
+        name = self._free_name(self.name.value.strip() or kind)
         match kind:
             case "box":
                 scene.add_box(name, (x, y, z), at)
@@ -152,9 +152,9 @@ class SceneTab:
         self._added(name)
 
     def _added(self, name: str) -> None:
-        self._chosen.options = (self._kit.words("none"), *self._names, name)
+        self.chosen.options = (self._kit.words("none"), *self._names, name)
         self._names = (*self._names, name)
-        set_if_new(self._chosen, "value", name)
+        set_if_new(self.chosen, "value", name)
 
     def _free_name(self, name: str) -> str:
         """The name, or the same with a number: adding never replaces without a word."""
@@ -173,23 +173,25 @@ class SceneTab:
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "mesh.stl"
                 path.write_bytes(file.content)
-                scale = 0.001 if self._unit.value == "mm" else 1.0
-                self._operator.arm.scene.add_mesh(name, path, tuple(v / 1000.0 for v in self._at.value), scale=scale)
+                scale = 0.001 if self.unit.value == "mm" else 1.0
+                self._operator.arm.scene.add_mesh(name, path, tuple(v / 1000.0 for v in self.at.value), scale=scale)
             self._added(name)
 
         self._operator.guarded(add)
 
-    def _take_name(self) -> None:
-        if self._saved.value != self._kit.words("choose"):
-            set_if_new(self._file, "value", self._saved.value)
+    def take_name(self) -> None:
+        """Of the saved scene that is chosen, into the field."""
+        if self.saved.value != self._kit.words("choose"):
+            set_if_new(self.file, "value", self.saved.value)
 
-    def _save(self) -> None:
-        self._operator.arm.scene.save(self._path())
-        self._saved.options = (self._kit.words("choose"), *saved_scenes())
+    def save(self) -> None:
+        """The scene into the file that the field names."""
+        self._operator.arm.scene.save(self.path())
+        self.saved.options = (self._kit.words("choose"), *saved_scenes())
 
-    def _path(self) -> Path:
+    def path(self) -> Path:
         """A file of the folder `scenes`, by its name alone."""
-        name = self._file.value.strip()
+        name = self.file.value.strip()
         if not name or Path(name).name != name or "\0" in name or name.startswith("."):
             raise gemelo.BadArgument(self._kit.words("bad_file_name", name=name))
         FOLDER.mkdir(exist_ok=True)

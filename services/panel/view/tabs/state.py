@@ -21,7 +21,7 @@ class StateTab:
 
     def __init__(self, kit: Kit) -> None:
         self._kit, self._operator = kit, kit.operator
-        self._joints, self._tool, self._log = kit.line(), kit.line(), kit.line()
+        self.joints, self.tool, self.log = kit.line(), kit.line(), kit.line()
 
     def refresh(self, readings: Readings, browser: Browser | None, lag: float, tool: tuple[float, ...]) -> None:
         """`lag` [s] of this browser; `tool`: x, y, z [m] and quaternion of the measured tool."""
@@ -38,10 +38,10 @@ class StateTab:
             for joint in self._operator.arm.description.joints
             if joint.name in readings.joints
         ]
-        set_if_new(self._joints, "content", table(rows, header) + self._steps(readings))
-        set_if_new(self._tool, "content", table(self._numbers(readings, browser, lag, tool)))
+        set_if_new(self.joints, "content", table(rows, header) + self._steps(readings))
+        set_if_new(self.tool, "content", table(self._numbers(readings, browser, lag, tool)))
         lines = [f"{esc(line.node)}: {esc(in_degrees(line.text))}" for line in self._operator.bus.log[-LOG_LINES:]]
-        set_if_new(self._log, "content", note("<br>".join(lines)))
+        set_if_new(self.log, "content", note("<br>".join(lines)))
 
     def _steps(self, readings: Readings) -> str:
         """Executed steps beside those of the path, to the half step, and of a virtual device what its shafts made."""

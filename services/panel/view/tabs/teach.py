@@ -28,19 +28,17 @@ class TeachTab:
         self._version = -1
         self._names: tuple[str, ...] = ()
         self._shown = ""
-        self._name = gui.add_text(words("name"), self._free_name())
-        kit.button(words("remember"), self._remember, color="green")
-        self._chosen = gui.add_dropdown(words("point"), (words("none"),))
-        self._chosen.on_update(lambda event: self._show())
-        self._picture = gui.add_image(BLANK, visible=False)
-        self._facts = kit.line()
+        self.name = gui.add_text(words("name"), self._free_name())
+        kit.button(words("remember"), self.remember, color="green")
+        self.chosen = gui.add_dropdown(words("point"), (words("none"),))
+        self.chosen.on_update(lambda event: self._show())
+        self.picture = gui.add_image(BLANK, visible=False)
+        self.facts = kit.line()
         kit.button(words("go_there"), self._go, color="green", needs="move")
         kit.button(words("as_goal"), self._as_goal, color="blue")
         kit.button(words("overwrite"), lambda: self._take(overwrite=self._require()), color="orange")
-        kit.button(
-            words("rename"), lambda: self._teaching.rename_point(self._require(), self._name.value), color="gray"
-        )
-        kit.button(words("remove"), self._remove, color="red")
+        kit.button(words("rename"), lambda: self._teaching.rename_point(self._require(), self.name.value), color="gray")
+        kit.button(words("remove"), self.remove, color="red")
         kit.reasons(move=words("go_there"))
 
     def refresh(self, readings: Readings) -> None:
@@ -55,17 +53,18 @@ class TeachTab:
         names = tuple(self._teaching.points)
         if names != self._names:
             fresh = [name for name in names if name not in self._names]
-            chosen = fresh[-1] if fresh and chooses_new else self._chosen.value
+            chosen = fresh[-1] if fresh and chooses_new else self.chosen.value
             self._names = names
-            self._chosen.options = (self._kit.words("none"), *names)
-            set_if_new(self._chosen, "value", chosen if chosen in names else self._kit.words("none"))
+            self.chosen.options = (self._kit.words("none"), *names)
+            set_if_new(self.chosen, "value", chosen if chosen in names else self._kit.words("none"))
         self._shown = ""
         self._show()
 
-    def _remember(self) -> None:
+    def remember(self) -> None:
+        """Where the arm is now, under the name in the field, and chooses it."""
         self._take()
         self._list(chooses_new=True)  # at once: what is pressed next is meant for it
-        set_if_new(self._name, "value", self._free_name())
+        set_if_new(self.name, "value", self._free_name())
 
     def _free_name(self) -> str:
         """The first that no point has."""
@@ -73,7 +72,7 @@ class TeachTab:
         return next(name for name in names if name not in self._teaching.points)
 
     def _take(self, overwrite: str = "") -> None:
-        self._teaching.remember(overwrite or self._name.value, self._drawn, overwrite=bool(overwrite))
+        self._teaching.remember(overwrite or self.name.value, self._drawn, overwrite=bool(overwrite))
 
     def _drawn(self) -> bytes | None:
         """What this browser sees, as JPEG; None where it does not draw in time."""
@@ -86,12 +85,12 @@ class TeachTab:
         return file.getvalue()
 
     def _require(self) -> str:
-        if self._chosen.value not in self._names:
+        if self.chosen.value not in self._names:
             raise gemelo.BadArgument(self._kit.words("choose_point"))
-        return str(self._chosen.value)
+        return str(self.chosen.value)
 
-    def _remove(self) -> None:
-        """Asks first: what is forgotten cannot be had back."""
+    def remove(self) -> None:
+        """The chosen point; asks first: what is forgotten cannot be had back."""
         name, words = self._require(), self._kit.words
         with self._kit.gui.add_modal(words("remove")) as modal:
             self._kit.line(note(esc(words("remove_question", name=name))))
@@ -113,7 +112,7 @@ class TeachTab:
 
     def _show(self) -> None:
         """The joint values and the picture of the chosen point."""
-        name = str(self._chosen.value)
+        name = str(self.chosen.value)
         if name == self._shown:
             return
         self._shown = name
@@ -121,12 +120,12 @@ class TeachTab:
         picture = point.picture if point is not None else None
         is_there = picture is not None and picture.is_file()
         if picture is not None and is_there:
-            self._picture.image = np.asarray(imageio.imread(picture))
-        set_if_new(self._picture, "visible", is_there)
+            self.picture.image = np.asarray(imageio.imread(picture))
+        set_if_new(self.picture, "visible", is_there)
         joints = self._operator.arm.description.joints
         rows = [(esc(joint.name), esc(text_of(joint, point.joints[joint.name]))) for joint in joints] if point else []
         about = table(rows) if rows else note(esc(self._kit.words("no_points"))) if not self._names else ""
         error = self._teaching.points_error
         if error is not None:
             about = box(esc(self._kit.words.problem(problem_of(error))[1]), "#e03131")
-        set_if_new(self._facts, "content", about)
+        set_if_new(self.facts, "content", about)
