@@ -62,7 +62,7 @@ class Execution:
     ) -> None:
         self._arm, self._legs, self._points, self._controls, self._on_leg = arm, legs, points, controls, on_leg
         self._queue: deque[Leg] = deque()
-        self._next: Prepared | None = None
+        self.following: Prepared | None = None  # the next leg, with its motion once that is handed over
         self._motion: Motion | None = None
         self.is_starting = False  # True while a motion is handed over: the arm may move, and `is_moving` not know it
         self.leg: Leg | None = None  # that is carried out, or was the last
@@ -75,7 +75,7 @@ class Execution:
 
     def cancel(self) -> None:
         """The arm decelerates; from any thread."""
-        for motion in (self._next.motion if self._next is not None else None, self._motion):
+        for motion in (self.following.motion if self.following is not None else None, self._motion):
             if motion is not None and not motion.is_over:
                 motion.cancel()
 
@@ -100,7 +100,7 @@ class Execution:
         self._tell(None)
 
     def _pause_if_asked(self, leg: Leg) -> None:
-        handed_over = self._next is not None and self._next.leg is leg and self._next.motion is not None
+        handed_over = self.following is not None and self.following.leg is leg and self.following.motion is not None
         if handed_over or not self._controls.wants_pause:
             return
         self._on_leg(leg, self._done, self._planned, "paused before this step")
@@ -139,7 +139,7 @@ class Execution:
             self._arm.wait_for(self._controls.stop.is_set, SENSOR_PERIOD)
 
     def _move(self, leg: Leg) -> None:
-        prepared, self._next = self._next, None
+        prepared, self.following = self.following, None
         if prepared is None or prepared.leg is not leg:
             prepared = Prepared(leg)
         self.is_starting = prepared.motion is not None
@@ -210,10 +210,10 @@ class Execution:
         if leg is None or self._controls.stop.is_set():
             return None
         try:
-            self._next = Prepared(leg, self._plan(leg, motion.plan.end))
+            self.following = Prepared(leg, self._plan(leg, motion.plan.end))
         except Error:
             return None  # it is planned once more when its turn comes, and refused then if it must be
-        return self._next if self._peek(0) is leg else None
+        return self.following if self._peek(0) is leg else None
 
     def _plan(self, leg: Leg, start: Mapping[str, float] | None) -> Plan:
         plan = plan_leg(self._arm, leg, self._points, start)

@@ -77,7 +77,7 @@ class ProgramRun:
         self._lock = threading.RLock()
         self._state = RunState(program.name)
         self._controls = Controls()
-        self._execution: Execution | None = None
+        self.execution: Execution | None = None  # of the newest start
         self._thread: threading.Thread | None = None
         self._stops = 0
 
@@ -100,11 +100,11 @@ class ProgramRun:
             programs = called_programs(self.program, self._programs)
             legs = legs_of(self.program, programs, first)
             self._controls = Controls(pauses_after_one=one_step)
-            self._execution = Execution(self._arm, legs, dict(self._points), self._controls, self._on_leg)
+            self.execution = Execution(self._arm, legs, dict(self._points), self._controls, self._on_leg)
             if stops != self._stops:
                 self._controls.stop.set()
             self._put(RunState(self.program.name, RunStatus.RUNNING, started_at=time.time()))
-            self._thread = threading.Thread(target=self._run, args=(self._execution,), name="program", daemon=True)
+            self._thread = threading.Thread(target=self._run, args=(self.execution,), name="program", daemon=True)
             self._thread.start()
 
     def pause(self) -> None:
@@ -118,7 +118,7 @@ class ProgramRun:
         """Pauses at once: the arm decelerates on its path and stands there until `resume` or `stop`."""
         with self._lock:
             self._require(RunStatus.RUNNING)
-            execution = self._execution
+            execution = self.execution
             if execution is None or not (execution.is_moving or execution.is_starting):
                 return self.pause()
             was_starting = execution.is_starting
@@ -146,8 +146,8 @@ class ProgramRun:
         """The arm decelerates on its path, and the run is over; returns at once, `wait` when it rests."""
         self._stops += 1  # without the lock: a stop waits for nobody's answer
         self._controls.stop.set()
-        if self._execution is not None:
-            self._execution.cancel()
+        if self.execution is not None:
+            self.execution.cancel()
         self._arm.wake()
 
     def wait(self, timeout: float | None = None) -> RunState:

@@ -26,7 +26,7 @@ class ImageReader:
         self._source, self._wake = source, wake
         self._lock = threading.Lock()
         self._faults: list[CameraFault] = []
-        self._frame: EncodedImage | None = None
+        self.frame: EncodedImage | None = None  # the newest that nobody has taken
         self._stop, self._anew = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
@@ -47,9 +47,9 @@ class ImageReader:
         """Faults since the last call, then the newest image that came after them."""
         with self._lock:
             events: list[Event] = [*self._faults]
-            if self._frame is not None:
-                events.append(self._frame)
-            self._faults, self._frame = [], None
+            if self.frame is not None:
+                events.append(self.frame)
+            self._faults, self.frame = [], None
         return events
 
     def _run(self) -> None:
@@ -79,11 +79,11 @@ class ImageReader:
 
     def _put(self, event: Event) -> None:
         with self._lock:
-            is_first = self._frame is None and not self._faults
+            is_first = self.frame is None and not self._faults
             if isinstance(event, CameraFault):
                 self._faults.append(event)
-                self._frame = None  # of before the fault
+                self.frame = None  # of before the fault
             else:
-                self._frame = event
+                self.frame = event
         if is_first:
             self._wake()

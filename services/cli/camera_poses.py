@@ -136,7 +136,7 @@ def measure(arm: Arm, eye: Eye, task: Task, is_agreed: bool) -> MountFit:
         belief, chosen = _choose(arm, task, belief, start)
         _show(arm, task, chosen)
         confirm("The arm goes there now, and looks from each. Is its way free?", is_agreed)
-        views, numbers = _drive(arm, eye, task, chosen.joints)
+        views, numbers = drive(arm, eye, task, chosen.joints)
         arm.move(joints=_named(arm, start), speed=SPEED)
     return solved([first, *views], [0, *numbers], belief)
 
@@ -231,8 +231,9 @@ def _rigid_links(arm: Description, link: str) -> list[str]:
     return sorted(found)
 
 
-def _drive(arm: Arm, eye: Eye, task: Task, poses: Sequence[Array]) -> tuple[list[BoardView], list[int]]:
-    """What is seen from each pose, and which poses those are, counted from 1; the others are named."""
+def drive(arm: Arm, eye: Eye, task: Task, poses: Sequence[Array]) -> tuple[list[BoardView], list[int]]:
+    """What is seen from each pose, joint values (n,) [rad] or [m], and which poses those are, counted from 1; the
+    others are named."""
     link_at = link_pose(arm.description, task.link)
     views: list[BoardView] = []
     numbers: list[int] = []

@@ -69,7 +69,7 @@ def sensors(session: CommandSession, as_json: bool) -> ExitCode:
 
 def text_of(view: DeviceSnapshot) -> str:
     """The snapshot as one screen of text."""
-    lines = [f"device   {_who(view.status)}", f"config   {view.configuration}"]
+    lines = [f"device   {who_it_is(view.status)}", f"config   {view.configuration}"]
     if view.state is None:
         return "\n".join(lines)
     lines += [f"mode     {_mode(view)}", *_fault(view), f"drivers  {_drivers(view.state)}"]
@@ -85,7 +85,8 @@ def reading_text(reading: Reading) -> str:
     return f"{reading.name} {value} {reading.unit}".rstrip()
 
 
-def _who(status: DeviceStatus) -> str:
+def who_it_is(status: DeviceStatus) -> str:
+    """The device, how it is connected, and its firmware."""
     name = status.device or "unknown"
     if not status.online:
         return f"{name}: OFFLINE: {status.reason or 'no reason is known'}"

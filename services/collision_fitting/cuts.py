@@ -69,7 +69,7 @@ def best_cut(part: MeshPart) -> list[MeshPart] | None:
     counts as well.
     """
     cuts = [*_between_bodies(part), *_planes(part)]
-    whole = _outside(part, _some(part.places), part.planes)
+    whole = outside(part, _some(part.places), part.planes)
     least = min((cut.outside.beyond for cut in cuts), default=0.0)
     if least <= (1.0 - PROGRESS) * whole.beyond:
         cuts.sort(key=lambda cut: cut.outside.beyond)
@@ -93,7 +93,7 @@ def _between_bodies(part: MeshPart) -> Iterator[_Cut]:
     masks.sort(key=lambda mask: sum(_boxes(low[side].min(axis=0), high[side].max(axis=0)) for side in (mask, ~mask)))
     for mask in masks[:CUTS]:
         both = [_some(part.places[side[mine]]) for side in (mask, ~mask)]
-        yield _Cut(_sum(_outside(part, places, part.planes) for places in both), bodies=bodies[mask])
+        yield _Cut(_sum(outside(part, places, part.planes) for places in both), bodies=bodies[mask])
 
 
 def _planes(part: MeshPart) -> Iterator[_Cut]:
@@ -135,7 +135,7 @@ def _cut_by(part: MeshPart, planes: Array, rough: int = 1, enough: float = np.in
     around = np.vstack((part.planes, planes))
     looked_at: list[Outside] = []
     for side in sides:
-        looked_at.append(_outside(part, side, around, rough))
+        looked_at.append(outside(part, side, around, rough))
         if sum(each.beyond for each in looked_at) > enough:
             break
     return _Cut(_sum(looked_at), planes)
@@ -146,7 +146,7 @@ def _sum(several: Iterable[Outside]) -> Outside:
     return Outside(float(beyond), float(held))
 
 
-def _outside(part: MeshPart, places: Array, planes: Array, rough: int = 1) -> Outside:
+def outside(part: MeshPart, places: Array, planes: Array, rough: int = 1) -> Outside:
     """Of the hull of places (n, 3) [m] of the part, without what is on one of the planes (m, 4), where another part
     goes on."""
     try:

@@ -31,7 +31,7 @@ MOST = 40  # shapes of a link
 # forked one has them.
 ALONE = {"spawn": 8.0, "fork": 0.5}
 
-_Wanted = tuple[str, TriangleMesh, float, int]  # what `_fit` is given
+WantedFit = tuple[str, TriangleMesh, float, int]  # what `fit_link` is given
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def fit_links(
     drawn = {name: mesh for name, mesh in meshes.items() if mesh is not None}
     fits = []
     wanted_fits = [(name, mesh, usual_bound(mesh) if within is None else within, most) for name, mesh in drawn.items()]
-    for fit, seconds in _on_all_cores(wanted_fits):
+    for fit, seconds in fit_on_all_cores(wanted_fits):
         fits.append(fit)
         place = f'link "{fit.link}" ({len(fits)} of {len(drawn)}), {len(fit.mesh.faces)} triangles'
         p95, worst = 1000.0 * fit.excess.p95, 1000.0 * fit.excess.worst
@@ -87,9 +87,9 @@ def fit_links(
     return fits
 
 
-def _on_all_cores(wanted: Sequence[_Wanted]) -> Iterator[tuple[LinkFit, float]]:
+def fit_on_all_cores(wanted: Sequence[WantedFit]) -> Iterator[tuple[LinkFit, float]]:
     """Each fit with how long it took [s], in their order; in processes of their own once they have taken `ALONE`."""
-    began, number, method = time.process_time(), 0, _start_method()
+    began, number, method = time.process_time(), 0, start_method()
     while number < len(wanted) and time.process_time() < began + ALONE[method]:
         yield _timed_fit(wanted[number])
         number += 1
@@ -99,15 +99,15 @@ def _on_all_cores(wanted: Sequence[_Wanted]) -> Iterator[tuple[LinkFit, float]]:
             yield from others.map(_timed_fit, wanted[number:])
 
 
-def _start_method() -> str:
+def start_method() -> str:
     """Forked only as on the command line: what other threads, also Zenoh's own, have locked stays so in a fork."""
     is_alone = threading.active_count() == 1 and "zenoh" not in sys.modules
     return "fork" if is_alone and sys.platform == "linux" else "spawn"
 
 
-def _timed_fit(wanted: _Wanted) -> tuple[LinkFit, float]:
+def _timed_fit(wanted: WantedFit) -> tuple[LinkFit, float]:
     began = time.monotonic()
-    return _fit(*wanted), time.monotonic() - began
+    return fit_link(*wanted), time.monotonic() - began
 
 
 def usual_bound(mesh: TriangleMesh) -> float:
@@ -115,7 +115,8 @@ def usual_bound(mesh: TriangleMesh) -> float:
     return max(WITHIN, WITHIN_SHARE * float(np.ptp(mesh.vertices, axis=0).max()))
 
 
-def _fit(link: str, mesh: TriangleMesh, within: float, most: int) -> LinkFit:
+def fit_link(link: str, mesh: TriangleMesh, within: float, most: int) -> LinkFit:
+    """`most` shapes at the most around the mesh of a link, to within so many [m]."""
     surface = MeshSurface(mesh)
     shapes = tuple(shapes_around(surface, within, most))
     return LinkFit(link, mesh, shapes, within, excess_of(shapes, surface, within))

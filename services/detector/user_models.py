@@ -86,7 +86,7 @@ class UserModel:
 
     def look(self, image: ColourImage, threshold: float) -> list[Found]:
         """What is in `image` (h, w, 3; red first) with at least that score; raises `BadModel`."""
-        return _without_doubles(*self._run(image), threshold)
+        return without_doubles(*self._run(image), threshold)
 
     def _run(self, image: ColourImage) -> tuple[Array, Array]:
         """(n, 4) sides [px of the image], and (n, classes) scores."""
@@ -178,7 +178,7 @@ def standing(found: Found, model: CameraModel, camera_from_plane: Array, size: S
     turns = TURNS[:1] if abs(size[0] - size[1]) < 1e-3 * max(size) else TURNS
     fits = [_fit(found.sides, float(turn), model, camera_from_plane, size) for turn in turns]
     error, values, slope = min(fits, key=lambda each: each[0])
-    sides = _projected(values, model, camera_from_plane, size)
+    sides = projected_box(values, model, camera_from_plane, size)
     shares = (found.sides[2:] - found.sides[:2]) / (sides[2:] - sides[:2])
     if not np.isfinite(values).all() or shares.min() < LIKE_SIZE[0] or shares.max() > LIKE_SIZE[1]:
         return None
@@ -197,18 +197,19 @@ def _fit(
     values = np.array([seed[0], seed[1], turn])
     slope = np.zeros((4, 2))
     for _ in range(ROUNDS):
-        here = _projected(values, model, camera_from_plane, size)
+        here = projected_box(values, model, camera_from_plane, size)
         for axis in range(2):
             ahead = values.copy()
             ahead[axis] += NUDGE
-            slope[:, axis] = (_projected(ahead, model, camera_from_plane, size) - here) / NUDGE
+            slope[:, axis] = (projected_box(ahead, model, camera_from_plane, size) - here) / NUDGE
         values[:2] += np.linalg.lstsq(slope, sides - here, rcond=None)[0]
-    off = sides - _projected(values, model, camera_from_plane, size)
+    off = sides - projected_box(values, model, camera_from_plane, size)
     return float(np.sqrt(np.mean(off**2))), values, slope
 
 
-def _projected(values: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Array:
-    """(4,) [px] the box in the image around the thing."""
+def projected_box(values: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Array:
+    """(4,) [px] left, upper, right and lower side of the box in the image around a thing of `size` [m], whose `values`
+    are x and y [m] on the plane and yaw [rad]; `camera_from_plane` is (4, 4)."""
     pixels = project_box(values, model, camera_from_plane, size)
     return np.concatenate([pixels.min(axis=0), pixels.max(axis=0)])
 
@@ -218,7 +219,9 @@ def _sides(boxes: Array) -> Array:
     return np.column_stack([boxes[:, :2] - boxes[:, 2:] / 2.0, boxes[:, :2] + boxes[:, 2:] / 2.0])
 
 
-def _without_doubles(sides: Array, scores: Array, threshold: float) -> list[Found]:
+def without_doubles(sides: Array, scores: Array, threshold: float) -> list[Found]:
+    """Of boxes with `sides` (n, 4) [px] and `scores` (n, labels), 0 to 1, those that reach the threshold, each thing
+    once."""
     labels = scores.argmax(axis=1)
     best = scores[np.arange(len(scores)), labels]
     found = []

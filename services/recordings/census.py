@@ -25,7 +25,7 @@ MAX_NODES = 256  # that are asked; more would be no robot's
 
 
 @dataclass
-class _Asked:
+class Asked:
     """One node that is being asked, until all three answers are there."""
 
     name: str
@@ -62,7 +62,7 @@ class Census:
             return
         if is_new or now - self._asked_at[message.node] > PERIOD:
             self._asked_at[message.node], self._started[message.node] = now, message.started
-            self._ask(_Asked(message.node, self._node.now()))
+            self.ask(Asked(message.node, self._node.now()))
 
     def _has_place(self, now: float) -> bool:
         """True if one more node can be asked; those of commands that have ended long ago make place."""
@@ -72,11 +72,12 @@ class Census:
                 self._known.pop(name, None)
         return len(self._asked_at) < MAX_NODES
 
-    def _ask(self, asked: _Asked) -> None:
+    def ask(self, asked: Asked) -> None:
+        """All that is to be known of a node; its answers come later."""
         for request in (info_request, interfaces_request, parameters_request):  # the first one also for its clock
             self._ask_one(asked, request(asked.name))
 
-    def _ask_one(self, asked: _Asked, request: Request[Empty, Any]) -> None:
+    def _ask_one(self, asked: Asked, request: Request[Empty, Any]) -> None:
         began = self._node.monotonic()
 
         def on_answer() -> None:
@@ -85,7 +86,7 @@ class Census:
 
         pending = self._node.ask_at_once(request, Empty(), TIMEOUT, on_answer)
 
-    def _take(self, asked: _Asked, pending: PendingCall[Empty, Any], took: float) -> None:
+    def _take(self, asked: Asked, pending: PendingCall[Empty, Any], took: float) -> None:
         """`took` [s] is the round trip."""
         try:
             answer = pending.response()

@@ -70,8 +70,10 @@ class Node:
         overrides: Mapping[str, ParameterValue] | None = None,
         log_level: str = "info",
         stop: ShutdownRequest | None = None,
+        rates: RequestRates | None = None,
     ) -> None:
-        """Waits for the router; raises `NodeNameTaken` where `name` lives already. `overrides` are parameters."""
+        """Waits for the router; raises `NodeNameTaken` where `name` lives already. `overrides` are parameters, `rates`
+        how much of what is asked is taken, if not as much as usual."""
         self._identity = identity.identify(name)
         self.name = name
         self.deployment = deployment if deployment is not None else load_deployment()
@@ -84,7 +86,7 @@ class Node:
         self._readiness: Readiness | None = None
         self._problem = ""  # why it is not ready
         self._endpoints = NodeEndpoints()
-        self._rates = RequestRates()
+        self._rates = rates or RequestRates()
         from_file = self.deployment.parameters.get(name, {})
         saved = SavedParameters(project_root() / self.deployment.paths.run, name)
         self._parameters = ParameterRegistry(name, from_file, overrides or {}, saved, self.log)

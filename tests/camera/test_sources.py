@@ -309,7 +309,7 @@ def test_a_slow_reader_gets_the_newest_image_only_and_is_woken_once(
     begun = time.time_ns()
     deadline = time.monotonic() + 5.0
     assert woken.acquire(timeout=5.0)
-    while reader._frame is None or reader._frame.stamp < begun + 50 * MS:  # five images and more
+    while reader.frame is None or reader.frame.stamp < begun + 50 * MS:  # five images and more
         assert time.monotonic() < deadline
         os.sched_yield()
     assert not woken.acquire(blocking=False)

@@ -198,13 +198,13 @@ def test_a_world_that_stands_still_is_drawn_once_and_its_noise_every_time(rm1_fo
     stand(world, arm, "left")
     first, second = camera.image(world.snapshot()), camera.image(world.snapshot())
     assert (first != second).any()
-    calm = camera._calm
+    calm = camera.calm
     stand(world, arm, "left", stamp=2)
     camera.image(world.snapshot())
-    assert camera._calm is calm
+    assert camera.calm is calm
     stand(world, arm, "right")
     camera.image(world.snapshot())
-    assert camera._calm is not calm
+    assert camera.calm is not calm
 
 
 def test_the_stamp_of_an_image_is_that_of_the_joints_it_shows(rm1_folder: Path) -> None:

@@ -86,12 +86,12 @@ class PretendDevice:
 
     def step(self, now: int) -> None:
         if self._homing:
-            self._home()
+            self.go_on_homing()
         self._states.put(msgspec.structs.replace(self.state, stamp=now))
         if self.readings is not None:
             self._sensors.put(msgspec.structs.replace(self.readings, stamp=now))
 
-    def _home(self) -> None:
+    def go_on_homing(self) -> None:
         if self._node.monotonic() - self._since < TO_HOME:
             velocity = tuple(-80.0 if name == self._homing[0] else 0.0 for name in self.arm.joint_names)
             self.set(velocity=velocity)

@@ -174,9 +174,7 @@ def test_too_few_poses_that_show_the_board_write_nothing(show, capsys):
 def test_a_board_on_the_tool_places_a_camera_that_stands_and_is_a_part_of_the_arm_meanwhile(show, capsys, monkeypatch):
     shown, path = show(board_on_tool(parol6()))
     carried = []
-    monkeypatch.setattr(
-        camera_poses, "_drive", lambda *arguments: (carried.extend(shown.carried), drive(*arguments))[1]
-    )
+    monkeypatch.setattr(camera_poses, "drive", lambda *arguments: (carried.extend(shown.carried), drive(*arguments))[1])
     assert run(["camera", "mount", "side", "--on", "tool_link", "--poses", "9", "--yes"]) is ExitCode.OK
     assert carried == [MOUNT_BOARD]
     assert shown.carried == []
@@ -184,7 +182,7 @@ def test_a_board_on_the_tool_places_a_camera_that_stands_and_is_a_part_of_the_ar
     assert off(shown, path) < 0.5
 
 
-drive = camera_poses._drive
+drive = camera_poses.drive
 
 
 def test_a_tag_that_is_larger_than_said_is_refused_by_name(show, capsys):

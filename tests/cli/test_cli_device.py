@@ -102,7 +102,7 @@ def test_a_homing_that_never_begins_is_not_waited_for_for_ever(connected, rm1_de
     from gemelo import homing as module
 
     monkeypatch.setattr(module, "TO_BEGIN", 0.2)
-    monkeypatch.setattr(rm1_device, "_home", lambda: rm1_device.set(mode=DeviceMode.UNREFERENCED))
+    monkeypatch.setattr(rm1_device, "go_on_homing", lambda: rm1_device.set(mode=DeviceMode.UNREFERENCED))
     with pytest.raises(CommandError, match="did not begin"):
         home(connected, [])
 

@@ -51,9 +51,9 @@ def deployment(cell: Cell, tmp_path: Path) -> Deployment:
 
 
 @contextmanager
-def running(deployment: Deployment) -> Iterator[Node]:
+def running(deployment: Deployment, network: MemoryNetwork | None = None) -> Iterator[Node]:
     """The detector's process as a thread, and a node that stands for the camera's."""
-    network = MemoryNetwork()
+    network = network or MemoryNetwork()
     with (
         Node("detector", deployment, bus=MemoryBus(network)) as node,
         Node("camera", deployment, bus=MemoryBus(network)) as camera,
@@ -160,8 +160,9 @@ def test_an_image_and_the_state_of_its_moment_meet_whatever_the_clocks_of_their_
     deployment = load_deployment(environ=environ)
     data, seen = picture(arm, cell)  # its lens; the camera is now on the tool, at the place where the other one hangs
     info = replace(seen, name="hand", parent=arm.tool_frame)
-    with running(deployment) as camera, ExitStack() as living:
-        gateway = Node("stepper_gateway", deployment, bus=MemoryBus(camera._bus.network))  # type: ignore[attr-defined]
+    network = MemoryNetwork()
+    with running(deployment, network) as camera, ExitStack() as living:
+        gateway = Node("stepper_gateway", deployment, bus=MemoryBus(network))
         living.enter_context(gateway)
         for node, seconds in ((camera, ahead), (gateway, -ahead)):
             Skewed(seconds, 1e-4).on(node)

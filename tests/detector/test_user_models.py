@@ -14,7 +14,7 @@ from schemas.detections import DetectionKind
 from services.arm.model.description import load_arm
 from services.detector.core import Detector
 from services.detector.main import read_models
-from services.detector.user_models import BadModel, Found, UserModel, _projected, _without_doubles, standing
+from services.detector.user_models import BadModel, Found, UserModel, projected_box, standing, without_doubles
 from services.vision.camera_model import model_of
 from services.vision.rigid import from_transform, inverse
 from tests.detector.onnx_file import red_finder
@@ -140,17 +140,17 @@ def test_a_class_that_the_model_does_not_have_is_refused_and_the_others_are_look
 def test_doubles_of_a_class_are_one_and_classes_stay_apart() -> None:
     sides = np.array([[10.0, 10.0, 50.0, 50.0], [12.0, 11.0, 51.0, 52.0], [200.0, 10.0, 240.0, 50.0]])
     scores = np.array([[0.9, 0.0], [0.8, 0.0], [0.7, 0.0]])
-    assert [each.score for each in _without_doubles(sides, scores, 0.5)] == [0.9, 0.7]
+    assert [each.score for each in without_doubles(sides, scores, 0.5)] == [0.9, 0.7]
     scores[1] = (0.0, 0.8)
-    assert sorted(each.score for each in _without_doubles(sides, scores, 0.5)) == [0.7, 0.8, 0.9]
-    assert not _without_doubles(sides, scores, 0.95)
+    assert sorted(each.score for each in without_doubles(sides, scores, 0.5)) == [0.7, 0.8, 0.9]
+    assert not without_doubles(sides, scores, 0.95)
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.6, 1.2])
 def test_a_long_thing_is_placed_whatever_its_turn(table: Table, yaw: float) -> None:
     lens, size = model_of(table.exact), (0.06, 0.02, 0.03)
     plane = inverse(from_transform(table.exact.parent_from_camera))
-    sides = _projected(np.array([0.28, 0.1, yaw]), lens, plane, size)
+    sides = projected_box(np.array([0.28, 0.1, yaw]), lens, plane, size)
     place = standing(Found(0, 0.9, sides), lens, plane, size)
     assert place is not None
     assert place.plane_from_box[:2, 3] == pytest.approx([0.28, 0.1], abs=1.5e-3)

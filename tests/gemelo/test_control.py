@@ -6,7 +6,7 @@ import os
 import socket
 import stat
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 import msgspec
@@ -14,6 +14,7 @@ import pytest
 
 import gemelo
 from gemelo import control_file
+from gemelo.control import Hold
 from gemelo.session import Session
 from schemas.actions import GoalRequest, GoalResponse, ResultRequest
 from schemas.control import ControlAnswer, ControlState, ControlTake
@@ -222,18 +223,26 @@ def test_the_secret_is_never_published_nor_recorded_nor_logged(lab: Lab) -> None
 # The file by which the programs of one user share a hold.
 
 
+@contextmanager
+def takes(arm: gemelo.Arm) -> Iterator[str]:
+    """As `Arm.take_control`, with the secret, as the command line takes it."""
+    secret = arm.control.take("Ana")
+    with Hold(arm.control):
+        yield secret
+
+
 def test_programs_of_the_same_user_share_the_hold_also_those_that_were_connected_before(lab: Lab) -> None:
     script, holder = lab.arm("pick-1"), lab.arm("cli-1")
     path = control_file.path_of("rm1", lab.deployment)
-    with holder.take_control("Ana"):
-        control_file.write(path, holder.control._own.secret, "Ana")
+    with takes(holder) as secret:
+        control_file.write(path, secret, "Ana")
         assert refusal(lambda: script.speed(0.5)).check == "device"
         assert until(lambda: holder.control.state.members == ("cli-1", "pick-1"))
         assert script.control.may_move
     page = lab.arm("panel")
     page.control.shares = False
-    with holder.take_control("Ana"):
-        control_file.write(path, holder.control._own.secret, "Ana")
+    with takes(holder) as secret:
+        control_file.write(path, secret, "Ana")
         assert refusal(lambda: page.speed(0.5)).check == "control"
         assert refusal(lambda: script.speed(0.5)).check == "device"  # the new hold, by its new secret
 

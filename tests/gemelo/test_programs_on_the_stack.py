@@ -255,9 +255,11 @@ def test_a_stop_while_the_next_leg_is_handed_over_already_stops_both(cell: Cell)
     run = cell.run(*SHUTTLE)
     run.start()
     cell.await_step(run, (0, 0))
-    execution = run._execution
+    execution = run.execution
     assert execution is not None
-    assert cell.arm.wait_for(lambda: execution._next is not None and execution._next.motion is not None, LONGEST)
+    assert cell.arm.wait_for(
+        lambda: execution.following is not None and execution.following.motion is not None, LONGEST
+    )
     run.stop()
     assert run.wait(5.0).status is RunStatus.STOPPED
     assert rests(cell.arm, 1.0)

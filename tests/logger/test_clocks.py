@@ -66,7 +66,7 @@ def test_a_node_that_was_started_again_is_asked_at_once_and_one_of_long_ago_make
     deployment = Deployment(paths=PathsSection(run=str(tmp_path / "run"), out=str(tmp_path / "out")))
     network, records = MemoryNetwork(), []
     asked: list[tuple[str, int]] = []
-    monkeypatch.setattr(Census, "_ask", lambda census, one: asked.append((one.name, one.at)))
+    monkeypatch.setattr(Census, "ask", lambda census, one: asked.append((one.name, one.at)))
     with (
         Node("diver", deployment, robot="rm1", bus=MemoryBus(network)) as diver,
         Node("logger", deployment, robot="rm1", bus=MemoryBus(network)) as logger,

@@ -14,6 +14,7 @@ from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, Planni
 from schemas.system import LogLevel, LogRecord
 from schemas.topics import DESCRIPTION, FRAMES, LOG, SCENE, STATIC_FRAMES
 from services.arm.model.description import load_arm
+from services.arm.model.urdf import JointKind
 from services.recordings.channels import Entry
 from services.recordings.mcap_file import McapFile
 from services.state_publisher.core import StatePublisher
@@ -107,7 +108,7 @@ def test_the_files_own_schemas_have_the_published_fields_and_require_what_is_alw
 
 def test_every_link_of_the_arm_that_has_a_shape_hangs_on_a_frame_that_is_recorded(arm, tmp_path):
     publisher = StatePublisher(arm)
-    names = [joint.name for joint in publisher._moving]
+    names = [joint.name for joint in arm.model.joints if joint.kind is not JointKind.FIXED]
     moving = publisher.on_joint_state(JointState(stamp=START, name=tuple(names), position=(0.0,) * len(names))).frames
     found = written(
         tmp_path / "arm.mcap",

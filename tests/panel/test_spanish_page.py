@@ -34,7 +34,7 @@ from schemas.motion import FollowErrorCode
 from services.panel.model.problems import problem_of
 from services.panel.words.step_text import step_text
 from services.panel.words.words import SENTENCES, Words
-from services.stepper_gateway.device.command_handler import NOT_NOW, REMEDIES, CommandHandler
+from services.stepper_gateway.device.command_handler import NOT_NOW, REMEDIES, complaint
 from services.stepper_gateway.links.frames import Code
 
 ROOT = Path(__file__).parents[2]
@@ -182,10 +182,8 @@ def told_in_spanish(english: str) -> str:
 @pytest.mark.parametrize("kind", DeviceCommandKind)
 @pytest.mark.parametrize("mode", DeviceMode)
 def test_every_command_that_the_device_refuses_in_any_mode_with_any_code(kind: DeviceCommandKind, mode: DeviceMode):
-    handler = object.__new__(CommandHandler)
     for code in Code:
-        command = SimpleNamespace(kind=kind)
-        told = handler._complaint(command, SimpleNamespace(code=code, mode=mode))
+        told = complaint(kind, SimpleNamespace(code=code, mode=mode))
         said = told_in_spanish(f"{kind.name.lower()} refused: {told}")
         for english in (kind.name, mode.name, code.name):
             assert not re.search(rf"\b{english}\b", said), said

@@ -110,9 +110,10 @@ def test_ik_and_validity_keep_the_robots_clearance_and_say_how_near(rm1: Arm, wo
     assert refusal is not None
     assert refusal.value == pytest.approx(GAP, abs=1e-5)
     near = replace(rm1, clearance=0.001)
-    there = World(near, Planner(near).kinematics, world.scene)
+    kinematics = Planner(near).kinematics
+    there = World(near, kinematics, world.scene)
     assert kinematic.validity(asked, None, 0.0, there).code is PlanCode.SUCCESS
-    x, y, z = there._kinematics.tool(GOAL).position.tolist()
+    x, y, z = kinematics.tool(GOAL).position.tolist()
     pose = IkRequest(goal=PoseGoal(position=(x, y, z)), near=JointState(name=rm1.joint_names, position=GOAL))
     told = kinematic.ik(pose, None, 0.0, world).refusal
     assert told is not None

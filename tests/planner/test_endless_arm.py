@@ -12,6 +12,7 @@ from schemas.joints import JointState
 from schemas.planning import JointGoal, PlanRequest, PoseGoal
 from services.arm.model.description import load_arm
 from services.planner.core import Planner
+from services.planner.kinematics.goals import Goals
 from services.planner.request.deadline import NEVER
 
 BOX = '<collision><origin xyz="{at}"/><geometry><box size="{size}"/></geometry></collision>'
@@ -103,8 +104,9 @@ def test_every_free_configuration_and_every_pose_of_one_can_be_gone_to(planner: 
 
 
 def test_configurations_of_a_pose_are_less_than_half_a_turn_away_and_are_told_once(planner: Planner, free: list):
+    goals = Goals(planner.arm, planner.kinematics, planner.checker)
     for start, goal in zip(free[:16:2], free[1:16:2], strict=True):
-        rows = np.array(list(planner._goals.candidates(pose_of(planner, goal), start, NEVER)))
+        rows = np.array(list(goals.candidates(pose_of(planner, goal), start, NEVER)))
         assert np.abs(rows - start).max() < np.pi + 1e-6
         turned = np.concatenate((np.cos(rows), np.sin(rows)), axis=1)
         apart = np.linalg.norm(turned[:, None] - turned[None], axis=2) + 9.0 * np.eye(len(rows))

@@ -165,13 +165,13 @@ def test_the_bound_of_a_large_link_is_a_share_of_its_length_unless_another_is_as
 
 def test_most_cuts_are_told_apart_by_a_rough_look(monkeypatch: pytest.MonkeyPatch):
     looks: list[int] = []
-    whole = cuts._outside
+    whole = cuts.outside
 
     def counted(part: MeshPart, places: np.ndarray, planes: np.ndarray, rough: int = 1) -> cuts.Outside:
         looks.append(rough)
         return whole(part, places, planes, rough)
 
-    monkeypatch.setattr(cuts, "_outside", counted)
+    monkeypatch.setattr(cuts, "outside", counted)
     made = trimesh.util.concatenate([trimesh.creation.box((0.2, 0.03, 0.03)), trimesh.creation.box((0.03, 0.2, 0.03))])
     shapes_around(MeshSurface(as_mesh(made)), 0.005, 2)
     assert looks.count(1) <= 2 * (cuts.FINALISTS + cuts.CUTS) + 1  # both sides of each, and what is cut

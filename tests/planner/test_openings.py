@@ -101,9 +101,9 @@ def test_a_heavy_mesh_with_all_that_cad_draws_needs_few_shapes():
 def test_links_are_fitted_alike_by_one_process_and_by_several(alone: float, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(mesh_fit, "ALONE", {"spawn": alone, "fork": alone})
     wanted = [(name, as_mesh(cup(sections)), WITHIN, 4) for name, sections in (("a", 24), ("b", 32), ("c", 48))]
-    found = [fit for fit, _ in mesh_fit._on_all_cores(wanted)]
+    found = [fit for fit, _ in mesh_fit.fit_on_all_cores(wanted)]
     assert [fit.link for fit in found] == ["a", "b", "c"]
-    assert [fit.shapes for fit in found] == [mesh_fit._fit(*each).shapes for each in wanted]
+    assert [fit.shapes for fit in found] == [mesh_fit.fit_link(*each).shapes for each in wanted]
 
 
 FORKED = """
@@ -112,9 +112,9 @@ from services.collision_fitting import mesh_fit
 from tests.planner.test_openings import as_mesh, cup
 mesh_fit.ALONE["fork"] = 0.0
 wanted = [(name, as_mesh(cup(sections)), mesh_fit.WITHIN, 4) for name, sections in (("a", 24), ("b", 32))]
-found = [fit for fit, _ in mesh_fit._on_all_cores(wanted)]
-assert [fit.shapes for fit in found] == [mesh_fit._fit(*each).shapes for each in wanted]
-print(mesh_fit._start_method())
+found = [fit for fit, _ in mesh_fit.fit_on_all_cores(wanted)]
+assert [fit.shapes for fit in found] == [mesh_fit.fit_link(*each).shapes for each in wanted]
+print(mesh_fit.start_method())
 """
 
 
@@ -124,6 +124,6 @@ def test_only_a_process_without_other_threads_forks_and_fits_alike():
     stop = threading.Event()
     other = threading.Thread(target=stop.wait)
     other.start()
-    assert mesh_fit._start_method() == "spawn"
+    assert mesh_fit.start_method() == "spawn"
     stop.set()
     other.join()

@@ -37,7 +37,7 @@ def test_one_character_of_a_recorded_output_is_found(changed):
 
 
 def test_a_core_that_says_nothing_is_found(monkeypatch):
-    monkeypatch.setattr(publisher_core.StatePublisher, "_frames", lambda *_: None)
+    monkeypatch.setattr(publisher_core.StatePublisher, "on_joint_state", lambda *_: publisher_core.FramesUpdate())
     found = replay(RECORDINGS / "state_publisher.mcap", "state_publisher").difference
     assert (found.topic, found.path, found.replayed) == ("frames", "", "(nothing)")
 

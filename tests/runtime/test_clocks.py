@@ -30,16 +30,20 @@ int clock_gettime(clockid_t id, struct timespec *now) {
 """
 READER = """
 import sys, time
+import zenoh
 from schemas.deployment import RouterSection
 from schemas.topics import Delivery
 from services.runtime.bus.zenoh_bus import ZenohBus
-bus = ZenohBus(RouterSection(port=int(sys.argv[1])), "rm1")
+from services.runtime.bus.zenoh_config import client_config
+section = RouterSection(port=int(sys.argv[1]))
+bus, beside = ZenohBus(section, "rm1"), zenoh.open(client_config(section, "rm1"))
 say = lambda arrival: print(arrival.payload.decode(), flush=True)
 bus.subscribe("device/events", Delivery.EVERY, say, lambda lost: print("lost", lost, flush=True))
 # The writer's heartbeat says what a reader might have missed, which is then recovered.
-beats = bus._session.declare_subscriber("device/events/@adv/pub/**", lambda beat: print("heartbeat", flush=True))
+beats = beside.declare_subscriber("device/events/@adv/pub/**", lambda beat: print("heartbeat", flush=True))
 print(f"joined {time.time()}", flush=True)
 sys.stdin.read()
+beside.close()
 bus.close()
 """
 

@@ -35,7 +35,7 @@ PATIENCE = 8.0  # [s] in which a link of a lease of 1 s is missed, and back
 def limits(port: int) -> list[int]:
     """[ms] of every connection of this process to the port."""
     found = []
-    for opened in dead_links._sockets():
+    for opened in dead_links.tcp_sockets():
         with opened:
             try:
                 if opened.getpeername()[1] == port:
@@ -75,7 +75,7 @@ def test_a_link_on_loopback_has_none(tmp_path):
      ("tls/lab.example:1?rel=1#so=2", "lab.example", 1)],
 )  # fmt: skip
 def test_host_and_port_of_any_locator_are_found(locator, host, port):
-    assert (dead_links._host(locator), dead_links._port(locator)) == (host, port)
+    assert (dead_links.host_of(locator), dead_links.port_of(locator)) == (host, port)
 
 
 class Far:

@@ -66,9 +66,7 @@ def test_a_polite_client_gets_all_its_answers(buses: Buses) -> None:
 
 def limited(buses: Buses, name: str, of_a_client: Rate = OF_A_CLIENT, of_refusals: Rate = OF_REFUSALS) -> Node:
     """A node with these limits in place of its own."""
-    node = buses.node(name)
-    node._rates = RequestRates(of_a_client, of_refusals)
-    return node
+    return buses.node(name, rates=RequestRates(of_a_client, of_refusals))
 
 
 def test_what_a_client_asks_above_its_rate_is_dropped_counted_and_said_once(

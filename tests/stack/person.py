@@ -102,14 +102,14 @@ class Operator:
         done = []
         while True:
             try:
-                done += self._free()
+                done += self.free()
                 return self.move(), done
             except (AssertionError, GoalRefused, NoAnswer, RequestRefused):
                 if time.monotonic() > deadline:
                     raise
                 self.node.wait(0.1)
 
-    def _free(self):
+    def free(self):
         self.wait_for(lambda: self.device.message is not None and not self.device.is_stale, 1.0)
         match self.device.message.mode:
             case DeviceMode.UNREFERENCED:

@@ -93,7 +93,7 @@ def test_a_goal_that_was_heard_before_the_gateway_died_moves_nothing_when_it_is_
     assert there.epoch == back.epoch != 0
     stack.kill("stepper_gateway")
     stack.wait_ready(15.0, ["stepper_gateway"])
-    operator._free()
+    operator.free()
     operator.seen.clear()
     for goal in (there, back):
         again = operator.node.call(goal_request(FOLLOW_JOINT_TRAJECTORY), goal)

@@ -203,7 +203,7 @@ def test_any_bytes_are_answers_or_counted_and_take_no_memory(pieces: list[bytes]
     for piece in pieces:
         for answer in reader.feed(piece):
             assert 0 <= answer.seq < 1 << 32
-    assert len(reader._rest) <= 64
+    assert len(reader.rest) <= 64
     reader.feed(b">")
     assert reader.feed(b"<ACK,9,1>\n") == [LineAnswer(9, 1)], "what came before does not spoil what follows"
 

@@ -84,12 +84,12 @@ def load_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
     """
     global _newest
     if _newest is None or _newest[0]() is not arm:
-        _newest = weakref.ref(arm), _read_collision_geometry(arm, model)
+        _newest = weakref.ref(arm), read_collision_geometry(arm, model)
     return _newest[1].copy()
 
 
-def _read_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
-    """Pinocchio drops what it does not know WITHOUT an error, so the shapes are counted."""
+def read_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
+    """The collision shapes, read anew; counted, since Pinocchio drops what it does not know WITHOUT an error."""
     expected = sum(len(link.collisions) for link in arm.model.links)
     geometry = pin.buildGeomFromUrdf(
         model, str(arm.urdf_path), pin.GeometryType.COLLISION, package_dirs=[str(arm.folder)]

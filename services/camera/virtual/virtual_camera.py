@@ -32,7 +32,7 @@ class VirtualCamera:
         self.period = 1.0 / record.fps
         self._info, self._look = info, look
         self._optics = Optics(samples=source.samples, blur=source.blur, noise=source.noise)
-        self._calm: tuple[object, Image] | None = None  # the newest image without noise, and of what
+        self.calm: tuple[object, Image] | None = None  # the newest image without noise, and of what
         self._count = 0
 
     def open(self) -> None:
@@ -53,11 +53,11 @@ class VirtualCamera:
         """(h, w, 3) in red, green, blue."""
         pose = base_from_camera(self._info, snapshot.links)
         key = (snapshot.key, pose)
-        if self._calm is None or self._calm[0] != key:
-            self._calm = key, render(snapshot.solids, self._info, pose, replace(self._optics, noise=0.0))
+        if self.calm is None or self.calm[0] != key:
+            self.calm = key, render(snapshot.solids, self._info, pose, replace(self._optics, noise=0.0))
         self._count += 1
         grain = Optics(blur=0.0, noise=self._optics.noise)
-        return expose(self._calm[1], grain, self._count)
+        return expose(self.calm[1], grain, self._count)
 
 
 def base_from_camera(info: CameraInfo, links: Mapping[str, Rigid]) -> Rigid:

@@ -66,7 +66,7 @@ def cache_folder() -> Path:
 
 
 @cache
-def _maker() -> bytes:
+def maker() -> bytes:
     """The hash of the code that makes spheres, compiled and not."""
     here = Path(__file__).parent
     files = (Path(motion.__file__), here / "sphere_cover.py", here.parent / "collision_geometry" / "solids.py")
@@ -74,7 +74,7 @@ def _maker() -> bytes:
 
 
 def _name_of(content: bytes) -> str:
-    return hashlib.sha256(_maker() + content).hexdigest()
+    return hashlib.sha256(maker() + content).hexdigest()
 
 
 def _read(path: Path) -> Array | None:

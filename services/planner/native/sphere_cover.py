@@ -117,7 +117,7 @@ def _placed(shape: CollisionShape, bulge: float) -> SphereCover:
 def kept_cover(shape: CollisionShape, bulge: float) -> SphereCover:
     """The spheres [m] of a shape about its own origin, from the disk where they have been made before."""
     if shape.mesh is None or shape.kind is ShapeKind.HULL:
-        return _kept_solid(solid_of(shape), bulge)
+        return kept_solid(solid_of(shape), bulge)
     vertices, faces = shape.mesh.arrays
     content = b"".join(
         (np.float64(bulge).tobytes(), np.int64(len(vertices)).tobytes(), vertices.tobytes(), faces.tobytes())
@@ -127,7 +127,8 @@ def kept_cover(shape: CollisionShape, bulge: float) -> SphereCover:
 
 
 @lru_cache(maxsize=256)
-def _kept_solid(solid: ConvexSolid, bulge: float) -> SphereCover:
+def kept_solid(solid: ConvexSolid, bulge: float) -> SphereCover:
+    """As `kept_cover`, of a solid whose spheres may reach `bulge` [m] beyond it; the newest are also kept in memory."""
     rows = cached_rows(f"{solid} {bulge}".encode(), lambda: _as_rows(cover_of(solid, bulge)))
     return SphereCover(rows[:-1], float(rows[-1, 0]))
 

@@ -36,7 +36,7 @@ def end_dead_links(session: zenoh.Session) -> zenoh.LinkEventsListener[None] | N
         return None
 
     def on_event(event: zenoh.LinkEvent) -> None:
-        if event.kind == zenoh.SampleKind.PUT and not is_loopback(_host(str(event.link.dst))):
+        if event.kind == zenoh.SampleKind.PUT and not is_loopback(host_of(str(event.link.dst))):
             limit(event.link)
 
     return session.info.declare_link_events_listener(on_event, history=True)
@@ -44,9 +44,9 @@ def end_dead_links(session: zenoh.Session) -> zenoh.LinkEventsListener[None] | N
 
 def limit(link: zenoh.Link) -> int:
     """Sets the limit on the socket of the link; returns how many were found: 1, or 0 if it has ended by now."""
-    ends = (_port(str(link.src)), _port(str(link.dst)))
+    ends = (port_of(str(link.src)), port_of(str(link.dst)))
     found = 0
-    for opened in _sockets():
+    for opened in tcp_sockets():
         with suppress(OSError), opened:
             if (opened.getsockname()[1], opened.getpeername()[1]) == ends:
                 opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)
@@ -54,7 +54,7 @@ def limit(link: zenoh.Link) -> int:
     return found
 
 
-def _sockets() -> Iterator[socket.socket]:
+def tcp_sockets() -> Iterator[socket.socket]:
     """A copy of every TCP socket of this process, to be closed; Zenoh tells nobody which are its own."""
     for name in os.listdir(OWN_FILES):
         with suppress(OSError):
@@ -72,16 +72,17 @@ def _sockets() -> Iterator[socket.socket]:
                 opened.close()
 
 
-def _port(locator: str) -> int:
+def port_of(locator: str) -> int:
+    """Of `tls/10.0.0.1:7447`, with what may stand after `#` or `?`."""
     return int(_address(locator)[1])
 
 
-def _host(locator: str) -> str:
+def host_of(locator: str) -> str:
+    """As `port_of`; an IPv6 address without its brackets."""
     return _address(locator)[0].strip("[]")
 
 
 def _address(locator: str) -> tuple[str, str]:
-    """Host and port of `tls/10.0.0.1:7447`, with what may stand after `#` or `?`."""
     address = locator.partition("/")[2]
     for mark in "#?":
         address = address.partition(mark)[0]

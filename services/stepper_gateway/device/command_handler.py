@@ -104,7 +104,7 @@ class CommandHandler:
                 command.answer, command.answered = reply, moment.monotonic
                 return self.tell_shown(moment)
         self._device.commands.remove(command)
-        reason = self._device.unreachable_reason(moment) if accepted else self._complaint(command, reply)
+        reason = self._device.unreachable_reason(moment) if accepted else complaint(command.kind, reply)
         for ticket in command.tickets:
             self._answer(ticket, accepted, reason, reply.mode, sent=True)
         if not command.tickets and not accepted:
@@ -188,14 +188,6 @@ class CommandHandler:
                     given = command.arguments
                     self._on_reference(given.argument, given.positions, reply.t_us, moment)
 
-    def _complaint(self, command: PendingCommand, reply: CommandReply) -> str:
-        remedy = REMEDIES.get(reply.code)
-        if reply.code == Code.NOT_READY:
-            remedy = NOT_NOW.get(command.kind, remedy)
-        mode = DeviceMode(reply.mode).name if reply.mode in DeviceMode._value2member_map_ else str(reply.mode)
-        text = f"the device refuses {command.kind.name} in mode {mode}: {code_name(reply.code)}"
-        return f"{text}, {remedy}" if remedy else text
-
     def _answer(self, ticket: int, accepted: bool, reason: str, mode: int | None = None, sent: bool = False) -> None:
         said = mode is not None and mode in DeviceMode._value2member_map_
         known = DeviceMode(mode or 0) if said else self._device.session.mode
@@ -205,3 +197,13 @@ class CommandHandler:
                 self._heard.append((listener, response))
             return
         self._device.out.put(Answer(ticket, response))
+
+
+def complaint(kind: DeviceCommandKind, reply: CommandReply) -> str:
+    """Why the device has refused a command, with the remedy where there is one."""
+    remedy = REMEDIES.get(reply.code)
+    if reply.code == Code.NOT_READY:
+        remedy = NOT_NOW.get(kind, remedy)
+    mode = DeviceMode(reply.mode).name if reply.mode in DeviceMode._value2member_map_ else str(reply.mode)
+    text = f"the device refuses {kind.name} in mode {mode}: {code_name(reply.code)}"
+    return f"{text}, {remedy}" if remedy else text

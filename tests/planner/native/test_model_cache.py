@@ -68,7 +68,7 @@ def test_another_mesh_or_bulge_or_maker_is_another_model(made: list[int], monkey
     kept_cover(cube(), BULGE)
     kept_cover(cube(0.06), BULGE)
     kept_cover(cube(), 2.0 * BULGE)
-    monkeypatch.setattr(model_cache, "_maker", lambda: b"compiled anew")
+    monkeypatch.setattr(model_cache, "maker", lambda: b"compiled anew")
     kept_cover(cube(), BULGE)
     assert len(made) == 4
 
@@ -130,7 +130,7 @@ def test_a_solid_is_covered_once_too_and_as_it_would_be_anew(folder: Path, monke
     box = CollisionShape("box", ShapeKind.BOX, (0.1, 0.07, 0.05))
     fresh = sphere_cover.cover_of(solid_of(box), 0.011)
     kept_cover(box, 0.011)
-    sphere_cover._kept_solid.cache_clear()
+    sphere_cover.kept_solid.cache_clear()
     monkeypatch.setattr(sphere_cover, "cover_of", None)
     again = kept_cover(box, 0.011)
     assert np.array_equal(again.spheres, fresh.spheres)
@@ -138,14 +138,14 @@ def test_a_solid_is_covered_once_too_and_as_it_would_be_anew(folder: Path, monke
 
 
 def test_the_shapes_of_an_arm_are_read_once_and_their_triangles_too(meshed: Arm, monkeypatch: pytest.MonkeyPatch):
-    read = self_collisions._read_collision_geometry
+    read = self_collisions.read_collision_geometry
     times: list[Arm] = []
 
     def counted(arm: Arm, model: object) -> object:
         times.append(arm)
         return read(arm, model)
 
-    monkeypatch.setattr(self_collisions, "_read_collision_geometry", counted)
+    monkeypatch.setattr(self_collisions, "read_collision_geometry", counted)
     arm = load_arm(meshed.folder)
     Planner(arm).prepare()
     assert times == [arm]
@@ -172,7 +172,7 @@ def test_another_process_finds_what_the_first_has_made(meshed: Arm, made: list[i
     subprocess.run([sys.executable, "-c", program, str(meshed.folder)], check=True)
     there = set(folder.iterdir())
     assert any(file.suffix == ".rows" for file in there)
-    sphere_cover._kept_solid.cache_clear()
+    sphere_cover.kept_solid.cache_clear()
     NativePlanner(meshed)
     assert made == []
     assert set(folder.iterdir()) == there  # nor the boxes' and cylinders' spheres

@@ -41,21 +41,21 @@ class AnswerReader:
     """Cuts a stream of bytes into answers, and counts what is none: boot messages, torn lines, noise."""
 
     def __init__(self) -> None:
-        self._rest = b""
+        self.rest = b""  # of an answer that is not there yet
         self.bad = 0
 
     def feed(self, data: bytes) -> list[LineAnswer]:
         """The answers that are complete now, oldest first."""
-        self._rest += data
+        self.rest += data
         found: list[LineAnswer] = []
-        while (end := self._rest.find(b">")) >= 0:
-            start = self._rest.rfind(b"<", 0, end)
-            frame, self._rest = self._rest[max(0, start) : end + 1], self._rest[end + 1 :]
+        while (end := self.rest.find(b">")) >= 0:
+            start = self.rest.rfind(b"<", 0, end)
+            frame, self.rest = self.rest[max(0, start) : end + 1], self.rest[end + 1 :]
             answer = read_answer(frame)
             if answer is None:
                 self.bad += 1
             else:
                 found.append(answer)
-        if len(self._rest) > LONGEST:
-            self._rest = self._rest[-LONGEST:]
+        if len(self.rest) > LONGEST:
+            self.rest = self.rest[-LONGEST:]
         return found
