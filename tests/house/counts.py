@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TypeGuard
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("docs", "examples", "firmware", "gemelo", "schemas", "services", "tests")
@@ -161,6 +162,45 @@ def without_excuse(module: Module) -> Iterator[str]:
             near = [line for node in late for line in lines[node.lineno - 2 : node.end_lineno]]
             if late and not any("# " in line for line in near):
                 yield f"{module.name}.{function.name}"
+
+
+# What belongs to nobody's inside though its name begins so, or has no other way to it.
+PUBLIC = {"_replace": "of a named tuple, as its documentation says"}
+FOREIGN = {
+    "_actions": "argparse lists the options of a parser nowhere else",
+    "_get_local_constants": "hypothesis has no setting for the numbers that it takes from modules",
+    "_local_constants": "the same",
+    "_websock_server": "viser tells nobody what it keeps for a browser",
+    "_broadcast_buffer": "the same",
+    "_client_state_from_id": "the same",
+}
+SETTERS = {"setattr", "getattr", "delattr", "object"}  # of Python, of monkeypatch, and `patch.object`
+
+
+def pokes(module: Module) -> Iterator[str]:
+    """Private names of others that the module reads, writes, imports or replaces; those that it defines are its own."""
+    nodes = list(ast.walk(module.tree))
+    own = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)}
+    own |= {node.attr for node in nodes if _is_of_self(node) and isinstance(node.ctx, ast.Store)}
+    for node in nodes:
+        names: list[str] = []
+        if isinstance(node, ast.Attribute) and not _is_of_self(node):
+            names = [node.attr]
+        elif isinstance(node, ast.ImportFrom):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] in SETTERS:
+            names = [each.value for each in node.args[1:2] if isinstance(each, ast.Constant)]
+        for name in names:
+            if _is_private(name) and name not in own | PUBLIC.keys() | FOREIGN.keys():
+                yield f"{module.path}:{node.lineno}: {name}"
+
+
+def _is_of_self(node: ast.AST) -> TypeGuard[ast.Attribute]:
+    return isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
+
+
+def _is_private(name: object) -> bool:
+    return isinstance(name, str) and name.startswith("_") and not name.startswith("__")
 
 
 def without_origin(module: Module) -> Iterator[str]:

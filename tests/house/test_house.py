@@ -16,6 +16,7 @@ from tests.house.counts import (
     fragments,
     imports,
     modules,
+    pokes,
     without_excuse,
     without_origin,
     without_origin_in_core,
@@ -28,6 +29,7 @@ KEPT = {
     "services.runtime.process.freed_memory": "the C library's heap, apart from the main of services",
     "services.stepper_gateway.ledger.reasons": "the sentences, apart from the arithmetic",
 }
+LOOKERS = ("tests/", "services/bench/", "services/chaos/", "services/demo/", "docs/", "examples/")
 CLAUSES = {"What", "Where", "How", "Whether", "Who", "When", "Which", "Why", "Whatever", "True", "From", "By", "For"}
 
 
@@ -109,6 +111,34 @@ def test_a_constant_of_the_core_without_an_origin_is_seen(text, found):
 
 def module(name: str, *lines: str) -> tuple[str, Module]:
     return name, Module(Path(f"{name}.py"), name, "\n".join(lines))
+
+
+def test_what_tests_and_measures_look_at_is_public(house):
+    """What they need has a name of its own, or is reached as a person or another module reaches it."""
+    looking = [each for each in house.values() if str(each.path).startswith(LOOKERS)]
+    assert [found for each in looking for found in pokes(each)] == []
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        ("page._move.problem", "_move"),
+        ("pages()[0]._move = 1", "_move"),
+        ("import a; a._move()", "_move"),
+        ("from a import b, _move", "_move"),
+        ('monkeypatch.setattr(page, "_move", None)', "_move"),
+        ('with mock.patch.object(page, "_move"): pass', "_move"),
+        ("page.move.problem", ""),
+        ("page.__dict__", ""),
+        ("here._replace(x=1.0)", ""),
+        ('monkeypatch.setattr(page, "move", "_move")', ""),
+        ("class A:\n    def f(self, other): return self._move, other.move", ""),
+        ("class A:\n    def f(self, other): self._move = other._move", ""),
+        ("class A:\n    def _move(self): pass\nA()._move()", ""),
+    ],
+)
+def test_a_look_at_what_is_private_is_seen(line, name):
+    assert [found.rpartition(" ")[2] for found in pokes(module("a", line)[1])] == ([name] if name else [])
 
 
 def test_a_circle_is_seen_and_one_of_types_alone_is_none():
