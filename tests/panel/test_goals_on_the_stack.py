@@ -361,6 +361,7 @@ def test_spheres_and_cylinders_are_added_and_resized(served: Served, arm: gemelo
         served.press("add")
         until(lambda: tuple(scene.objects), lambda names, name=f"my {kind}": name in names)
         until(lambda: tab.chosen.value, lambda chosen, name=f"my {kind}": chosen == name)
+        until(lambda name=f"my {kind}": name in tab.facts.content and tab.gizmo, bool)  # the fields are the new one's
     assert scene.objects["my sphere"].shape == SphereShape(radius=0.02)
     assert scene.objects["my cylinder"].shape == CylinderShape(radius=0.02, length=0.06)
     until(lambda: tuple(tab.size.value), lambda size: size == pytest.approx((40.0, 40.0, 60.0)))
