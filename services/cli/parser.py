@@ -59,10 +59,10 @@ class Parser(argparse.ArgumentParser):
             message = f'no {what} "{said}": {hint}'
         left_over = re.fullmatch(r"unrecognized arguments: (\S+).*", message, re.DOTALL)
         if left_over is not None and self.typed is not None:
-            self.typed.error(self.typed.strange(left_over[1]))
+            self.typed.error(self.typed.left_over_message(left_over[1]))
         self.exit(ExitCode.USAGE, f"{self.prog}: {message}\n")
 
-    def strange(self, word: str) -> str:
+    def left_over_message(self, word: str) -> str:
         """What is said of a word that the command does not take, with the option that is most like it."""
         options = re.findall(r"--[a-z][\w-]*", self.format_usage())
         alike = get_close_matches(word.partition("=")[0], options, 1, ALIKE) if word.startswith("-") else []
