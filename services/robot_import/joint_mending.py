@@ -1,13 +1,17 @@
-"""Joints that no motor of an arm turns: a base that drives or flies stands still, and followers of followers follow the
-joint that has the motor.
+"""Joints that no motor of an arm turns: a base that drives or flies stands still, as does a joint that its limits lock,
+and followers of followers follow the joint that has the motor.
 """
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
+from services.arm.frames.transforms import from_axis_angle, from_rpy, multiply, rotate, to_rpy
+from services.arm.model.urdf import JointKind, UrdfJoint
 from services.arm.model.xml_reader import XmlReader
+from services.robot_import.limits import MOST_TRAVEL, TURN
+from services.robot_import.mended import Mended
 
 FREE = {"planar": "drives", "floating": "is free to move"}
 LEFT_BY_FIXING = ("axis", "limit", "dynamics", "mimic", "safety_controller", "calibration")
@@ -43,6 +47,55 @@ def fix(joint: ET.Element) -> None:
     for tag in LEFT_BY_FIXING:
         for element in joint.findall(tag):
             joint.remove(element)
+
+
+def stand_at(mended: Mended, places: Mapping[str, float]) -> None:
+    """Fixes the joints of these names at their places [rad] or [m], and what follows them where that leads it."""
+    for element, joint in zip(mended.xml.root.findall("joint"), mended.model.joints, strict=True):
+        mimic = joint.mimic
+        if joint.name in places:
+            place = places[joint.name]
+        elif mimic is not None and mimic.joint in places:
+            place = mimic.multiplier * places[mimic.joint] + mimic.offset
+        else:
+            continue
+        if place:
+            _move(element, joint, place)
+        fix(element)
+
+
+def _move(element: ET.Element, joint: UrdfJoint, place: float) -> None:
+    """Puts the origin of the joint where `place` [rad] or [m] takes its link."""
+    turn, (x, y, z) = from_rpy(*joint.origin.rpy), joint.axis
+    xyz, rpy = joint.origin.xyz, joint.origin.rpy
+    if joint.kind is JointKind.PRISMATIC:
+        along = rotate(turn, (place * x, place * y, place * z))
+        xyz = (xyz[0] + along[0], xyz[1] + along[1], xyz[2] + along[2])
+    else:
+        rpy = to_rpy(multiply(turn, from_axis_angle(joint.axis, place)))
+    for origin in element.findall("origin"):
+        element.remove(origin)
+    texts = {key: " ".join(f"{value:.9g}" for value in triple) for key, triple in (("xyz", xyz), ("rpy", rpy))}
+    ET.SubElement(element, "origin", texts)
+
+
+def fix_locked(mended: Mended) -> None:
+    """Joints whose limits are one and the same place stand there; at 0 exporters write them for want of limits."""
+    places = {joint.name: joint.limit.lower for joint in mended.model.joints if joint.limit and _is_locked(joint)}
+    for element in mended.xml.root.findall("joint"):
+        name = element.get("name", "")
+        if name in places:
+            unit = "m" if element.get("type") == JointKind.PRISMATIC else "rad"
+            message = f"its limits hold it at {places[name]:.6g} {unit}"
+            remedy = 'type="fixed" there: write another `lower` or `upper` where it moves'
+            mended.warn(element, f'joint "{name}"', message, remedy)
+    stand_at(mended, places)
+
+
+def _is_locked(joint: UrdfJoint) -> bool:
+    most = {JointKind.REVOLUTE: TURN, JointKind.PRISMATIC: MOST_TRAVEL[JointKind.PRISMATIC]}.get(joint.kind, 0.0)
+    limit = joint.limit
+    return limit is not None and joint.mimic is None and limit.lower == limit.upper and 0.0 < abs(limit.lower) <= most
 
 
 def follow_the_motor(xml: XmlReader, say: Say) -> None:

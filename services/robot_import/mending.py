@@ -11,7 +11,7 @@ from services.arm.errors import DescriptionError
 from services.arm.model.urdf import JointKind, model_of
 from services.arm.model.xml_reader import XmlReader, parse_xml
 from services.robot_import import link_mending, number_mending, unit_mending
-from services.robot_import.joint_mending import fix_free_base, follow_the_motor
+from services.robot_import.joint_mending import fix_free_base, fix_locked, follow_the_motor
 from services.robot_import.mended import Mended, numbers_in
 from services.robot_import.source import RobotSource
 from services.robot_import.stick_figure import sticks
@@ -44,6 +44,7 @@ def mend(source: RobotSource) -> Mended:
         unit_mending.lengths,
         _axes,
         _mimics,
+        fix_locked,
         link_mending.millimetres,
         link_mending.flat,
         link_mending.tiny,

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
-
 from services.arm.device.device_config import MAX_COUNTS
 from services.arm.errors import DescriptionError
-from services.arm.frames.transforms import from_axis_angle, from_rpy, multiply, rotate, to_rpy
 from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
 from services.arm.model.virtual_drive import driven_joints
-from services.robot_import.joint_mending import fix
+from services.robot_import.joint_mending import stand_at
 from services.robot_import.mended import Mended
 from services.robot_import.poses import zero_state
 from services.robot_import.questions import Questions, yes_or_no
@@ -35,7 +32,7 @@ def ask_who_stands(mended: Mended, tool: str, questions: Questions) -> None:
         )
         stand = len(driven) > MOST or any(_is_wheel(joint) for joint in aside)
         if questions.ask("others_stand_still", question, "yes" if stand else "no", yes_or_no):
-            _stand(mended, aside)
+            stand_at(mended, zero_state(aside))
             _say(mended, aside, tool, STANDING)
             driven = [joint for joint in driven if joint not in aside]
         else:
@@ -73,37 +70,6 @@ def _is_behind(link: str, first: str, parents: dict[str, UrdfJoint]) -> bool:
 
 def _is_wheel(joint: UrdfJoint) -> bool:
     return joint.kind is JointKind.CONTINUOUS and WHEEL in f"{joint.name} {joint.child}".lower()
-
-
-def _stand(mended: Mended, aside: list[UrdfJoint]) -> None:
-    """Fixes the joints at 0 or at the limit nearest to it, and those that follow them where that leads them."""
-    places = zero_state(aside)
-    for element, joint in zip(mended.xml.root.findall("joint"), mended.model.joints, strict=True):
-        mimic = joint.mimic
-        if joint.name in places:
-            place = places[joint.name]
-        elif mimic is not None and mimic.joint in places:
-            place = mimic.multiplier * places[mimic.joint] + mimic.offset
-        else:
-            continue
-        if place:
-            _move(element, joint, place)
-        fix(element)
-
-
-def _move(element: ET.Element, joint: UrdfJoint, place: float) -> None:
-    """Puts the origin of the joint where `place` [rad] or [m] takes its link."""
-    turn, (x, y, z) = from_rpy(*joint.origin.rpy), joint.axis
-    xyz, rpy = joint.origin.xyz, joint.origin.rpy
-    if joint.kind is JointKind.PRISMATIC:
-        along = rotate(turn, (place * x, place * y, place * z))
-        xyz = (xyz[0] + along[0], xyz[1] + along[1], xyz[2] + along[2])
-    else:
-        rpy = to_rpy(multiply(turn, from_axis_angle(joint.axis, place)))
-    for origin in element.findall("origin"):
-        element.remove(origin)
-    texts = {key: " ".join(f"{value:.9g}" for value in triple) for key, triple in (("xyz", xyz), ("rpy", rpy))}
-    ET.SubElement(element, "origin", texts)
 
 
 def _say(mended: Mended, aside: list[UrdfJoint], tool: str, remedy: str) -> None:

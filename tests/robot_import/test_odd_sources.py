@@ -21,7 +21,7 @@ from services.robot_import.mended import Mended
 from services.robot_import.mending import mend
 from services.robot_import.questions import Questions
 from services.robot_import.source import find_source
-from tests.robot_import.exports import joint, write
+from tests.robot_import.exports import LIMIT, joint, write
 
 BOX = '<geometry><box size="0.06 0.06 0.2"/></geometry>'
 LINKS = tuple(f'<link name="{name}"><visual>{BOX}</visual></link>' for name in ("base", "a", "b"))  # lines 3 to 5
@@ -107,6 +107,19 @@ ODD = {
         'error: line 7: joint "two": mimics "none", which is no joint; did you mean "one"? -> name the joint that '
         "has the motor in <mimic>",
     ),
+    "two limits": (
+        (*LINKS, FIRST, SECOND.replace("</joint>", '<limit lower="-1" upper="1" effort="9" velocity="1"/></joint>')),
+        'error: line 7: joint "two": <limit> is there 2 times, and they differ -> leave one',
+    ),
+    "two origins of one shape": (
+        (LINKS[0], LINKS[1].replace("<geometry>", '<origin xyz="0 0 1"/>\n<origin xyz="0 0 2"/><geometry>'), LINKS[2],
+         FIRST, SECOND),
+        'error: lines 4 and 5: link "a": <origin> is there 2 times, and they differ -> leave one',
+    ),
+    "a link within another": (
+        (LINKS[0], LINKS[1].replace("</link>", '\n<link name="c"/></link>'), LINKS[2], FIRST, SECOND),
+        'error: line 5: link "c": it stands within link "a", where nothing reads it -> move it behind link "a"',
+    ),
     "an endless joint with limits": (
         (*LINKS, joint("one", "base", "a", kind="continuous"), SECOND),
         'warning: line 6: joint "one": is continuous, which turns beyond its limits -2.6 to 2.6 -> write '
@@ -137,6 +150,36 @@ def test_how_numbers_and_types_are_written_is_mended(tmp_path: Path, first: str,
     (said,) = map(str, found.findings())
     assert expected in said
     assert found.model.joints == mended(tmp_path / "plain", *LINKS, FIRST, SECOND).model.joints
+
+
+def test_the_same_element_twice_is_no_fault(tmp_path: Path):
+    twice = SECOND.replace("</joint>", f"{LIMIT}\n</joint>")
+    assert said_of(tmp_path, *LINKS, FIRST, twice) == said_of(tmp_path / "once", *LINKS, FIRST, SECOND) == []
+
+
+@pytest.mark.parametrize(("kind", "unit"), [("revolute", "rad"), ("prismatic", "m")])
+def test_a_joint_that_its_limits_lock_stands_there_and_what_follows_it_too(tmp_path: Path, kind: str, unit: str):
+    locked = LIMIT.replace('"-2.6"', '"0.5"').replace('"2.6"', '"0.5"')
+    follower = joint("two", "a", "b", rest=f'{LIMIT}<mimic joint="one" multiplier="2" offset="0.1"/>')
+    third = joint("three", "b", "c")
+    parts = (*LINKS, '<link name="c"/>', joint("one", "base", "a", kind=kind, rest=locked), follower, third)
+    found = mended(tmp_path, *parts)
+    said = f'line 7: joint "one": its limits hold it at 0.5 {unit} -> type="fixed" there: '
+    assert [str(each) for each in found.findings() if said in str(each)]
+    assert [each.kind for each in found.model.joints] == ["fixed", "fixed", "revolute"]
+    free = mend(find_source(write(tmp_path / "free.urdf", "free", *(each.replace(locked, LIMIT) for each in parts))))
+    expected = link_transforms(free.model, {"one": 0.5, "two": 1.1})
+    for name, (position, turn) in link_transforms(found.model, {}).items():
+        assert position == pytest.approx(expected[name][0], abs=1e-8)
+        assert turn == pytest.approx(expected[name][1], abs=1e-8)
+
+
+def test_limits_that_are_both_zero_are_none(tmp_path: Path):
+    none = LIMIT.replace('"-2.6"', '"0"').replace('"2.6"', '"0"')
+    found = mended(tmp_path, *LINKS, FIRST, joint("two", "a", "b", rest=none))
+    limit = found.model.joint("two").limit
+    assert limit is not None
+    assert (limit.lower, limit.upper) == pytest.approx((-math.pi, math.pi))
 
 
 def test_a_decimal_comma_is_no_comma_between_numbers(tmp_path: Path):

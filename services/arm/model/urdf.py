@@ -17,6 +17,13 @@ ZERO: Triple = (0.0, 0.0, 0.0)
 DEFAULT_AXIS: Triple = (1.0, 0.0, 0.0)
 NO_SHAPE = "nothing"  # of a geometry that cannot be read
 SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "cylinder": {"radius": 1, "length": 1}}  # how many numbers
+SINGLE = {  # what an element has once at the most, by its tag: a reader takes the first and is silent about another
+    "link": ("inertial",),
+    "joint": ("origin", "parent", "child", "axis", "limit", "mimic"),
+    "inertial": ("origin", "mass", "inertia"),
+    "visual": ("origin", "geometry"),
+    "collision": ("origin", "geometry"),
+}
 
 
 class JointKind(StrEnum):
@@ -161,7 +168,25 @@ def model_of(xml: XmlReader) -> tuple[UrdfModel, list[XmlFault]]:
         raise DescriptionError(f"the root element is <{xml.root.tag}>, it must be <robot>: export it as URDF")
     links = tuple(_link(xml, element) for element in xml.root.findall("link"))
     joints = tuple(_joint(xml, element) for element in xml.root.findall("joint"))
+    _require_single(xml)
     return UrdfModel(xml.root.get("name", ""), links, joints), xml.faults
+
+
+def _require_single(xml: XmlReader) -> None:
+    """Faults of what would be passed over: a second, other element, and a link or a joint within another one."""
+    for outer in (each for each in xml.root if each.tag in ("link", "joint")):
+        where = f'{outer.tag} "{outer.get("name", "")}"'
+        for element in outer.iter():
+            for tag in SINGLE.get(element.tag, ()):
+                several = element.findall(tag)
+                if len({ET.tostring(each).strip() for each in several}) > 1:
+                    for each in several:
+                        xml.fault(each, where, f"<{tag}> is there {len(several)} times, and they differ", "leave one")
+            if element is not outer and element.tag in ("link", "joint"):
+                inner = f'{element.tag} "{element.get("name", "")}"'
+                xml.fault(
+                    element, inner, f"it stands within {where}, where nothing reads it", f"move it behind {where}"
+                )
 
 
 def _link(xml: XmlReader, element: ET.Element) -> UrdfLink:
