@@ -28,6 +28,7 @@ from services.chaos.options import add_soak_options
 from services.chaos.person import Person
 from services.chaos.site import ChaosSite, installed_broker
 from services.runtime.deployment import load_deployment
+from services.runtime.errors import NoAnswer
 from services.runtime.process.ending import ended_by_signals
 from services.stack.results import new_results
 from services.stack.stack import StackError
@@ -81,7 +82,7 @@ def main() -> None:
     try:
         with ended_by_signals():
             sys.exit(0 if run(options.hours * HOUR, options.seed, broker, options.out.resolve()) else 1)
-    except StackError as error:
+    except (StackError, NoAnswer) as error:
         sys.exit(f"soak: {error}")
     except KeyboardInterrupt:
         sys.exit("soak: interrupted: its stack has been stopped, and there is no report")
