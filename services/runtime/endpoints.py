@@ -6,6 +6,7 @@ import os
 import socket
 import time
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import msgspec
@@ -44,14 +45,12 @@ class NodeEndpoints:
 
     def info(self, identity: Identity, robot: str) -> NodeInfo:
         """The node's identity and endpoints."""
-        from importlib.metadata import version  # 20 ms that most nodes never need
-
         return NodeInfo(
             node=identity.name,
             robot=robot,
             host=socket.gethostname(),
             pid=os.getpid(),
-            version=version("gemelo"),
+            version=_own_version(),
             started=identity.started,
             publishes=tuple(sorted(key for key in self.publishers if not key.startswith("@"))),
             subscribes=tuple(sorted({each.topic.key for each in self.subscriptions})),
@@ -74,6 +73,13 @@ class NodeEndpoints:
         """Warns once per reliable topic that has lost messages."""
         for each in self.subscriptions:
             each.report_losses()
+
+
+@cache
+def _own_version() -> str:
+    from importlib.metadata import version  # 20 ms that most nodes never need
+
+    return version("gemelo")
 
 
 def _interface(topic: Topic[Any]) -> TopicInterface:

@@ -31,6 +31,29 @@ def test_holes_of_the_heap_are_given_back_while_the_process_goes_on() -> None:
     subprocess.run([sys.executable, "-c", HOLES], check=True, timeout=60.0)
 
 
+CIRCLES = """
+import gc, time, weakref
+from services.runtime.process.freed_memory import give_back_freed_memory
+
+class Circle:
+    def __init__(self):
+        self.own = self
+
+gc.disable()  # so seldom does it come of itself where little is made
+gone = weakref.ref(Circle())
+assert gone() is not None, "the circle went by itself: nothing is tested"
+give_back_freed_memory(every=0.01)
+end = time.monotonic() + 20.0
+while gone() is not None:
+    assert time.monotonic() < end, "the circle is still there"
+    time.sleep(0.01)
+"""
+
+
+def test_circles_that_nobody_holds_are_freed_while_the_process_goes_on() -> None:
+    subprocess.run([sys.executable, "-c", CIRCLES], check=True, timeout=60.0)
+
+
 HEAPS = """
 import ctypes, sys, threading
 from services.runtime.process.freed_memory import give_back_freed_memory
