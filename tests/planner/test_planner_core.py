@@ -14,6 +14,8 @@ from schemas.joints import JointState
 from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
 from services.arm.model.description import Arm, load_arm
 from services.planner.core import Planner
+from services.planner.request.refusals import PlanRefused
+from services.planner.request.start_state import resolve_start
 from services.planner.timing.profile import joint_limits
 from services.planner.verification.verify import require_within_limits, sample
 
@@ -85,6 +87,15 @@ def test_a_goal_where_the_arm_is_is_a_plan_that_stands(planner: Planner, home: J
     response = planner.plan(PlanRequest(goal=NamedGoal(name="home")), home)
     assert response.code is PlanCode.SUCCESS
     assert response.duration == 0.1
+
+
+def test_a_whole_start_is_the_same_in_whatever_order_its_joints_are_named(rm1: Arm):
+    ready = rm1.named_states["ready"]
+    shuffled = JointState(name=rm1.joint_names[::-1], position=ready[::-1])
+    for given_start, present in ((standing(ready), None), (shuffled, None), (None, standing(ready))):
+        assert resolve_start(rm1, given_start, present, 0.0) == ready
+    with pytest.raises(PlanRefused, match=r"is 1\.000 s old"):
+        resolve_start(rm1, None, standing(ready), 1.0)
 
 
 def test_a_start_rounded_to_whole_steps_beyond_a_limit_is_still_a_start(planner: Planner, rm1: Arm):

@@ -53,7 +53,9 @@ class CollisionChecker:
 
     def keeps(self, positions: Positions, margin: float) -> bool:
         """True if everything is farther than `margin` [m] in this configuration (n,)."""
-        return self.touching(np.array((positions, positions)), margin) is None
+        self.deadline.check()
+        row = np.array((positions,))
+        return self._spheres.is_free(self.world, row, margin) or self._touching(row.repeat(2, axis=0), margin) is None
 
     def distance(self, positions: Positions) -> float:
         """Distance [m] of the nearest pair, as `World.distance`."""
@@ -69,6 +71,10 @@ class CollisionChecker:
         self.deadline.check()
         if len(positions) < 2:
             return self.world.touching(positions, margin)
+        return None if self._spheres.is_free(self.world, positions, margin) else self._touching(positions, margin)
+
+    def _touching(self, positions: Array, margin: float) -> Array | None:
+        """As `touching`, where the spheres do not know it to be free."""
         found = self._spheres.resolve(self.world, positions, margin)
         if found.touching is not None:
             return found.touching

@@ -52,8 +52,12 @@ class SphereCheck(Protocol):
     def least_distance(self, world: World, positions: Positions) -> float:
         """[m] that every pair is apart at least in this configuration (n,) [rad] or [m]; 0 where nothing is known."""
 
+    def is_free(self, world: World, rows: Array, margin: float) -> bool:
+        """True if the polyline through `rows` (m, n) [rad] or [m], or the only row, is known to keep `margin` [m]."""
+
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
-        """What is certain of the polyline through `rows` (m, n) [rad] or [m], m >= 2, with `margin` [m] to keep."""
+        """What is certain of the polyline through `rows` (m, n) [rad] or [m], m >= 2, that is not known to be free,
+        with `margin` [m] to keep."""
 
 
 class NativeCheck:
@@ -77,12 +81,16 @@ class NativeCheck:
         planner = self._planner if self._shown is world else self.planner(world, world.clearance)
         return planner.distance(positions)
 
+    def is_free(self, world: World, rows: Array, margin: float) -> bool:
+        """True if the spheres keep `margin` [m] all along the polyline through `rows` (m, n) [rad] or [m], or in the
+        only row."""
+        planner = self.planner(world, margin)
+        return bool(planner.free(rows)[0]) if len(rows) == 1 else planner.path_free(rows)
+
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
         """The result of the spheres for the polyline through `rows` (m, n) [rad] or [m] with `margin` [m] to keep, and
         the stretches that they leave unresolved."""
         planner = self.planner(world, margin)
-        if planner.path_free(rows):
-            return Resolution()
         touching = planner.touching(rows)
         if touching is not None:
             return Resolution(touching)
@@ -107,6 +115,10 @@ class ExactShapesOnly:
     def least_distance(self, world: World, positions: Positions) -> float:
         """0 for every configuration (n,) [rad] or [m]: nothing is known."""
         return 0.0
+
+    def is_free(self, world: World, rows: Array, margin: float) -> bool:
+        """False, whatever the `rows` (m, n) [rad] or [m] and the `margin` [m]: nothing is known."""
+        return False
 
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
         """The whole polyline through `rows` (m, n) [rad] or [m], unresolved."""

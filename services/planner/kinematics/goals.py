@@ -20,7 +20,7 @@ from services.planner.kinematics.task_space import task_space
 from services.planner.kinematics.unreachable import UnreachableRefusals
 from services.planner.request.deadline import Deadline
 from services.planner.request.refusals import beyond_limit, malformed, timed_out, unknown_name
-from services.planner.request.start_state import require_parallel, require_unwound
+from services.planner.request.start_state import are_usable, require_parallel, require_unwound
 
 Array = NDArray[np.float64]
 Start = tuple[float, ...]
@@ -87,6 +87,8 @@ class Goals:
         return values
 
     def _joints(self, goal: JointGoal, start: Start) -> Start:
+        if goal.name == self._arm.joint_names and are_usable(self._arm, goal.position):
+            return goal.position
         if not goal.name:
             raise malformed(INVALID, "joints", "the goal names no joint", "name at least one joint and its position")
         require_parallel(goal.name, goal.position, "the joint goal")

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from schemas.joints import JointState
 from schemas.planning import PlanCode
 from services.arm.model.description import Arm, Joint
+from services.planner.request.per_arm import once_per_arm
 from services.planner.request.refusals import malformed, moving_start, stale_state, start_beyond_limit, unknown_name
 
 # Tuning constants: chosen, where a line does not say measured or standard.
@@ -19,6 +20,9 @@ ROUNDING = 0.51  # [steps] executed positions are whole steps, so they may be th
 
 def resolve_start(arm: Arm, given: JointState | None, present: JointState | None, age: float) -> tuple[float, ...]:
     """Joint values [rad] or [m] in the arm's order, within the limits; raises `PlanRefused`."""
+    told = present if given is None and age <= STALE_AFTER else given
+    if told is not None and told.name == arm.joint_names and not any(told.velocity) and are_usable(arm, told.position):
+        return told.position
     values = {} if given is None else _values(arm, given)
     if len(values) < len(arm.joints):
         values = {**_present(arm, present, age), **values}
@@ -59,6 +63,22 @@ def _values(arm: Arm, state: JointState) -> dict[str, float]:
         if abs(velocity) > REST * joint.velocity:
             raise moving_start(joint, velocity, REST * joint.velocity)
     return dict(zip(state.name, state.position, strict=True))
+
+
+def are_usable(arm: Arm, positions: Sequence[float]) -> bool:
+    """True if there is a value [rad] or [m] for each joint, in the arm's order, and all are where a plan may begin or
+    end: an answer in a tenth of the time that it takes to say why not."""
+    spans = _spans(arm)
+    return len(positions) == len(spans) and all(
+        lower <= value <= upper for value, (lower, upper) in zip(positions, spans, strict=True)
+    )
+
+
+@once_per_arm
+def _spans(arm: Arm) -> list[tuple[float, float]]:
+    """The limits of each joint [rad] or [m], and `MOST_TURNED` where it has none."""
+    endless = (-MOST_TURNED, MOST_TURNED)
+    return [endless if math.isinf(joint.upper) else (joint.lower, joint.upper) for joint in arm.joints]
 
 
 def require_unwound(code: PlanCode, joint: Joint, value: float) -> None:

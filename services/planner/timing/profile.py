@@ -57,6 +57,8 @@ def joint_limits(arm: Arm, velocity_scaling: float = 1.0, acceleration_scaling: 
     """The arm's limits (n,), in [rad] or [m] per s, s^2 and s^3; the scalings are dimensionless. The acceleration's
     scaling applies to the jerk as well, so that its ramp keeps its duration."""
     full = _full_limits(arm)
+    if velocity_scaling == acceleration_scaling == 1.0:
+        return full
     return JointLimits(
         velocity=velocity_scaling * full.velocity,
         acceleration=acceleration_scaling * full.acceleration,

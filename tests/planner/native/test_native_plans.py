@@ -144,7 +144,9 @@ def test_what_the_spheres_say_of_a_configuration_for_certain_is_so_on_the_exact_
     for row in configurations(150, 6):
         distance = world.distance(row)
         assert check.least_distance(world, row) <= max(distance, 0.0) + UNSURE
-        if check.resolve(world, np.array((row, row)), CLEARANCE).touching is not None:
+        if check.is_free(world, row[None], CLEARANCE):
+            assert distance >= CLEARANCE
+        elif check.resolve(world, np.array((row, row)), CLEARANCE).touching is not None:
             touching += 1
             assert distance < CLEARANCE
     assert touching > 10
