@@ -6,7 +6,7 @@ from enum import IntEnum, StrEnum
 
 from schemas.frames import Transform
 from schemas.joints import JointState
-from schemas.message import Message, Vector
+from schemas.message import Message, Vector, has_finite_sum
 from schemas.motion import JointTrajectory
 from schemas.scene import Contact, SceneObject
 
@@ -156,6 +156,11 @@ class StepMargin(Message, frozen=True, kw_only=True):
     rate_limit: float = 0.0  # [steps/s] of driver, tick and configuration
     share: float = 0.0  # of the limit that binds, pull-out torque included: 1 is all
     limited_by: str = ""  # "step rate", "pulse width" or "pull-out torque"
+
+    def __post_init__(self) -> None:
+        """As of any message, by one look at all numbers together: a plan has one of each joint."""
+        if not has_finite_sum((self.peak_rate, self.rate_limit, self.share)):
+            super().__post_init__()
 
 
 class PlanningTimes(Message, frozen=True, kw_only=True):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from itertools import chain
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -103,15 +102,18 @@ class Planner:
         watch, deadline = watch or Stopwatch(clock), Deadline(clock, request.allowed_time, clock(), cancel)
         self.checker.deadline = self.checker.world.deadline = deadline.extended(LATEST)
         try:
-            response = self._plan(request, present, age, deadline, watch)
+            return self._plan(request, present, age, deadline, watch)
         except PlanRefused as refused:
-            response = PlanResponse(code=refused.code, refusal=refused.refusal, fraction=refused.fraction)
+            return PlanResponse(
+                code=refused.code,
+                refusal=refused.refusal,
+                fraction=refused.fraction,
+                times=watch.times,
+                scene_version=self.checker.world.scene.version,
+                scene_epoch=self.checker.world.scene.epoch,
+            )
         finally:
             self.checker.deadline = self.checker.world.deadline = NEVER
-        scene = self.checker.world.scene
-        return msgspec.structs.replace(
-            response, times=watch.times, scene_version=scene.version, scene_epoch=scene.epoch
-        )
 
     def planned_path(self, trajectory: JointTrajectory, stamp: int) -> PlannedPath:
         """The path of the tool, for eyes; `stamp` [ns] UNIX."""
@@ -136,7 +138,7 @@ class Planner:
         self.checker.clearance = self._clearance(request)
         start = resolve_start(self.arm, request.start, present, age)
         margin = self._start_margin(start, deadline)
-        builder = TrajectoryBuilder(self.arm, self.checker, request, limits, margin, watch, deadline.extended(LATEST))
+        builder = TrajectoryBuilder(self.arm, self.checker, request, limits, margin, watch, self.checker.deadline)
         context = PlanningContext(request, start, limits, margin, builder, deadline, watch)
         fraction, stopped_by = 1.0, None
         if isinstance(request.motion, LinearMotion | CircularMotion):
@@ -159,6 +161,9 @@ class Planner:
             planner_id=planner_id,
             fraction=fraction,
             stopped_by=stopped_by,
+            times=watch.times,
+            scene_version=self.checker.world.scene.version,
+            scene_epoch=self.checker.world.scene.epoch,
         )
 
     def _verified(self, trajectory: JointTrajectory, end: Start, context: PlanningContext) -> VerifiedTrajectory:

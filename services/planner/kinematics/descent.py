@@ -75,7 +75,13 @@ class Descent:
             return self._descend(
                 target, start, lambda q: target.error_and_jacobian(self._kinematics, q), target.is_exact
             )
-        return Attempt(*self._native.descend(start, *_exact_target(target)))
+        return Attempt(*self._native.descend(start[None], *_exact_target(target))[0])
+
+    def descend_all(self, target: ToolTarget, starts: Array) -> list[Attempt]:
+        """As `descend`, from each of `starts` (m, n) [rad] or [m]; in one call where it is an exact pose."""
+        if self._native is None or target.pointing is not None or target.is_tolerant:
+            return [self.descend(target, start) for start in starts]
+        return [Attempt(*end) for end in self._native.descend(starts, *_exact_target(target))]
 
     def knows_centring(self, target: ToolTarget) -> bool:
         """True if `centred` answers for this target: built, and the target is an exact one."""

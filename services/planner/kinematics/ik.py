@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import chain, islice
+from itertools import chain, islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
 STARTS = 24  # beside the present configuration; chosen: `ik_success` of the bench holds it
 FULL_POSE_JOINTS, MORE_STARTS = 6, 64  # that many where a full pose has to be searched for
+REFINED = 8  # of the closed form together, behind the first one, which mostly will do
 BATCH = 4  # starts that are tried together before their solutions are handed out
 FEW = 4  # starts where the closed form finds nothing, which it has never missed
 FINE_TURNS, MOST_AT_LIMITS = (
@@ -52,7 +53,7 @@ class InverseKinematics:
         turning = [index for index in chain_order(arm)[1:] if arm.joints[index].unit == "rad"]
         self._mirrored = [index for index in turning if not self._idle[index]]
         self._period = np.array([math.tau if math.isinf(joint.upper) else 0.0 for joint in arm.joints])
-        self._starts = spread(arm, self._start_count(arm))
+        self._starts = np.array(spread(arm, self._start_count(arm)))
 
     @property
     def is_closed_form(self) -> bool:
@@ -90,11 +91,15 @@ class InverseKinematics:
     def _closed_form_solutions(self, target: ToolTarget, near: Array) -> Iterator[Array]:
         """The closed form's configurations, each refined until it meets the target; lazily, the nearest first."""
         rows = self._closed_form_configurations(target, near)
+        if not len(rows):
+            return
         travels = np.abs(rows - near) / self._speed
-        for place in np.argsort(travels.max(axis=1), kind="stable").tolist():
-            attempt = self._descent.descend(target, rows[place])
-            if attempt.is_solution:
-                yield attempt.positions
+        nearest = rows[np.argsort(travels.max(axis=1), kind="stable")]
+        begins = [0, *range(1, len(nearest), REFINED)]
+        for begin, end in pairwise([*begins, len(nearest)]):
+            for attempt in self._descent.descend_all(target, nearest[begin:end]):
+                if attempt.is_solution:
+                    yield attempt.positions
 
     def _closed_form_configurations(self, target: ToolTarget, near: Array) -> Array:
         """(m, n) [rad] or [m], in no order."""
@@ -199,9 +204,10 @@ class InverseKinematics:
         return bool((np.abs(np.array(found) - positions) / self._speed).max(axis=1).min() > same)
 
     def _attempts(self, target: ToolTarget, near: Array, deadline: Deadline) -> Iterator[Attempt]:
-        """Descents from starts spread over the limits; the first few lie around `near`."""
-        for index, point in enumerate(self._starts):
+        """Descents from starts spread over the limits, `BATCH` at once; the first ones lie around `near`."""
+        starts = self._starts.copy()
+        starts[:BATCH] = near + 0.25 * (starts[:BATCH] - 0.5 * (self._lower + self._upper))
+        for begin in range(0, len(starts), BATCH):
             if deadline.has_passed():
                 return
-            start = near + 0.25 * (point - 0.5 * (self._lower + self._upper)) if index < 4 else point
-            yield self.descend(target, start)
+            yield from self._descent.descend_all(target, starts[begin : begin + BATCH])

@@ -58,6 +58,9 @@ class NativePlanner:
         self._bulge = bulge
         self._assembly = Assembly(arm, bulge)
         self._scene = self._assembly.compiled_scene((), {})
+        self._lower, self._upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
+        self._is_limited = bool(np.isfinite((self._lower, self._upper)).all())
+        self._weights = 1.0 / np.array([joint.velocity for joint in arm.joints])
 
     @property
     def kernel(self) -> str:
@@ -186,7 +189,7 @@ class NativePlanner:
         """
         rows = self._rows(np.atleast_2d(np.asarray(goals, dtype=np.float64)))
         at = self._row(start)
-        bounds = np.array([*self._span(np.vstack((at, rows))), [1.0 / joint.velocity for joint in self.arm.joints]])
+        bounds = np.array((*self._span(at, rows), self._weights))
         flag = cancel if isinstance(cancel, NativeCancelFlag) else None  # another kind is only seen by the caller
         world, margin = self._scene.world, self.margin
         done = motion.plan(world, self._kernel, bounds, at, rows, seed, margin, time_limit, flag, enough)
@@ -200,11 +203,15 @@ class NativePlanner:
         """(rows, spheres, 3) [m] in the base, in the order of the trees: for tests and pictures."""
         return motion.centres(self._scene.world, self._kernel, self._rows(positions))
 
-    def _span(self, ends: Array) -> tuple[Array, Array]:
-        """Where is searched: within the limits, and half a turn around `ends` (m, n) where a joint has none."""
-        lower, upper = np.array([(joint.lower, joint.upper) for joint in self.arm.joints]).T
+    def _span(self, start: Array, goals: Array) -> tuple[Array, Array]:
+        """Where is searched: within the limits, and where a joint has none, half a turn around `start` (n,) and `goals`
+        (m, n)."""
+        if self._is_limited:
+            return self._lower, self._upper
+        ends = np.vstack((start, goals))
         around = ends.min(axis=0) - math.pi, ends.max(axis=0) + math.pi
-        return np.where(np.isfinite(lower), lower, around[0]), np.where(np.isfinite(upper), upper, around[1])
+        is_finite = np.isfinite(self._lower), np.isfinite(self._upper)
+        return np.where(is_finite[0], self._lower, around[0]), np.where(is_finite[1], self._upper, around[1])
 
     def _rows(self, values: ArrayLike) -> Array:
         rows = np.ascontiguousarray(values, dtype=np.float64)

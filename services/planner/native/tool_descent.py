@@ -23,27 +23,29 @@ class NativeDescent:
 
     def descend(
         self,
-        start: Array,
+        starts: Array,
         position: Array,
         rotation: Array,
         metres_per_radian: float,
         position_tolerance: float,
         rotation_tolerance: float,
-    ) -> tuple[Array, float, bool]:
-        """Where the descent from `start` (n,) ends, how far from `position` (3,) [m] and `rotation` (9,), by rows or
-        empty, and True if that is within the tolerances [m] and [rad]; the error is in [m], a radian counts
+    ) -> list[tuple[Array, float, bool]]:
+        """For each of `starts` (m, n) where the descent ends, how far from `position` (3,) [m] and `rotation` (9,), by
+        rows or empty, and True if that is within the tolerances [m] and [rad]; the error is in [m], a radian counts
         `metres_per_radian`."""
-        rows = np.ascontiguousarray(start, dtype=np.float64)[None]
-        end = motion.descend(
+        ends = motion.descend(
             self._arm,
-            rows,
+            np.ascontiguousarray(starts, dtype=np.float64),
             np.ascontiguousarray(position, dtype=np.float64),
             np.ascontiguousarray(rotation, dtype=np.float64),
             metres_per_radian,
             position_tolerance,
             rotation_tolerance,
-        )[0]
-        return end[:-2].copy(), float(end[-2]), bool(end[-1])
+        )
+        reached = ends[:, :-2].copy()
+        return [
+            (row, error, is_there == 1.0) for row, (error, is_there) in zip(reached, ends[:, -2:].tolist(), strict=True)
+        ]
 
     def centred(
         self,

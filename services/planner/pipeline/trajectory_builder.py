@@ -141,7 +141,7 @@ class TrajectoryBuilder:
                 seen = look(states)
                 self._require_free(seen.positions, free_line)
             try:
-                require_ends(trajectory, start, goal, states)
+                require_ends(trajectory, start, goal)
                 require_limits(self._arm, states, seen, self._limits, self._request.timing is Timing.JERK_LIMITED)
             except BadTrajectory as error:
                 raise not_verified(str(error)) from error

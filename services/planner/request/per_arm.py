@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import TypeVar
+from operator import is_
+from typing import ParamSpec, TypeVar
 
-from services.arm.model.description import Arm
-
+P = ParamSpec("P")
 T = TypeVar("T")
 
 
-def once_per_arm(make: Callable[[Arm], T]) -> Callable[[Arm], T]:
-    """Decorates a function of the arm: its newest result is returned again as long as the arm is the same one, and is
-    not to be changed."""
-    newest: tuple[Arm, T] | None = None
+def once_per_arm(make: Callable[P, T]) -> Callable[P, T]:
+    """Decorates a function of the arm, and of what else is mostly the same object from plan to plan: its newest result
+    is returned again as long as all are the same ones, and is not to be changed. Called by places alone."""
+    newest: tuple[tuple[object, ...], T] | None = None
 
     @wraps(make)
-    def kept(arm: Arm) -> T:
+    def kept(*made_of: P.args, **named: P.kwargs) -> T:
         nonlocal newest
         known = newest
-        if known is None or known[0] is not arm:
-            newest = known = (arm, make(arm))
+        if known is None or not all(map(is_, known[0], made_of)):
+            newest = known = (made_of, make(*made_of, **named))
         return known[1]
 
     return kept

@@ -84,12 +84,23 @@ class States(NamedTuple):
     accelerations: Array
 
 
+def tuples_in_python(rows: Array) -> list[tuple[float, ...]]:
+    """`tuples` of `rows` (m, n), where the core is not built."""
+    return list(map(tuple, rows.tolist()))
+
+
+@where_built(tuples_in_python)
+def tuples(rows: Array) -> list[tuple[float, ...]]:
+    """The numbers of `rows` (m, n), as messages have them."""
+    return motion.tuples(np.ascontiguousarray(rows))
+
+
 def trajectory_of(names: Sequence[str], states: States) -> JointTrajectory:
     """The states as points."""
-    times, *columns = (column.tolist() for column in states)
+    times, *columns = states
     points = [
         TrajectoryPoint(positions=p, velocities=v, accelerations=a, time_from_start=t)
-        for t, p, v, a in zip(times, *(map(tuple, column) for column in columns), strict=True)
+        for t, p, v, a in zip(times.tolist(), *map(tuples, columns), strict=True)
     ]
     return JointTrajectory(joint_names=tuple(names), points=tuple(points))
 

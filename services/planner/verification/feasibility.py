@@ -174,9 +174,14 @@ def queue_share(arm: Arm, trajectory: JointTrajectory) -> float:
 
 
 def _queue_share(arm: Arm, states: States) -> float:
-    peaks = np.abs(states.velocities).max(axis=0)
-    braking = max(peak / joint.acceleration for joint, peak in zip(arm.joints, peaks.tolist(), strict=True))
+    braking = float((np.abs(states.velocities).max(axis=0) / _accelerations(arm)).max())
     return float(LEAD + 0.5 * braking) / (arm.device.queue_capacity * KNOT)
+
+
+@once_per_arm
+def _accelerations(arm: Arm) -> Array:
+    """(n,) [rad/s^2] or [m/s^2] of the joints."""
+    return np.array([joint.acceleration for joint in arm.joints])
 
 
 def sentence(margin: StepMargin) -> str:

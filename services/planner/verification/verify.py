@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from itertools import chain
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 DENSITY = 10  # samples between two points; chosen: a quintic between two points 0.05 s apart bends little in 5 ms
 ROUNDING = 1e-9  # [rad] or [m], and a share of limits: what floating point may add
 
+SIDES = np.array([[-1.0], [1.0], [1.0], [1.0], [1.0]])  # a position is above its lower limit, all else below
 LOOSE_JERK = 1.01  # share of the limit; chosen: third differences of neighbouring points have few digits left
 
 
@@ -42,22 +43,19 @@ class Samples:
 
 
 class Look(NamedTuple):
-    """`positions` (m, n) of samples, and what they all reach, (n,) each: the least and the largest position, and the
-    largest size of each derivative."""
+    """`positions` (m, n) of samples, and what they all have `reached`, (5, n): the least and the largest position, and
+    the largest size of each derivative."""
 
     positions: Array
-    lower: Array
-    upper: Array
-    velocity: Array
-    acceleration: Array
-    jerk: Array
+    reached: Array
 
 
 def look_in_python(states: States) -> Look:
     """`look`, where the core is not built."""
     samples = sample_between(*states)
     sizes = (np.abs(rows).max(axis=0) for rows in (samples.velocities, samples.accelerations, samples.jerks))
-    return Look(samples.positions, samples.positions.min(axis=0), samples.positions.max(axis=0), *sizes)
+    reached = np.array((samples.positions.min(axis=0), samples.positions.max(axis=0), *sizes))
+    return Look(samples.positions, reached)
 
 
 @where_built(look_in_python)
@@ -160,20 +158,21 @@ def limit_shares(samples: Samples, limits: JointLimits) -> tuple[float, float, f
 def require_limits(arm: Arm, states: States, seen: Look, limits: JointLimits, is_jerk_limited: bool) -> None:
     """`require_within_limits` and, where it is jerk-limited, `require_jerk` of the trajectory through `states`, at
     which `seen` has looked; raises `BadTrajectory`."""
-    loose = 1.0 + ROUNDING
-    lower, upper = _bounds(arm)
-    is_within = (
-        (seen.lower >= lower).all()
-        and (seen.upper <= upper).all()
-        and (seen.velocity <= loose * limits.velocity).all()
-        and (seen.acceleration <= loose * limits.acceleration).all()
-        and not (is_jerk_limited and not (seen.jerk <= LOOSE_JERK * limits.jerk).all())
-    )
+    is_within = bool((seen.reached * SIDES <= _most(arm, limits, is_jerk_limited)).all())
     if not is_within:
         samples = sample_between(*states)
         require_within_limits(arm, samples, limits)
         if is_jerk_limited:
             require_jerk(arm, samples, limits)
+
+
+@once_per_arm
+def _most(arm: Arm, limits: JointLimits, is_jerk_limited: bool) -> Array:
+    """(5, n) that each row of `Look.reached` may be, times `SIDES`."""
+    lower, upper = _bounds(arm)
+    loose = 1.0 + ROUNDING
+    jerk = LOOSE_JERK * limits.jerk if is_jerk_limited else np.full(len(lower), np.inf)
+    return np.array((-lower, upper, loose * limits.velocity, loose * limits.acceleration, jerk))
 
 
 @once_per_arm
@@ -209,16 +208,13 @@ def require_jerk(arm: Arm, samples: Samples, limits: JointLimits) -> None:
         raise BadTrajectory(f'jerk of "{name}" is {share[row, column]:.3g} times its limit at {t:.3f} s')
 
 
-def require_ends(
-    trajectory: JointTrajectory, start: tuple[float, ...], goal: tuple[float, ...], states: States | None = None
-) -> None:
+def require_ends(trajectory: JointTrajectory, start: tuple[float, ...], goal: tuple[float, ...]) -> None:
     """Raises `BadTrajectory` unless the trajectory leads exactly from `start` to `goal`, (n,) [rad] or [m], at rest at
-    both, with increasing times; `states` are its points, where they are at hand."""
-    times = (states or states_of(trajectory)).times
-    early = np.flatnonzero(~(times[:-1] < times[1:]))
-    if early.size:
-        before, after = times[early[0] : early[0] + 2].tolist()
-        raise BadTrajectory(f"the trajectory goes from {before:.6f} s to {after:.6f} s")
+    both, with increasing times."""
+    times = [point.time_from_start for point in trajectory.points]
+    for before, after in pairwise(times):
+        if not before < after:
+            raise BadTrajectory(f"the trajectory goes from {before:.6f} s to {after:.6f} s")
     first, last = trajectory.points[0], trajectory.points[-1]
     if first.positions != start or last.positions != goal or first.time_from_start != 0.0:
         raise BadTrajectory("the trajectory does not lead from the start to the goal")

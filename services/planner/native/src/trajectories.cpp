@@ -45,22 +45,37 @@ nb::tuple quintics(const Row& stamps, const Rows& p, const Rows& v, const Rows& 
     return nb::make_tuple(taken(0), taken(1), taken(2), taken(3));
 }
 
-// Positions (k, n) of samples at `shares` of each segment, the least and the largest of them, and the
-// largest sizes of velocities, accelerations and jerks, (n,) each.
+// Positions (k, n) of samples at `shares` of each segment, and (5, n) the least and the largest of them, and the
+// largest sizes of velocities, accelerations and jerks.
 nb::tuple sampled(const Row& stamps, const Rows& p, const Rows& v, const Rows& a, const Row& shares) {
     const TrajectoryView trajectory = trajectory_of(stamps, p, v, a);
     const size_t dof = trajectory.dof, segments = stamps.size() - 1, rows = segments * shares.size();
     std::vector<double> positions(rows * dof);
-    std::array<std::vector<double>, 5> reached;
-    for (auto& each : reached) each.resize(dof);
+    std::vector<double> reached(5 * dof);
+    const auto row = [&](size_t k) { return reached.data() + k * dof; };
     {
         nb::gil_scoped_release release;
         sample_all(trajectory, segments, shares.data(), shares.size(), positions.data(),
-                   {reached[0].data(), reached[1].data(), reached[2].data(), reached[3].data(), reached[4].data()});
+                   {row(0), row(1), row(2), row(3), row(4)});
     }
-    const auto taken = [&](size_t k) { return array_of(std::move(reached[k]), {dof}); };
-    return nb::make_tuple(array_of(std::move(positions), {rows, dof}), taken(0), taken(1), taken(2), taken(3),
-                          taken(4));
+    return nb::make_tuple(array_of(std::move(positions), {rows, dof}), array_of(std::move(reached), {size_t{5}, dof}));
+}
+
+// A tuple of floats for each of `rows` (m, n).
+nb::list tuples(const Rows& rows) {
+    nb::list result;
+    const auto columns = static_cast<Py_ssize_t>(rows.shape(1));
+    for (size_t i = 0; i < rows.shape(0); ++i) {
+        nb::object row = nb::steal(PyTuple_New(columns));
+        if (!row.is_valid()) throw nb::python_error();
+        for (Py_ssize_t k = 0; k < columns; ++k) {
+            PyObject* number = PyFloat_FromDouble(rows(i, static_cast<size_t>(k)));
+            if (number == nullptr) throw nb::python_error();
+            PyTuple_SET_ITEM(row.ptr(), k, number);
+        }
+        result.append(row);
+    }
+    return result;
 }
 
 // How far any of `rows` (m, n) is at most from the line between two rows (2, n), in any joint.
@@ -150,6 +165,7 @@ void add_trajectories(nb::module_& module) {
                "index"_a);
     module.def("peak_rates", &rates_of, "start"_a, "square"_a, "cube"_a, "shares"_a, "knot"_a);
     module.def("sampled", &sampled, "stamps"_a, "positions"_a, "velocities"_a, "accelerations"_a, "shares"_a);
+    module.def("tuples", &tuples, "rows"_a);
     module.def("most_aside", &most_aside, "line"_a, "rows"_a);
     module.def("stream_rates", &stream_rates, "stamps"_a, "positions"_a, "velocities"_a, "accelerations"_a, "scale"_a,
                "shares"_a, "begin"_a, "end"_a, "last"_a, "knot"_a, "subdivision"_a);
