@@ -13,7 +13,7 @@ from services.arm.interpolation import TrajectorySampler
 from services.arm.model.description import Arm
 from services.planner.collision.clearance import first_collision
 from services.planner.core import Planner
-from services.planner.timing.profile import joint_limits, straight_line
+from services.planner.timing.profile import States, joint_limits, straight_line
 from services.planner.verification import verify
 from services.planner.verification.verify import BadTrajectory, require_ends, require_within_limits, sample
 
@@ -81,6 +81,17 @@ def test_compiled_and_in_python_a_trajectory_is_seen_to_reach_as_far(trajectory:
     aside = verify.aside(line, compiled.positions)
     assert aside == pytest.approx(verify.aside_in_python(line, compiled.positions), rel=1e-9)
     assert aside > 1e-4
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_however_a_trajectory_swings_it_is_seen_to_reach_as_far(seed: int):
+    random = np.random.default_rng(seed)
+    times = np.cumsum(random.uniform(1e-3, 0.3, 30))
+    sizes = (1.0, 10.0 ** random.uniform(-3.0, 1.0), 10.0 ** random.uniform(-3.0, 2.0))
+    states = States(times - times[0], *(size * random.normal(size=(30, 5)) for size in sizes))
+    compiled, python = verify.look(states), verify.look_in_python(states)
+    assert np.array_equal(compiled.reached[:-1], python.reached[:-1])
+    assert np.allclose(compiled.reached[-1], python.reached[-1], rtol=1e-12, atol=0.0)
 
 
 @pytest.mark.parametrize("what", ["positions", "velocities", "accelerations", "times"])

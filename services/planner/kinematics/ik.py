@@ -47,7 +47,8 @@ class InverseKinematics:
         self._closed: ClosedForm | None = None if is_numeric else closed_form(arm, kinematics)
         self._parallel: ParallelAxes | None = None if is_numeric else parallel_axes(arm, kinematics)
         self._lower, self._upper = one_turn(arm)
-        self._speed = np.array([joint.velocity for joint in arm.joints])
+        self._speeds = [joint.velocity for joint in arm.joints]
+        self._speed = np.array(self._speeds)
         self._idle = self._without_effect(arm)
         # The first joint of the chain turns the whole arm as it is: its mirror image is no other configuration.
         turning = [index for index in chain_order(arm)[1:] if arm.joints[index].unit == "rad"]
@@ -199,9 +200,11 @@ class InverseKinematics:
             new.append(positions)
 
     def _is_new(self, positions: Array, found: list[Array], same: float) -> bool:
-        if not found:
-            return True
-        return bool((np.abs(np.array(found) - positions) / self._speed).max(axis=1).min() > same)
+        values, speeds = positions.tolist(), self._speeds
+        return all(
+            any(abs(a - b) / speed > same for a, b, speed in zip(other.tolist(), values, speeds, strict=True))
+            for other in found
+        )
 
     def _attempts(self, target: ToolTarget, near: Array, deadline: Deadline) -> Iterator[Attempt]:
         """Descents from starts spread over the limits, `BATCH` at once; the first ones lie around `near`."""

@@ -25,12 +25,19 @@ TRIED = 3  # of them, the nearest, to which the straight path is looked at
 
 
 def nearby_free(
+    arm: Arm, core: NativePlanner, ends: list[Array], validity: ValidityChecker, seed: int, deadline: Deadline
+) -> list[Array | None]:
+    """For each of `ends` (n,) [rad] or [m] itself where the native planner lets it move, else a near one where it does;
+    None where none was found."""
+    return [
+        end if is_free else _nearby(arm, core, end, validity, seed, deadline)
+        for end, is_free in zip(ends, core.free(ends, SPARE).tolist(), strict=True)
+    ]
+
+
+def _nearby(
     arm: Arm, core: NativePlanner, configuration: Array, validity: ValidityChecker, seed: int, deadline: Deadline
 ) -> Array | None:
-    """`configuration` (n,) [rad] or [m] itself where the native planner lets it move, else a near one where it does;
-    None where none was found."""
-    if core.free(configuration[None], SPARE)[0]:
-        return configuration
     for rows in _around(arm, configuration, seed):
         for row in rows[core.free(rows, SPARE)][:TRIED]:
             if validity.is_line_free(configuration, row):

@@ -71,9 +71,8 @@ class Search:
 
     def _native(self, core: NativePlanner, sought: _Sought, deadline: Deadline) -> Path:
         """By the native planner, between where it lets the arm be; from the start and to a goal by straight lines."""
-        start, *goals = (
-            nearby_free(self._arm, core, end, sought.validity, sought.seed, deadline)
-            for end in (sought.start, *sought.goals)
+        start, *goals = nearby_free(
+            self._arm, core, [sought.start, *sought.goals], sought.validity, sought.seed, deadline
         )
         if start is None:
             raise PathNotFound(SearchFailure.START_TOUCHES)
@@ -81,13 +80,13 @@ class Search:
         if not ends:
             raise PathNotFound(SearchFailure.GOAL_TOUCHES)
         path = native_path(core, start, np.array([near for _, near in ends]), sought.seed, sought.attempts, deadline)
-        goal = next(goal for goal, near in ends if np.array_equal(near, path.corners[-1]))
+        goal = next(goal for goal, near in ends if (near == path.corners[-1]).all())
         return self._joined(sought, start, path, goal, deadline)
 
     def _joined(self, sought: _Sought, near: Array, path: FreePath, goal: Array, deadline: Deadline) -> Path:
         """The native planner's path from near the start to near the goal, continued to both; where it is not, the curve
         stays as it is."""
-        is_at_goal = np.array_equal(goal, path.corners[-1])
+        is_at_goal = bool((goal == path.corners[-1]).all())
         if near is sought.start and is_at_goal:
             return Path(path.corners, path.control, NATIVE)
         with sought.watch.phase("smoothing"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 from schemas.planning import PlanningTimes
@@ -53,7 +53,9 @@ class Deadline:
 
     def has_passed(self) -> bool:
         """True if no time is left, or the plan is cancelled."""
-        return self.left <= 0.0
+        if self.cancel is not None and self.cancel.is_set():
+            return True
+        return not self.allowed - (self.clock() - self.began) > 0.0
 
     def check(self) -> None:
         """Raises `PlanRefused` (TIMED_OUT) if the deadline has passed."""
@@ -62,12 +64,12 @@ class Deadline:
 
     def extended(self, part: float) -> Deadline:
         """A deadline later by `part`, a share of the time allowed, for the answer to one that has passed."""
-        return replace(self, allowed=(1.0 + part) * self.allowed)
+        return Deadline(self.clock, (1.0 + part) * self.allowed, self.began, self.cancel)
 
     def share(self, part: float) -> Deadline:
         """A deadline within this one: only `part`, a share in (0, 1], of the time that is left."""
         now = self.clock()
-        return replace(self, allowed=part * (self.allowed - (now - self.began)), began=now)
+        return Deadline(self.clock, part * (self.allowed - (now - self.began)), now, self.cancel)
 
 
 NEVER = Deadline()

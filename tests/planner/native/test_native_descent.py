@@ -62,6 +62,17 @@ def test_what_they_call_a_solution_meets_the_target(both: Both, with_turn: bool)
             assert (both.compiled.clip(attempt.positions) == attempt.positions).all()
 
 
+@pytest.mark.parametrize("tolerance", [0.0, 0.01])
+def test_several_at_once_end_where_each_alone_does(both: Both, tolerance: float):
+    pose = both.kinematics.tool(both.rows[0])
+    target = ToolTarget(pose.position, pose.rotation, position_tolerance=tolerance)
+    for one, start in zip(both.compiled.descend_all(target, both.rows), both.rows, strict=True):
+        alone = both.compiled.descend(target, start)
+        assert np.array_equal(one.positions, alone.positions)
+        assert (one.error, one.is_solution) == (alone.error, alone.is_solution)
+    assert both.compiled.descend_all(target, both.rows[:0]) == []
+
+
 @pytest.mark.parametrize("angle", [1e-9, 1e-4, 1.0, 3.0, np.pi - 1e-4])
 def test_turns_of_every_size_are_taken_as_pinocchio_does(angle: float):
     both = Both(load_arm(project_root() / "urdf/parol6"))

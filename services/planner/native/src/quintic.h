@@ -81,30 +81,62 @@ inline void shrink(double value, double& least) {
     if (!(value >= least) && !std::isnan(least)) least = value;
 }
 
+// Chosen: more than what rounding takes from a bound, which is of the size of all the terms that it bounds.
+constexpr double kNoLess = 1.0 + 1e-10;
+
+// No less than the size of c0 + c1 u + c2 u^2 + c3 u^3 + c4 u^4 for u from 0 to 1: a polynomial lies between the least
+// and the largest of its coefficients by Bernstein (Farouki 2012, section 5.1). What is no number stays.
+inline double bound(double c0, double c1, double c2, double c3 = 0.0, double c4 = 0.0) {
+    double most = 0.0;
+    grow(std::abs(c0), most);
+    grow(std::abs(c0 + c1 / 4.0), most);
+    grow(std::abs(c0 + c1 / 2.0 + c2 / 6.0), most);
+    grow(std::abs(c0 + 3.0 * c1 / 4.0 + c2 / 2.0 + c3 / 4.0), most);
+    grow(std::abs(c0 + c1 + c2 + c3 + c4), most);
+    return kNoLess * most;
+}
+
 // Samples at so many `shares` of each segment: positions by rows into `positions`, and what they and their derivatives
-// reach.
+// reach. Derivatives are only looked at in segments in which they may reach farther than before.
 inline void sample_all(const TrajectoryView& trajectory, size_t segments, const double* shares, size_t count,
                        double* positions, const ExtremesView& reached) {
     const size_t dof = trajectory.dof;
     for (double* most : {reached.velocity, reached.acceleration, reached.jerk}) std::fill_n(most, dof, 0.0);
     std::copy_n(trajectory.positions, dof, reached.lower);
     std::copy_n(trajectory.positions, dof, reached.upper);
-    std::vector<double> derivatives(3 * dof);
-    Segment quintics;
-    for (size_t segment = 0; segment < segments; ++segment) {
+    std::vector<double> places(count);
+    for (size_t segment = 0; segment < segments; ++segment, positions += count * dof) {
         const double begin = trajectory.stamps[segment], lasts = trajectory.stamps[segment + 1] - begin;
-        quintics.begin(trajectory, segment);
-        for (size_t place = 0; place < count; ++place) {
-            const SampleView sample{positions, &derivatives[0], &derivatives[dof], &derivatives[2 * dof]};
-            quintics.sample(begin + shares[place] * lasts, sample);
-            for (size_t i = 0; i < dof; ++i) {
-                shrink(sample.positions[i], reached.lower[i]);
-                grow(sample.positions[i], reached.upper[i]);
-                grow(std::abs(sample.velocities[i]), reached.velocity[i]);
-                grow(std::abs(sample.accelerations[i]), reached.acceleration[i]);
-                grow(std::abs(sample.jerks[i]), reached.jerk[i]);
+        const double squared = lasts * lasts, cubed = std::pow(lasts, 3.0);
+        for (size_t place = 0; place < count; ++place) places[place] = (begin + shares[place] * lasts - begin) / lasts;
+        for (size_t i = 0; i < dof; ++i) {
+            const auto [p0, v0, a0, third, fourth, fifth] = Quintic(trajectory, segment, i, lasts);
+            for (size_t place = 0; place < count; ++place) {
+                const double u = places[place];
+                const double position = p0 + u * (v0 + u * (a0 / 2.0 + u * (third + u * (fourth + u * fifth))));
+                positions[place * dof + i] = position;
+                shrink(position, reached.lower[i]);
+                grow(position, reached.upper[i]);
             }
-            positions += dof;
+            if (!(bound(v0, a0, 3.0 * third, 4.0 * fourth, 5.0 * fifth) / lasts <= reached.velocity[i])) {
+                for (const double u : places) {
+                    const double velocity =
+                        (v0 + u * (a0 + u * (3.0 * third + u * (4.0 * fourth + u * 5.0 * fifth)))) / lasts;
+                    grow(std::abs(velocity), reached.velocity[i]);
+                }
+            }
+            if (!(bound(a0, 6.0 * third, 12.0 * fourth, 20.0 * fifth) / squared <= reached.acceleration[i])) {
+                for (const double u : places) {
+                    const double acceleration =
+                        (a0 + u * (6.0 * third + u * (12.0 * fourth + u * 20.0 * fifth))) / squared;
+                    grow(std::abs(acceleration), reached.acceleration[i]);
+                }
+            }
+            if (!(bound(6.0 * third, 24.0 * fourth, 60.0 * fifth) / cubed <= reached.jerk[i])) {
+                for (const double u : places) {
+                    grow(std::abs((6.0 * third + u * (24.0 * fourth + u * 60.0 * fifth)) / cubed), reached.jerk[i]);
+                }
+            }
         }
     }
 }
@@ -130,8 +162,6 @@ struct StreamView {
     size_t knots, dof, slots;
     double knot;
 };
-
-constexpr double kNoLess = 1.0 + 1e-12;  // chosen: more than what rounding takes from a bound
 
 // The largest rate [steps/s] of each joint, into `peaks` (dof,); what is no number is larger than all others.
 inline void peak_rates(const StreamView& stream, const double* shares, double* peaks) {
