@@ -7,13 +7,15 @@ neither by decoding nor by construction.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from math import isfinite
 from typing import TypeVar
 
 import msgspec
+from msgspec.structs import astuple
 
 Vector = tuple[float, ...]
+UNLIKE_FLOATS = frozenset((str, int, bool))  # they are finite, and hold nothing
 
 
 class BadMessage(ValueError):
@@ -24,16 +26,29 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
     """A frozen record with defaults for every field and no NaN or infinity anywhere in it."""
 
     def __post_init__(self) -> None:
-        for field, value in zip(self.__struct_fields__, msgspec.structs.astuple(self), strict=True):
+        values = astuple(self)
+        for value in values:
             kind = type(value)
             if kind is float:
-                if not math.isfinite(value):
-                    raise ValueError(f"field `{field}` is {value}: it must be finite")
-            elif kind is tuple or kind is list:
+                if not isfinite(value):
+                    break
+            elif (kind is tuple or kind is list) and value and not _is_plainly_finite(value):
+                break
+        else:
+            return
+        for field, value in zip(self.__struct_fields__, values, strict=True):
+            if type(value) is float and not isfinite(value):
+                raise ValueError(f"field `{field}` is {value}: it must be finite")
+            if type(value) is tuple or type(value) is list:
                 _require_finite(field, value)
 
 
 M = TypeVar("M", bound=Message)
+
+
+def _is_plainly_finite(values: Sequence[object]) -> bool:
+    """A quick answer: True only where nothing in `values` can be anything but finite."""
+    return has_finite_sum(values) if type(values[0]) is float else UNLIKE_FLOATS.issuperset(map(type, values))
 
 
 def _require_finite(field: str, values: Sequence[object]) -> None:
@@ -41,7 +56,7 @@ def _require_finite(field: str, values: Sequence[object]) -> None:
         return
     for index, value in enumerate(values):
         if type(value) is float:
-            if not math.isfinite(value):
+            if not isfinite(value):
                 raise ValueError(f"field `{field}[{index}]` is {value}: it must be finite")
         elif type(value) is tuple or type(value) is list:
             _require_finite(f"{field}[{index}]", value)
@@ -50,7 +65,7 @@ def _require_finite(field: str, values: Sequence[object]) -> None:
 def has_finite_sum(values: Sequence[object]) -> bool:
     """True only for numbers of which each is finite: what is not stays in the sum. A quick answer for long vectors."""
     try:
-        return math.isfinite(sum(values))  # type: ignore[arg-type]
+        return isfinite(sum(values))  # type: ignore[arg-type]
     except (TypeError, OverflowError):
         return False
 

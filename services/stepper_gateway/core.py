@@ -255,7 +255,7 @@ class GatewayCore:
         self._components.command_handler.tell_listeners(moment)
         self._components.control.tell(moment)
         status = status_of(self.device, moment)
-        if self._told is None or replace(status, stamp=0) != self._told:
-            self._told = replace(status, stamp=0)
-            self._components.out.publish(DEVICE_STATUS, status)
+        if status != self._told:
+            self._told = status
+            self._components.out.publish(DEVICE_STATUS, replace(status, stamp=moment.unix))
         return self._components.out.take()

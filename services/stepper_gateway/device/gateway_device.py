@@ -77,11 +77,13 @@ class GatewayDevice:
 
 
 def status_of(device: GatewayDevice, moment: Moment) -> DeviceStatus:
-    """Only the boot that says its states is described; a silent device is offline, whatever a broker has retained."""
+    """Without a stamp; only the boot that says its states is described.
+
+    A silent device is offline, whatever a broker has retained.
+    """
     unreachable_reason, session = device.unreachable_reason(moment), device.session
     report = session.status or StatusReport(online=False)
     return DeviceStatus(
-        stamp=moment.unix,
         online=not unreachable_reason,
         reason=unreachable_reason or device.not_ready_reason(),
         device=device.arm.device.name,
