@@ -45,7 +45,7 @@ def test_the_shares_of_a_path_are_those_of_its_curve(core, configurations):
         rows = configurations(80, 60 + round_)
         rows = rows[core.free(rows)]
         for start, goal in zip(rows[::2], rows[1::2], strict=False):
-            path = core.plan(start, goal, seed=round_, time_limit=0.5)
+            path = core.plan(start, goal, seed=round_, time_limit=0.1)
             if not isinstance(path, FreePath):
                 continue
             room = Room(np.full(len(start), 1e3), 1.0)
