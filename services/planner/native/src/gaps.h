@@ -30,13 +30,11 @@ inline Lanes bounds_gap(const Point& p, const float* low, const float* high) {
     return squared(out);
 }
 
-inline Lanes segment_gap(const Point& p, const float* from, const float* to) {
-    const float way[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
-    const float length = way[0] * way[0] + way[1] * way[1] + way[2] * way[2];
-    const Point off = p - Point{from[0], from[1], from[2]};
-    const Lanes along = (off.x * way[0] + off.y * way[1] + off.z * way[2]) * (length > 0.0f ? 1.0f / length : 0.0f);
+// From the begin of an edge to the point: `off`.
+inline Lanes edge_gap(const Point& off, const float* edge, float per_squared) {
+    const Lanes along = (off.x * edge[0] + off.y * edge[1] + off.z * edge[2]) * per_squared;
     const Lanes share = smaller(larger(along, 0.0f), 1.0f);
-    return squared(Point{off.x - share * way[0], off.y - share * way[1], off.z - share * way[2]});
+    return squared(Point{off.x - share * edge[0], off.y - share * edge[1], off.z - share * edge[2]});
 }
 
 // The nearest of the three edges, and of the face where the point is above it.
@@ -44,13 +42,10 @@ inline Lanes triangle_gap(const Point& p, const TriangleView& triangle) {
     const float* n = triangle.normal;
     Lanes nearest(0.0f), outside(0.0f);
     for (int i = 0; i < 3; ++i) {
-        const float *a = triangle.corner[i], *b = triangle.corner[(i + 1) % 3];
-        const Lanes gap = segment_gap(p, a, b);
+        const float *corner = triangle.corner[i], *inward = triangle.inward[i];
+        const Point off = p - Point{corner[0], corner[1], corner[2]};
+        const Lanes gap = edge_gap(off, triangle.edge[i], triangle.per_squared[i]);
         nearest = i == 0 ? gap : smaller(nearest, gap);
-        const float inward[3] = {n[1] * (b[2] - a[2]) - n[2] * (b[1] - a[1]),
-                                 n[2] * (b[0] - a[0]) - n[0] * (b[2] - a[2]),
-                                 n[0] * (b[1] - a[1]) - n[1] * (b[0] - a[0])};
-        const Point off = p - Point{a[0], a[1], a[2]};
         outside = larger(outside, Lanes(0.0f) - (off.x * inward[0] + off.y * inward[1] + off.z * inward[2]));
     }
     const float* a = triangle.corner[0];

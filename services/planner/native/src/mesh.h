@@ -98,7 +98,21 @@ class TriangleMesh {
             for (size_t i = 0; i < 3; ++i) view.corner[i][axis] = static_cast<float>(triangle[i][axis]);
             view.normal[axis] = twice_area > 1e-18 ? static_cast<float>(normal[axis] / twice_area) : 0.0f;
         }
+        for (size_t i = 0; i < 3; ++i) add_edge(i, view);
         return view;
+    }
+
+    // From the corner `i` to the next: what every distance to the triangle needs.
+    static void add_edge(size_t i, TriangleView& view) {
+        const float *from = view.corner[i], *to = view.corner[(i + 1) % 3], *n = view.normal;
+        float* edge = view.edge[i];
+        for (size_t axis = 0; axis < 3; ++axis) edge[axis] = to[axis] - from[axis];
+        const float squared = edge[0] * edge[0] + edge[1] * edge[1] + edge[2] * edge[2];
+        view.per_squared[i] = squared > 0.0f ? 1.0f / squared : 0.0f;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const size_t next = (axis + 1) % 3, last = (axis + 2) % 3;
+            view.inward[i][axis] = n[next] * edge[last] - n[last] * edge[next];
+        }
     }
 
     std::vector<Triangle> triangles_;

@@ -40,7 +40,10 @@ enum class ShapeKind : int32_t {
 
 struct TriangleView {
     float corner[3][3];
-    float normal[3];  // of length 1; zeros where the triangle has no area
+    float normal[3];       // of length 1; zeros where the triangle has no area
+    float edge[3][3];      // from each corner to the next
+    float per_squared[3];  // 1 by the square of each edge's length; 0 where it has none
+    float inward[3][3];    // across each edge into the triangle, as long as the edge
 };
 
 // An axis-aligned box around the triangles first .. first + count; inner ones have count 0.
