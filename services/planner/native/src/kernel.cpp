@@ -19,23 +19,60 @@ class CollisionCheck {
         result_ = {0, 0, -1, -1};
         half_ = load(query.half);
         place_frames(world_, query.joints, frames_);
-        if (query.steps == nullptr) return;
-        twist_frames(world_, query.steps, frames_, twists_);
-        slack_ = load(query.slack) + half_ * kRounding;
     }
 
     void run() {
-        for (int32_t part = 0; part < world_.part_count && !is_over(); ++part) {
-            const PartView& view = world_.parts[part];
-            roots_[part] = centre_of(frames_[view.frame], view.nodes[0]);
-            if (view.frame != 0) against_obstacles(part);  // what stands fixed cannot come nearer to anything
-        }
-        for (int32_t pair = 0; pair < world_.pair_count && !is_over(); ++pair) against_itself(pair);
+        if (query_.touching.first < 0 || !touch(query_.touching.first, query_.touching.second)) look_at_all();
         result_.hits &= query_.lanes;
         result_.near &= query_.lanes;
     }
 
   private:
+    void look_at_all() {
+        if (query_.steps != nullptr) {
+            twist_frames(world_, query_.steps, frames_, twists_);
+            slack_ = load(query_.slack) + half_ * kRounding;
+        }
+        for (int32_t part = 0; part < world_.part_count; ++part) {
+            roots_[part] = centre_of(frames_[world_.parts[part].frame], world_.parts[part].nodes[0]);
+        }
+        // The more lanes are known to be near, the less there is to look at for all others.
+        const int32_t first_part = query_.near.second >= kMaxParts ? query_.near.first : -1;
+        const int32_t first_pair = first_part < 0 && query_.near.first >= 0 ? pair_of(query_.near) : -1;
+        if (first_part >= 0) against_obstacles(first_part);
+        if (first_pair >= 0) against_itself(first_pair);
+        for (int32_t part = 0; part < world_.part_count && !is_over(); ++part) {
+            // What stands fixed cannot come nearer to anything.
+            if (part != first_part && world_.parts[part].frame != 0) against_obstacles(part);
+        }
+        for (int32_t pair = 0; pair < world_.pair_count && !is_over(); ++pair) {
+            if (pair != first_pair) against_itself(pair);
+        }
+    }
+
+    // The number of the pair of these two parts; -1 where there is none.
+    int32_t pair_of(const ContactView& parts) const {
+        for (int32_t pair = 0; pair < world_.pair_count; ++pair) {
+            const PairView& both = world_.pairs[pair];
+            if (both.first == parts.first && both.second == parts.second) return pair;
+        }
+        return -1;
+    }
+
+    // True if a part touches another one, or an obstacle, in a lane that matters; nothing is noted where it does not.
+    bool touch(int32_t first, int32_t second) {
+        const PartView& part = world_.parts[first];
+        begin(0.0f);
+        if (second >= kMaxParts) {
+            const int32_t obstacle[] = {second - kMaxParts};
+            const Descent down{part.nodes, &frames_[part.frame], world_.obstacles, first, -1};
+            descend(down, 0, centre_of(frames_[part.frame], part.nodes[0]), obstacle, 1);
+        } else {
+            against_solids(first, second);
+        }
+        return result_.hits != 0;
+    }
+
     bool is_over() const {
         if (query_.marks != nullptr) return false;
         const uint32_t hits = result_.hits & query_.lanes;
@@ -124,8 +161,14 @@ class CollisionCheck {
             begin(bounded(query_.pair_motion[pair], straight));
             if (within(gap, limit) == 0) return;
         }
+        against_solids(both.first, both.second);
+    }
+
+    // The spheres of the one part against the solids of the other.
+    void against_solids(int32_t spheres, int32_t solids) {
+        const PartView &first = world_.parts[spheres], &second = world_.parts[solids];
         const Placement seen = relative(frames_[second.frame], frames_[first.frame]);
-        const Descent down{first.nodes, &seen, second.solids, both.first, both.second};
+        const Descent down{first.nodes, &seen, second.solids, spheres, solids};
         for (int32_t done = 0; done < second.solid_count && !is_over(); done += kBatch) {
             int32_t batch[kBatch];
             int count = 0;

@@ -25,6 +25,10 @@ class MotionValidator {
     MotionValidator(const World& world, const Kernel& kernel, const Tolerances& tolerances)
         : world_(world), kernel_(kernel), tolerances_(tolerances), touching_(dof()) {}
 
+    // From now on what was found last is looked for first. Verdicts are the same, but of several contacts another one
+    // may be told of.
+    void learn() { is_learning_ = true; }
+
     // How many configurations have been looked at.
     uint64_t checks() const { return checks_; }
     const CheckResult& result() const { return result_; }  // the last contact, where the verdict is not kFree
@@ -205,9 +209,12 @@ class MotionValidator {
         const float margin = static_cast<float>(tolerances_.margin);
         kernel_.check(world_.view(),
                       {joints, half, is_moving ? steps : nullptr, slack, part_motion_.data(), pair_motion_.data(),
-                       margin, lanes, is_one_enough, marks},
+                       margin, lanes, is_one_enough, marks, is_one_enough ? touching_pair_ : ContactView{}, near_pair_},
                       result_);
         checks_ += count;
+        if (is_learning_ && result_.first >= 0) {
+            (result_.hits != 0 ? touching_pair_ : near_pair_) = {result_.first, result_.second};
+        }
         return result_.hits;
     }
 
@@ -225,6 +232,8 @@ class MotionValidator {
     Tolerances tolerances_;
     Joints touching_;
     CheckResult result_{};
+    bool is_learning_ = false;
+    ContactView touching_pair_, near_pair_;  // the newest ones
     uint64_t checks_ = 0;
     double motion_ = 0.0;
     Joints ends_;

@@ -91,6 +91,7 @@ inline Plan plan(const World& world, const Kernel& kernel, const Space& space, c
     const Tolerances hasty = told_to(kFinestSearched, world, kernel, query, tolerances);
     MotionValidator searching(world, kernel, hasty), last(world, kernel, tolerances);
     MotionValidator shortening(world, kernel, told_to(kFinestShortened, world, kernel, query, hasty));
+    for (MotionValidator* validator : {&searching, &shortening, &last}) validator->learn();
     std::vector<Joints> goals;
     for (const Joints& goal : query.goals) {
         if (searching.is_free(goal.data())) goals.push_back(goal);

@@ -101,6 +101,11 @@ struct WorldView {
     int32_t frame_count, part_count, pair_count, tree_count, unbounded_count, obstacle_count;
 };
 
+// Two parts, or a part and kMaxParts + an obstacle; -1: none.
+struct ContactView {
+    int32_t first = -1, second = -1;
+};
+
 struct CheckQuery {
     const float* joints;            // [dof][kLanes]
     const float* half;              // [kLanes] of the curve's parameter that each lane stands for, on both sides
@@ -112,6 +117,8 @@ struct CheckQuery {
     uint32_t lanes;         // which lanes matter
     bool first_hit_is_all;  // whether one lane's hit ends the question
     uint8_t* marks;  // null, or [parts][kMaxParts + obstacles]: all pairs near in a lane that matters are set to 1
+    // What is asked about first, for it has mostly been found before: whether these touch, and what is near these.
+    ContactView touching = {}, near = {};
 };
 
 struct CheckResult {
