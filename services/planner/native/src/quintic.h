@@ -54,12 +54,21 @@ class Segment {
     // At `time` [s].
     void sample(double time, const SampleView& sample) const {
         const double u = (time - began_) / dt_;
+        move(time, sample.positions, sample.velocities);
         for (size_t i = 0; i < joints_.size(); ++i) {
             const auto [p0, v0, a0, third, fourth, fifth] = joints_[i];
-            sample.positions[i] = p0 + u * (v0 + u * (a0 / 2.0 + u * (third + u * (fourth + u * fifth))));
-            sample.velocities[i] = (v0 + u * (a0 + u * (3.0 * third + u * (4.0 * fourth + u * 5.0 * fifth)))) / dt_;
             sample.accelerations[i] = (a0 + u * (6.0 * third + u * (12.0 * fourth + u * 20.0 * fifth))) / squared_;
             sample.jerks[i] = (6.0 * third + u * (24.0 * fourth + u * 60.0 * fifth)) / cubed_;
+        }
+    }
+
+    // As `sample`, of positions and velocities alone.
+    void move(double time, double* positions, double* velocities) const {
+        const double u = (time - began_) / dt_;
+        for (size_t i = 0; i < joints_.size(); ++i) {
+            const auto [p0, v0, a0, third, fourth, fifth] = joints_[i];
+            positions[i] = p0 + u * (v0 + u * (a0 / 2.0 + u * (third + u * (fourth + u * fifth))));
+            velocities[i] = (v0 + u * (a0 + u * (3.0 * third + u * (4.0 * fourth + u * 5.0 * fifth)))) / dt_;
         }
     }
 
@@ -111,13 +120,17 @@ inline void sample_all(const TrajectoryView& trajectory, size_t segments, const 
         for (size_t place = 0; place < count; ++place) places[place] = (begin + shares[place] * lasts - begin) / lasts;
         for (size_t i = 0; i < dof; ++i) {
             const auto [p0, v0, a0, third, fourth, fifth] = Quintic(trajectory, segment, i, lasts);
+            double least = reached.lower[i], largest = reached.upper[i], sum = 0.0;
             for (size_t place = 0; place < count; ++place) {
                 const double u = places[place];
                 const double position = p0 + u * (v0 + u * (a0 / 2.0 + u * (third + u * (fourth + u * fifth))));
                 positions[place * dof + i] = position;
-                shrink(position, reached.lower[i]);
-                grow(position, reached.upper[i]);
+                least = std::min(least, position);
+                largest = std::max(largest, position);
+                sum += position;
             }
+            grow(std::isnan(sum) ? sum : largest, reached.upper[i]);
+            shrink(std::isnan(sum) ? sum : least, reached.lower[i]);
             if (!(bound(v0, a0, 3.0 * third, 4.0 * fourth, 5.0 * fifth) / lasts <= reached.velocity[i])) {
                 for (const double u : places) {
                     const double velocity =
@@ -184,6 +197,13 @@ inline void peak_rates(const StreamView& stream, const double* shares, double* p
     }
 }
 
+// As std::nearbyint, which is a call on processors without SSE4.1, but for the sign of a zero: beyond 2^52 a double has
+// no fraction.
+inline double nearest_whole(double x) {
+    constexpr double kBig = 6755399441055744.0;  // 1.5 * 2^52
+    return std::abs(x) < 2251799813685248.0 ? (x + kBig) - kBig : std::nearbyint(x);
+}
+
 // From one knot to another of a trajectory of so many points, `knot` [s] apart; `scale` (dof,) [1/256 steps per rad or
 // m]. After the knot `last` the arm stands.
 struct KnotsView {
@@ -197,7 +217,7 @@ inline void peak_rates_of(const TrajectoryView& trajectory, const KnotsView& kno
                           double* peaks) {
     const size_t dof = trajectory.dof, rows = knots.end - knots.begin + 1;
     const double duration = trajectory.stamps[knots.points - 1];
-    std::vector<double> position(rows * dof), slope(rows * dof), unused(2 * dof);
+    std::vector<double> position(rows * dof), slope(rows * dof);
     Segment quintics;
     size_t segment = 0;
     quintics.begin(trajectory, 0);
@@ -207,11 +227,11 @@ inline void peak_rates_of(const TrajectoryView& trajectory, const KnotsView& kno
         while (segment + 2 < knots.points && trajectory.stamps[segment + 1] <= time) ++segment;
         if (segment != before) quintics.begin(trajectory, segment);
         double *at = &position[row * dof], *speed = &slope[row * dof];
-        quintics.sample(time, {at, speed, &unused[0], &unused[dof]});
+        quintics.move(time, at, speed);
         const bool is_last = row + 1 == rows && knots.end == knots.last;
         for (size_t i = 0; i < dof; ++i) {
-            at[i] = std::nearbyint(at[i] * knots.scale[i]);
-            speed[i] = is_last ? 0.0 : std::nearbyint(speed[i] * knots.scale[i]) * knots.knot;
+            at[i] = nearest_whole(at[i] * knots.scale[i]);
+            speed[i] = is_last ? 0.0 : nearest_whole(speed[i] * knots.scale[i]) * knots.knot;
         }
     }
     std::vector<double> square((rows - 1) * dof), cube((rows - 1) * dof);

@@ -63,17 +63,19 @@ nb::tuple sampled(const Row& stamps, const Rows& p, const Rows& v, const Rows& a
 
 // A tuple of floats for each of `rows` (m, n).
 nb::list tuples(const Rows& rows) {
-    nb::list result;
-    const auto columns = static_cast<Py_ssize_t>(rows.shape(1));
-    for (size_t i = 0; i < rows.shape(0); ++i) {
-        nb::object row = nb::steal(PyTuple_New(columns));
-        if (!row.is_valid()) throw nb::python_error();
+    const auto count = static_cast<Py_ssize_t>(rows.shape(0)), columns = static_cast<Py_ssize_t>(rows.shape(1));
+    nb::list result = nb::steal<nb::list>(PyList_New(count));
+    if (!result.is_valid()) throw nb::python_error();
+    const double* values = rows.data();
+    for (Py_ssize_t i = 0; i < count; ++i) {
+        PyObject* row = PyTuple_New(columns);
+        if (row == nullptr) throw nb::python_error();
+        PyList_SET_ITEM(result.ptr(), i, row);
         for (Py_ssize_t k = 0; k < columns; ++k) {
-            PyObject* number = PyFloat_FromDouble(rows(i, static_cast<size_t>(k)));
+            PyObject* number = PyFloat_FromDouble(*values++);
             if (number == nullptr) throw nb::python_error();
-            PyTuple_SET_ITEM(row.ptr(), k, number);
+            PyTuple_SET_ITEM(row, k, number);
         }
-        result.append(row);
     }
     return result;
 }
