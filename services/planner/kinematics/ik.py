@@ -54,6 +54,7 @@ class InverseKinematics:
         turning = [index for index in chain_order(arm)[1:] if arm.joints[index].unit == "rad"]
         self._mirrored = [index for index in turning if not self._idle[index]]
         self._period = np.array([math.tau if math.isinf(joint.upper) else 0.0 for joint in arm.joints])
+        self._is_limited = not self._period.any() and not self._idle.any()  # and each joint moves the tool
         self._starts = np.array(spread(arm, self._start_count(arm)))
 
     @property
@@ -151,6 +152,8 @@ class InverseKinematics:
     def _as_near(self, positions: Array, near: Array) -> Array:
         """The same pose of the tool with joints without limits less than half a turn from `near` (n,) [rad] or [m], and
         those that do not move the tool, as of a gripper, as they are there."""
+        if self._is_limited:
+            return positions
         turns = np.rint((positions - near) / np.where(self._period > 0.0, self._period, 1.0))
         return np.where(self._idle, near, positions - turns * self._period)
 
@@ -201,10 +204,13 @@ class InverseKinematics:
 
     def _is_new(self, positions: Array, found: list[Array], same: float) -> bool:
         values, speeds = positions.tolist(), self._speeds
-        return all(
-            any(abs(a - b) / speed > same for a, b, speed in zip(other.tolist(), values, speeds, strict=True))
-            for other in found
-        )
+        for other in found:  # without generators: most differ in the first joint already
+            for a, b, speed in zip(other.tolist(), values, speeds, strict=True):
+                if abs(a - b) / speed > same:
+                    break
+            else:
+                return False
+        return True
 
     def _attempts(self, target: ToolTarget, near: Array, deadline: Deadline) -> Iterator[Attempt]:
         """Descents from starts spread over the limits, `BATCH` at once; the first ones lie around `near`."""

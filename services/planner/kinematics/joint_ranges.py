@@ -27,13 +27,16 @@ class FullTurns:
         self._upper = np.array([joint.upper + ROUNDING for joint in arm.joints])
         self._speed = np.array([joint.velocity for joint in arm.joints])
         self._period = np.array([math.tau if joint.unit == "rad" else NEVER for joint in arm.joints])
+        self._is_limited = bool(np.isfinite((self._lower, self._upper)).all())
 
     def within_limits(self, branches: Array, near: Array) -> Array:
         """The branches (m, n) or one of them (n,), [rad] or [m], with every full turn within the limits, (k, n); joints
         without limits as near to `near` (n,) as they can be."""
         branches = np.atleast_2d(branches)
-        lower = np.where(np.isinf(self._lower), near - 0.5 * self._period, self._lower)
-        upper = np.where(np.isinf(self._upper), near + 0.5 * self._period, self._upper)
+        lower, upper = self._lower, self._upper
+        if not self._is_limited:
+            lower = np.where(np.isinf(lower), near - 0.5 * self._period, lower)
+            upper = np.where(np.isinf(upper), near + 0.5 * self._period, upper)
         first = branches + self._period * np.ceil((lower - branches) / self._period)
         more = np.floor((upper - first) / self._period)
         fits = (more >= 0.0).all(axis=1)  # false for what is not a number, too
