@@ -35,15 +35,26 @@ class MotionValidator {
     // Where on the path it was, where the verdict is kTouching.
     const Joints& touching() const { return touching_; }
 
-    bool is_free(const double* joints) {
-        stretches_.assign(1, {0, 0.5, 0.0});
-        ends_.assign(joints, joints + dof());
-        ends_.insert(ends_.end(), joints, joints + dof());
-        const Polyline point(ends_.data(), 2, dof());
+    bool is_free(const double* joints) { return are_free({joints}); }
+
+    // True if all `configurations`, (dof,) each, are free: eight make one question.
+    bool are_free(const std::vector<const double*>& configurations) {
+        stretches_.clear();
+        ends_.clear();
+        for (const double* joints : configurations) {
+            stretches_.push_back({stretches_.size(), 0.0, 0.0});
+            ends_.insert(ends_.end(), joints, joints + dof());
+        }
+        ends_.insert(ends_.end(), configurations.back(), configurations.back() + dof());
+        const Polyline points(ends_.data(), configurations.size() + 1, dof());
         const double still[kMaxDof] = {};
         world_.bound_motion(still, part_motion_, pair_motion_);
         slowness_.clear();
-        return check(point, 0, 1) == 0 && result_.near == 0;
+        for (size_t next = 0; next < stretches_.size(); next += kLanes) {
+            const size_t count = std::min<size_t>(kLanes, stretches_.size() - next);
+            if (check(points, next, count) != 0 || result_.near != 0) return false;
+        }
+        return true;
     }
 
     bool is_free_line(const double* from, const double* to, const StopCondition& stop) {

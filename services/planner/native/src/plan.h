@@ -39,10 +39,10 @@ inline Tolerances told_to(double finest, const World& world, const Kernel& kerne
     Tolerances wide = otherwise;
     wide.margin += kRoom * finest;
     MotionValidator validator(world, kernel, wide);
-    bool has_room = finest > otherwise.finest && validator.is_free(query.start.data());
-    for (const Joints& goal : query.goals) has_room = has_room && validator.is_free(goal.data());
+    std::vector<const double*> ends = {query.start.data()};
+    for (const Joints& goal : query.goals) ends.push_back(goal.data());
     Tolerances result = otherwise;
-    if (has_room) result.finest = finest;
+    if (finest > otherwise.finest && validator.are_free(ends)) result.finest = finest;
     return result;
 }
 
