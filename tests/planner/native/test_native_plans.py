@@ -186,6 +186,16 @@ def test_any_of_several_goals_will_do():
     assert path.corners[-1].tolist() == outside
 
 
+def test_more_goals_than_one_question_holds_are_all_asked_about():
+    core = NativePlanner(load("rm1"))
+    core.set_scene([crate("crate", (0.1, 0.1, 0.3), (0.4, 0.0, 0.15))])
+    inside, outside = [0.0, 0.0, 0.1], [1.0, 0.5, 0.1]
+    path = core.plan([-1.0, 0.0, 0.1], [*[inside] * 20, outside], seed=1, time_limit=5.0)
+    assert isinstance(path, FreePath)
+    assert path.corners[-1].tolist() == outside
+    assert core.path_free(path.corners)
+
+
 def test_a_start_and_a_goal_that_touch_are_told_apart():
     core = NativePlanner(load("rm1"))
     core.set_scene([crate("crate", (0.1, 0.1, 0.3), (0.4, 0.0, 0.15))])
