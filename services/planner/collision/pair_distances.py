@@ -7,6 +7,7 @@ times as long as all else that a scene needs, so what coal needs for one of thos
 from __future__ import annotations
 
 import coal
+import numpy as np
 import pinocchio as pin
 
 from services.planner.collision.world_geometry import WorldGeometry
@@ -21,8 +22,8 @@ class PairDistances:
         self._shapes = geometry.model.geometryObjects
         self._request = coal.DistanceRequest()
         self.deadline = NEVER
-        is_mesh = [mesh is not None for mesh in geometry.meshes]
-        self._is_slow = [is_mesh[one] or is_mesh[other] for one, other in geometry.pairs]
+        is_mesh = np.array([mesh is not None for mesh in geometry.meshes])
+        self._is_slow = np.any(is_mesh[geometry.both], axis=1)
         self._pair: dict[int, tuple[coal.ComputeDistance, coal.DistanceResult]] = {}
         self._poses = [coal.Transform3s() for _ in geometry.boxes]
 

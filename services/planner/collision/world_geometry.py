@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -39,14 +40,20 @@ class WorldGeometry:
         joints = np.array([*own.joints, *(each.joint for each in objects)], dtype=int)
         self.moving: list[int] = np.flatnonzero(joints).tolist()
         both, self.direct = self._checked(joints)
-        self.pairs: list[tuple[int, int]] = [(one, other) for one, other in both.tolist()]
-        self.names: list[LinkPair] = [(self.shape_names[one], self.shape_names[other]) for one, other in self.pairs]
+        self.both: NDArray[np.int_] = both  # (k, 2) numbers of the shapes
+        self.pairs: list[tuple[int, int]] = list(map(tuple, both.tolist()))
         paddings = np.array([0.0] * self._links + [each.shape.padding for each in objects])
         self.padding: list[float] = paddings[both].sum(axis=1).tolist()
         self.boxes = np.array([*own.boxes, *(each.box for each in objects)])
         per_shape = np.array([*own.reach, *(each.reach for each in objects)])
         self.reach: Array = per_shape.max(axis=0, initial=0.0) @ own.drivers
         self.pair_reach: Array = _between(per_shape, both) @ own.drivers
+
+    @cached_property
+    def names(self) -> list[LinkPair]:
+        """Of `pairs`; made when first asked for, as most plans never do."""
+        names = self.shape_names
+        return [(names[one], names[other]) for one, other in self.pairs]
 
     def _require_distinct(self) -> None:
         objects = self.shape_names[self._links :]
@@ -116,8 +123,7 @@ class LowerBounds:
         self._moving = geometry.moving
         self.pairs = range(geometry.direct, len(geometry.pairs))
         self._padding = np.array(geometry.padding[geometry.direct :])
-        both = np.array(geometry.pairs[geometry.direct :], dtype=int).reshape(-1, 2)
-        self._first, self._second = both.T
+        self._first, self._second = geometry.both[geometry.direct :].T
         self._centres, self._halves = geometry.boxes[:, 0], geometry.boxes[:, 1]
         self._radii = np.linalg.norm(self._halves, axis=1)
         placements = [shape.placement for shape in geometry.model.geometryObjects]
