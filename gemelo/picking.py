@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from gemelo.errors import Aborted, BadArgument, Canceled, Lost, Refused
 from gemelo.grasping import grasp_point, lift_above, looking_down, turn_between, yaw_of
-from gemelo.seeing import Eyes, Seen, add_to_scene, body_of
+from gemelo.seeing import MOVING, NO_GOOD_IMAGE, Eyes, Seen, add_to_scene, body_of
 from gemelo.targets import FULL
 from gemelo.units import Point, Pose
 from schemas.actions import GoalStatusCode
@@ -42,9 +42,9 @@ IsCancelled = Callable[[], bool]
 class Picked(NamedTuple):
     """A thing that was taken and put down.
 
-    >>> picked = gemelo.Picked("cup", "bin", gemelo.Pose((0.2, 0.1, 0.04)), 0.0001, 0.1, 1, 12.5, None)
+    >>> picked = gemelo.Picked("cup", "bin", gemelo.Pose((0.2, 0.1, 0.04)), 0.0001, 0.1, 1, 12.5, None, "no image")
     >>> print(picked)
-    cup is at bin: seen +-0.1 mm, turned 6 deg by the jaws, 12.5 s
+    cup is at bin: seen +-0.1 mm, turned 6 deg by the jaws, 12.5 s; not seen afterwards: no image
     """
 
     name: str
@@ -55,12 +55,15 @@ class Picked(NamedTuple):
     attempts: int
     took: float  # [s]
     after: Pose | None  # in the base frame, as it was seen afterwards; None where it was not, as behind the arm
+    unseen: str = ""  # why it was not seen afterwards
 
     def __str__(self) -> str:
         """One line for a person."""
         turned = f", turned {math.degrees(self.turned):.0f} deg by the jaws" if abs(self.turned) > 0.01 else ""
         again = "" if self.attempts == 1 else f", at attempt {self.attempts}"
-        return f"{self.name} is at {self.place}: seen +-{1e3 * self.sigma:.1f} mm{turned}{again}, {self.took:.1f} s"
+        return f"{self.name} is at {self.place}: seen +-{1e3 * self.sigma:.1f} mm{turned}{again}, {self.took:.1f} s" + (
+            f"; not seen afterwards: {self.unseen}" if self.unseen else ""
+        )
 
 
 @dataclass(frozen=True)
@@ -124,9 +127,9 @@ def pick(arm: Arm, eyes: Eyes, name: str, to: str, camera: str, tell: OnPicking,
         try:
             if _take(hand, thing, seen, way):
                 _put(hand, name, release)
-                after = _seen_afterwards(hand, eyes, seen, camera, spot)
+                after, unseen = _seen_afterwards(hand, eyes, seen, camera, spot)
                 took = arm.node.monotonic() - began
-                return Picked(name, to, seen.pose, seen.sigma, way.turned, attempt, took, after)
+                return Picked(name, to, seen.pose, seen.sigma, way.turned, attempt, took, after, unseen)
         finally:
             if name in arm.scene.objects and not arm.scene.objects[name].attached:
                 arm.scene.remove(name)
@@ -134,15 +137,15 @@ def pick(arm: Arm, eyes: Eyes, name: str, to: str, camera: str, tell: OnPicking,
     raise Aborted(f"{name} was not gripped: the jaws closed on nothing, {ATTEMPTS} times; where is it? `gemelo detect`")
 
 
-def _seen_afterwards(hand: Hand, eyes: Eyes, before: Seen, camera: str, spot: Point) -> Pose | None:
-    """Where the thing is seen now, None if it is not; raises `Aborted` where it still stands where it was.
+def _seen_afterwards(hand: Hand, eyes: Eyes, before: Seen, camera: str, spot: Point) -> tuple[Pose | None, str]:
+    """Where the thing is seen now, or why it is not; raises `Aborted` where it still stands where it was.
 
     Jaws that measure nothing are said to hold what the scene has between them: what is believed, not what is there.
     """
     try:
-        now = eyes.one(before.name, camera)
-    except (Refused, Lost):
-        return None
+        now = look_twice(eyes, before.name, camera)
+    except (Refused, Lost) as error:
+        return None, str(error)
     hand.tell(str(now))
     here, stood = now.pose.position, before.pose.position
     if math.dist(here, stood) < STAYED < math.dist(spot[:2], stood[:2]):
@@ -151,7 +154,17 @@ def _seen_afterwards(hand: Hand, eyes: Eyes, before: Seen, camera: str, spot: Po
             f"{before.name} was not picked: it still stands at {x:.1f} {y:.1f} {z:.1f} mm, where it was; the jaws "
             "closed beside it: is the camera where camera.toml says? `gemelo camera check`"
         )
-    return now.pose
+    return now.pose, ""
+
+
+def look_twice(eyes: Eyes, name: str, camera: str) -> Seen:
+    """The thing as it is seen; looks again where no image could be used, as on a host that is busy."""
+    try:
+        return eyes.one(name, camera)
+    except (Refused, Lost) as error:
+        if isinstance(error, Refused) and error.check not in (NO_GOOD_IMAGE, MOVING):
+            raise
+        return eyes.one(name, camera)
 
 
 def named(arm: Arm, eyes: Eyes, name: str, to: str) -> tuple[Thing, Place, Gripper]:

@@ -45,6 +45,12 @@ class Parser(argparse.ArgumentParser):
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
         self._negative_number_matcher = _NEGATIVE_NUMBER
         self.typed: Parser | None = None  # its leaf: argparse tells the root what that leaves
+        self._given: Sequence[str] = ()  # what is behind the command
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse does, for which a parser of a command is asked by its parent."""
+        self._given = list(args or ())
+        return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Ends the process with code 2 and one sentence."""
@@ -60,7 +66,24 @@ class Parser(argparse.ArgumentParser):
         left_over = re.fullmatch(r"unrecognized arguments: (\S+).*", message, re.DOTALL)
         if left_over is not None and self.typed is not None:
             self.typed.error(self.typed.left_over_message(left_over[1]))
+        one_of = re.fullmatch(r"one of the arguments (.*) is required", message)
+        if one_of is not None:
+            message = self._one_is_needed(one_of[1].split())
         self.exit(ExitCode.USAGE, f"{self.prog}: {message}\n")
+
+    def _one_is_needed(self, options: Sequence[str]) -> str:
+        """What is said where none of the options is given, with that which a bare word seems to be meant for."""
+        needed = f"say one of {', '.join(options)}"
+        word = next(iter(self._given), "")
+        has_places = any(not each.option_strings for each in self._actions)  # for words without an option
+        if has_places or not word or word.startswith("-"):
+            return f"{needed}\nsee `{self.prog} --help`, with examples"
+        names = [each for each in self._actions if set(each.option_strings) & set(options)]
+        pairs = [each for each in names if "=" in str(each.metavar)]
+        texts = [each for each in names if each.nargs is None and each.type is None]
+        meant = [each.option_strings[0] for each in (pairs if "=" in word else texts)]
+        hint = f"did you mean {meant[0]} {word}?" if meant and not word[0].isdigit() else needed
+        return f'"{word}" stands without an option: {hint}\nsee `{self.prog} --help`, with examples'
 
     def left_over_message(self, word: str) -> str:
         """What is said of a word that the command does not take, with the option that is most like it."""

@@ -87,6 +87,11 @@ def test_a_wrong_argument_is_called_what_it_is(capsys):
         ("state --jsn", 'gemelo state: "--jsn" is no option: did you mean --json?'),
         ("jog --sideways 1", 'gemelo jog: "--sideways" is no option: there is --joint, --twist, --turn, --frame'),
         ("jog turn 20deg/s", 'gemelo jog: "turn" is one word too many: there is --joint, --twist'),
+        ("move ready", 'gemelo move: "ready" stands without an option: did you mean --named ready?'),
+        ("move a=1", 'gemelo move: "a=1" stands without an option: did you mean --joints a=1?'),
+        ("move 0.3 0 0", 'gemelo move: "0.3" stands without an option: say one of --to, --joints, --named, --execute'),
+        ("move --time 3", "gemelo move: say one of --to, --joints, --named, --execute"),
+        ("scene add cup", "gemelo scene add: say one of --box,"),
         ("hold now", 'gemelo hold: "now" is one word too many: it has no options'),
     ],
 )
@@ -96,7 +101,7 @@ def test_what_a_command_does_not_take_is_named_with_what_it_takes(line, said, ca
     shown = capsys.readouterr().err
     assert ended.value.code == ExitCode.USAGE
     assert shown.startswith(said)
-    assert f"`gemelo {line.split()[0]} --help`" in shown
+    assert f"`{said.partition(':')[0]} --help`" in shown
 
 
 def test_a_message_is_written_as_json():

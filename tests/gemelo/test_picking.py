@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from gemelo import Refused
+from gemelo import Lost, Refused
 from gemelo.grasping import lift_above, looking_down, turn_between, yaw_of
-from gemelo.seeing import Seen
+from gemelo.picking import look_twice
+from gemelo.seeing import MOVING, NO_GOOD_IMAGE, Seen
 from gemelo.units import Pose
 from schemas.cell import ColourThing, TagThing
 from schemas.robot import Gripper
@@ -72,3 +73,29 @@ def test_jaws_turn_a_thing_by_the_way_to_its_nearest_side(askew: float, turned: 
     body = ((0.3, 0.0, 0.015), from_axis_angle((0.0, 0.0, 1.0), askew))
     found = turn_between(Pose((0.3, 0.0, 0.1), looking_down(0.0)), body, (0.05, 0.02, 0.03))
     assert found == (pytest.approx(turned), side)
+
+
+class Blinking:
+    """Eyes to which the given errors happen first."""
+
+    def __init__(self, *errors: Exception) -> None:
+        self.errors = list(errors)
+
+    def one(self, name: str, camera: str = "") -> Seen:
+        if self.errors:
+            raise self.errors.pop(0)
+        return seen(0.015)
+
+
+@pytest.mark.parametrize(
+    "error", [Refused("late", check=NO_GOOD_IMAGE), Refused("it moves", check=MOVING), Lost("no answer")]
+)
+def test_it_looks_once_more_where_no_image_was_of_use(error: Exception) -> None:
+    assert look_twice(Blinking(error), "thing", "") == seen(0.015)  # type: ignore[arg-type]
+    with pytest.raises(type(error)):
+        look_twice(Blinking(error, error), "thing", "")  # type: ignore[arg-type]
+
+
+def test_it_does_not_look_again_for_what_a_good_image_does_not_show() -> None:
+    with pytest.raises(Refused, match="not seen"):
+        look_twice(Blinking(Refused("not seen", check="detection")), "thing", "")  # type: ignore[arg-type]

@@ -119,6 +119,7 @@ WITHIN_OTHERS = {  # parts of sentences, which are tested as a whole below
     "gone": "{} for {} s: take control anew with `gemelo control take --force`",
     "seen": "{} is not seen by {}{}: is it in the image, lit, and not behind the arm? `gemelo camera view`",
     "picked": "{} is at {}: seen +-{} mm{}{}, {} s",
+    "unseen": "{}; not seen afterwards: {}",
     "mesh": "if it is drawn in mm, give scale=0.001",
     "expected": 'a share in per cent, as "50%"',
     "expected list": "a list of steps",
@@ -255,6 +256,9 @@ BEYOND = 'joint "a": 3.2000 rad is beyond the upper limit 2.9497 rad; stay withi
         ("cup is not seen by overhead; it sees red_block: is it in the image, lit, and not behind the arm? `gemelo "
          "camera view`", "ve red_block"),
         ("cup is at bin: seen +-0.4 mm, turned 3 deg by the jaws, at attempt 2, 9.1 s", "cup está en bin"),
+        ("cup is at bin: seen +-0.4 mm, 9.1 s; not seen afterwards: cup is not seen by overhead, and nothing else: is "
+         "it in the image, lit, and not behind the arm? `gemelo camera view`", "9.1 s; después no se vio: overhead no "
+         "ve cup"),
         ("gripper: 20.0 mm, stopped by what is between the jaws (commanded, not measured), holds cup", "lleva cup"),
         ('refused: object "x": its data is no usable STL file: it is no STL file: 17 bytes that are neither the binary '
          "form nor begin with solid", "«x»: el archivo no sirve. No es un archivo STL (17 bytes)."),

@@ -105,12 +105,12 @@ _THINGS: dict[str, str] = {
     '{path} has no thing or place "{name}": it has {names}': "{path} no tiene una cosa ni un lugar «{name}»; tiene "
     "{names}.",
     "{path} has no [[camera]]": "{path} no tiene [[camera]].",
-    "{name} is not seen by {cameras}, and nothing else: is it in the image, lit, and not behind the arm? `gemelo "
+    "{word} is not seen by {cameras}, and nothing else: is it in the image, lit, and not behind the arm? `gemelo "
     "camera "
-    "view`": "{cameras} no ve {name}, ni nada más: ¿está en la imagen, con luz, y no detrás del brazo?",
-    "{name} is not seen by {cameras}; it sees {others}: is it in the image, lit, and not behind the arm? `gemelo "
+    "view`": "{cameras} no ve {word}, ni nada más: ¿está en la imagen, con luz, y no detrás del brazo?",
+    "{word} is not seen by {cameras}; it sees {others}: is it in the image, lit, and not behind the arm? `gemelo "
     "camera "
-    "view`": "{cameras} no ve {name}; ve {others}: ¿está en la imagen, con luz, y no detrás del brazo?",
+    "view`": "{cameras} no ve {word}; ve {others}: ¿está en la imagen, con luz, y no detrás del brazo?",
     "{name} cannot be measured: {reason}": "No se puede medir {name}: {reason}",
     "something {colour} is seen, and its outline is not that of a box of {sizes} mm on the table: is it partly hidden, "
     "tilted, or of another size?": "se ve algo de color {colour}, y su contorno no es el de una caja de {sizes} mm en "
@@ -169,6 +169,7 @@ _THINGS: dict[str, str] = {
     "{name} is at {place}: seen +-{error} mm, turned {angle} deg by the jaws, at attempt {count}, {time} s": "{name} "
     "está "
     "en {place}: vista a +-{error} mm, girada {angle}° por las mordazas, al intento {count}, {time} s",
+    "{what}; not seen afterwards: {reason}": "{what}; después no se vio: {reason}",
     "the jaws have closed on nothing": "las mordazas se cerraron sobre nada.",
 }
 
