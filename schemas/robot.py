@@ -138,7 +138,7 @@ class Input(RobotRecord, frozen=True, kw_only=True):
     pull: Pull = Pull.NONE
 
 
-class Output(RobotRecord, frozen=True, kw_only=True):
+class DigitalOutput(RobotRecord, frozen=True, kw_only=True):
     """A digital output of the controller board."""
 
     name: KeyPart
@@ -235,6 +235,6 @@ class RobotFile(RobotRecord, frozen=True, kw_only=True):
     driver: tuple[Driver, ...]
     joint: tuple[StepperJoint, ...]
     input: tuple[Input, ...] = ()
-    output: tuple[Output, ...] = ()
+    output: tuple[DigitalOutput, ...] = ()
     sensor: tuple[Sensor, ...] = ()
     gripper: Gripper | None = None

@@ -27,7 +27,7 @@ class ConfigError(ValueError):
     """The core refuses this configuration; the message names the part and the reason."""
 
 
-class Device:
+class CoreDevice:
     """One device; nothing happens in it but by `receive` and `advance`.
 
     `config` may be the JSON text itself, and None for a device that has none yet. `motors` are ideal where there are
@@ -264,7 +264,7 @@ class Device:
         report = {"t_us": record.now_us, "steps": record.steps[:count], "shaft": record.shaft[:count]}
         return json.dumps(report).encode()
 
-    def inherit_environment(self, before: Device) -> None:
+    def inherit_environment(self, before: CoreDevice) -> None:
         """Takes over the environment of the previous device: held switches, blocked shafts and sensor readings.
 
         Of a device with other firmware it takes nothing: the same bytes may mean something else there.

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import msgspec
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from schemas.device import InjectKind, InjectRequest
 from schemas.device_config import InputRole
 
@@ -28,7 +28,7 @@ def read_injection(text: bytes) -> InjectRequest:
         raise InjectRefused(f"this is no injection: {error}") from error
 
 
-def inject(device: Device, request: InjectRequest) -> None:
+def inject(device: CoreDevice, request: InjectRequest) -> None:
     """Do it to the device; raises InjectRefused."""
     if not math.isfinite(request.value):
         raise InjectRefused(f"{request.kind}: the value {request.value} is not finite")
@@ -53,7 +53,7 @@ def inject(device: Device, request: InjectRequest) -> None:
             raise InjectRefused(f"{request.kind}: only the virtual ESP32's process can do that, a device alone cannot")
 
 
-def _press_estop(device: Device, pressed: bool | None) -> None:
+def _press_estop(device: CoreDevice, pressed: bool | None) -> None:
     buttons = [i for i, wired in enumerate(device.config.inputs) if wired.role is InputRole.ESTOP]
     if not buttons:
         raise InjectRefused('estop: this device has no e-stop; robot.toml wants an [[input]] with role = "estop"')
@@ -62,7 +62,7 @@ def _press_estop(device: Device, pressed: bool | None) -> None:
         device.press_input(button, True if pressed else None)
 
 
-def _put_object(device: Device, width: float) -> None:
+def _put_object(device: CoreDevice, width: float) -> None:
     if not device.has_jaws:
         raise InjectRefused('object: this device has no servo gripper; robot.toml wants a [gripper] of kind = "servo"')
     if not device.put_object(width):
@@ -70,7 +70,7 @@ def _put_object(device: Device, width: float) -> None:
         raise InjectRefused(f"object: {width * 1000:g} mm do not fit between the jaws, {apart:.1f} mm apart: open them")
 
 
-def _joint(device: Device, request: InjectRequest) -> int:
+def _joint(device: CoreDevice, request: InjectRequest) -> int:
     return _index("joint", request.target, (joint.name for joint in device.config.joints))
 
 

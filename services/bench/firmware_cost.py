@@ -13,7 +13,7 @@ from functools import cache
 
 import msgspec
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from schemas.device_config import DeviceConfig, JointConfig
 from services.bench.figures import Figure, NotMeasured, of_samples, quantile
 from services.runtime.deployment import project_root
@@ -116,7 +116,7 @@ def parse_mb_per_s() -> Figure:
     return of_samples(samples, reference=reference, note=note)
 
 
-def bench_device() -> Device:
+def bench_device() -> CoreDevice:
     """A device of JOINTS joints at rest at step 0, with a serial line."""
     joints = tuple(
         JointConfig(
@@ -128,7 +128,7 @@ def bench_device() -> Device:
         )
         for number in range(JOINTS)
     )
-    device = Device(DeviceConfig(name="bench", joints=joints), boot_id=BOOT)
+    device = CoreDevice(DeviceConfig(name="bench", joints=joints), boot_id=BOOT)
     device.attach_line()
     return device
 

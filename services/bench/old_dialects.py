@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from firmware.bindings.motor import VirtualMotor
 from firmware.platform.host.sketch import AustinStepper, HostSketch
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
@@ -107,7 +107,7 @@ class PacedBoard:
         self._end, self._other = os.openpty()
         tty.setraw(self._other)
         self.path = os.ttyname(self._other)
-        self._device = Device(device_config(arm), now_us=1_000_000)
+        self._device = CoreDevice(device_config(arm), now_us=1_000_000)
         self._device.attach_line()
         self._began = time.monotonic()
         self._is_on = True

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from firmware.bindings.frames import PinChange
 from schemas.device_config import DeviceConfig, JointConfig
 from services.bench.figures import NotMeasured
@@ -56,7 +56,7 @@ def bench_config(joints: Sequence[JointConfig], tick_hz: int) -> DeviceConfig:
     return DeviceConfig(name="bench", joints=named, tick_hz=tick_hz)
 
 
-def play(device: Device, knots: Sequence[WireKnot], dt_us: int) -> Trace:
+def play(device: CoreDevice, knots: Sequence[WireKnot], dt_us: int) -> Trace:
     """Plays knots `dt_us` [us] apart, from rest to rest; raises NotMeasured if they are refused or played slower."""
     device.trace()
     sent, beats, next_beat = 0, 0, 0
@@ -109,7 +109,7 @@ def _heartbeat(counter: int) -> bytes:
     return encode(Heartbeat(boot_id=0, session=1, counter=counter))
 
 
-def _expect_taken(device: Device) -> None:
+def _expect_taken(device: CoreDevice) -> None:
     for frame in device.take():
         if frame.kind == "traj/ack" and frame.payload[20] not in (Code.OK, Code.DUPLICATE):
             raise NotMeasured(f"the device refuses the path: {Code(frame.payload[20]).name}")

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import msgspec
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from firmware.bindings.frames import PinChange
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, InputConfig, InputRole
@@ -56,7 +56,7 @@ def largest_rate(tick_hz: int) -> float:
 
 def is_exact(rate: int, tick_hz: int) -> bool:
     """True if the device takes a path of `rate` [steps/s] and makes each of its pulses in time."""
-    device = Device(bench_config([joint_of(rate, 1e7, dir_setup_us=SETUP_US)], tick_hz), boot_id=BOOT)
+    device = CoreDevice(bench_config([joint_of(rate, 1e7, dir_setup_us=SETUP_US)], tick_hz), boot_id=BOOT)
     knots = to_and_fro(rate)
     try:
         changes = play(device, knots, round(DT * 1e6)).changes
@@ -114,7 +114,7 @@ def estop_reaction_ticks() -> Figure:
 
 def reaction(config: DeviceConfig, first: bytes, pressed_us: int) -> float:
     """Ticks of one press at `pressed_us` [us] of device time."""
-    device = Device(config, boot_id=BOOT)
+    device = CoreDevice(config, boot_id=BOOT)
     device.receive(first)
     device.advance(pressed_us - BEFORE_US)
     device.trace()
@@ -170,7 +170,7 @@ def errors_of(config: DeviceConfig) -> list[float]:
     """Errors [us] of every pulse of every joint."""
     joints = [joint_of(j.max_velocity_q8 / FINE, j.max_acceleration_q8 / FINE) for j in config.joints]
     knots = full_speed(config)
-    changes, origin = play(Device(bench_config(joints, config.tick_hz), boot_id=BOOT), knots, round(DT * 1e6))
+    changes, origin = play(CoreDevice(bench_config(joints, config.tick_hz), boot_id=BOOT), knots, round(DT * 1e6))
     errors: list[float] = []
     for joint in range(len(joints)):
         times = crossings(knots, joint)

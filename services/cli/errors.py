@@ -9,7 +9,7 @@ from enum import IntEnum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from schemas.robot import Input, Output, Sensor
+    from schemas.robot import DigitalOutput, Input, Sensor
     from services.arm.model.description import Arm, Joint
 
 
@@ -63,7 +63,7 @@ def joint_of(arm: Arm, name: str) -> Joint:
     raise unknown("joint", name, arm.joint_names)
 
 
-def require_name(kind: str, name: str, parts: Sequence[Input] | Sequence[Output] | Sequence[Sensor]) -> str:
+def require_name(kind: str, name: str, parts: Sequence[Input] | Sequence[DigitalOutput] | Sequence[Sensor]) -> str:
     """Returns `name` if robot.toml has such a part; raises `CommandError` with the nearest name."""
     known = [part.name for part in parts]
     if not known:

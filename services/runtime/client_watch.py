@@ -21,7 +21,7 @@ MAX_IDLE = 32  # clients without a goal that are watched
 
 
 @dataclass
-class Client:
+class WatchedClient:
     """One client's token, and the goals that end with it."""
 
     missing_since: float | None  # [s] monotonic; None while the token is there
@@ -43,7 +43,7 @@ class ClientWatch:
 
     def __init__(self, watch: Watch, is_connected: Callable[[], bool]) -> None:
         self._watch, self._is_connected = watch, is_connected
-        self._clients: dict[str, Client] = {}  # by key of the token
+        self._clients: dict[str, WatchedClient] = {}  # by key of the token
         self._was_away = False
         self._back_at = float("-inf")  # [s] monotonic, when the router came back last
         self._now = 0.0  # [s] monotonic, of the last call
@@ -77,8 +77,8 @@ class ClientWatch:
         gone = [key for key, client in self._clients.items() if client.goals and client.is_lost(now)]
         return [(goal_id, key) for key in gone for goal_id in sorted(self._dropped(key).goals)]
 
-    def _watched(self, key: str) -> Client:
-        client = self._clients[key] = Client(self._now, FIRST_SIGHT)
+    def _watched(self, key: str) -> WatchedClient:
+        client = self._clients[key] = WatchedClient(self._now, FIRST_SIGHT)
 
         def on_token(is_there: bool) -> None:
             if is_there:
@@ -97,7 +97,7 @@ class ClientWatch:
             if place < too_many or self._now - since > LINGER:
                 self._dropped(key)
 
-    def _dropped(self, key: str) -> Client:
+    def _dropped(self, key: str) -> WatchedClient:
         client = self._clients.pop(key)
         for declaration in client.declarations:
             declaration.close()

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from firmware.platform.host.board import DeviceClock
 from schemas.device_config import DeviceConfig
 from schemas.message import Message, Vector
@@ -89,7 +89,7 @@ class VirtualArm(GatewayDriver):
         if start is not None:
             steps = tuple(round(j.steps.to_steps(p)) for j, p in zip(self.arm.joints, start, strict=True))
         self.config = config or device_config(self.arm)  # with which the device starts
-        self.device = Device(
+        self.device = CoreDevice(
             self.config, BOOT_ID, BOOTED, _fitting(steps, self.config), referenced, motors=motors,
             gripper=self.arm.gripper, gripper_unit=gripper_unit(self.arm),
         )  # fmt: skip
@@ -155,7 +155,7 @@ class VirtualArm(GatewayDriver):
     def reboot(self, boot_id: int, referenced: bool = True) -> None:
         """The device loses power and starts again where it stands, with its clock at 0."""
         self._device_zero = self.now_us
-        self.device = Device(
+        self.device = CoreDevice(
             self.config, boot_id, 0, self.device.steps, referenced,
             gripper=self.arm.gripper, gripper_unit=gripper_unit(self.arm),
         )  # fmt: skip
@@ -163,7 +163,7 @@ class VirtualArm(GatewayDriver):
     def unconfigure(self) -> None:
         """Another device takes its place, at its very first start."""
         self._device_zero = self.now_us
-        self.device = Device(None, 79)
+        self.device = CoreDevice(None, 79)
 
     def freeze(self, seconds: float) -> None:
         """The device stands still as a whole for `seconds` [s], and wakes up to what has arrived meanwhile."""

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from firmware.bindings.injection import inject
 from schemas.device import DeviceCommandKind, DeviceMode, InjectKind, InjectRequest
 from schemas.device_config import DeviceConfig, JointConfig
@@ -73,7 +73,7 @@ class Bench:
         referenced: bool = True,
         steps: Sequence[int] | None = None,
     ) -> None:
-        self.device = Device(config, BOOT, steps=steps, motors=motors, shaft=shaft, referenced=referenced)
+        self.device = CoreDevice(config, BOOT, steps=steps, motors=motors, shaft=shaft, referenced=referenced)
         self.events: list[dict[str, object]] = []
         self.acks: list[Ack] = []
         self.codes: list[int] = []  # of CMD_ACKs

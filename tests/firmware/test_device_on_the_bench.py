@@ -12,7 +12,7 @@ from bench_firmware import FIRST, LAST, Bench, Row, command, rm1_config, smooth,
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware.bindings.device import ConfigError, Device
+from firmware.bindings.device import ConfigError, CoreDevice
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, JointConfig
 
@@ -26,9 +26,9 @@ def vectors() -> list[Any]:
     return [pytest.param(case, id=case["name"]) for case in cases]
 
 
-def vector_device() -> Device:
+def vector_device() -> CoreDevice:
     described = json.loads((VECTORS / "device.json").read_text())
-    return Device(msgspec.convert(described["config"], DeviceConfig), boot_id=described["boot_id"])
+    return CoreDevice(msgspec.convert(described["config"], DeviceConfig), boot_id=described["boot_id"])
 
 
 @pytest.mark.parametrize("case", vectors())
@@ -115,6 +115,6 @@ def one_joint(lower_q8: int, upper_q8: int) -> DeviceConfig:
 
 def test_a_configuration_that_cannot_be_is_refused_with_the_joint_and_the_reason():
     with pytest.raises(ConfigError, match="'q1' of device 'x': its lower limit is not below its upper limit"):
-        Device(one_joint(5, 5))
+        CoreDevice(one_joint(5, 5))
     with pytest.raises(ConfigError, match="2 start positions for 1 joints"):
-        Device(one_joint(0, 5), steps=(1, 2))
+        CoreDevice(one_joint(0, 5), steps=(1, 2))

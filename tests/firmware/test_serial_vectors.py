@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from firmware.bindings.parsers import ConfigTextRefused, read_config
 from schemas.device_config import DeviceConfig
 from services.runtime.serial_frames import PacketDecoder
@@ -32,7 +32,7 @@ def test_packets_are_cut_alike(case: dict[str, Any]):
 
 @pytest.mark.parametrize("case", cases(LINES["cases"]))
 def test_lines_are_answered_alike(case: dict[str, Any]):
-    device = Device(msgspec.convert(LINES["config"], DeviceConfig))
+    device = CoreDevice(msgspec.convert(LINES["config"], DeviceConfig))
     device.attach_line()
     device.take_serial()
     for line in case["lines"]:

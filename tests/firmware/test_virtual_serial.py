@@ -15,7 +15,7 @@ import pytest
 from bed_firmware import Bed, SerialPort, wait_for
 from bench_firmware import BOOT, FIRST, LAST, command, heartbeat, seal, smooth, traj
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from schemas.device import DeviceCommandKind, DeviceMode, InjectKind
 from schemas.device_config import DeviceConfig, config_text
 from services.arm.device.device_config import device_config
@@ -40,7 +40,7 @@ def other(arm: Arm) -> DeviceConfig:
 
 
 def test_an_answer_goes_where_the_question_came_from_and_states_where_the_heartbeat_was(rm1: Arm):
-    device = Device(device_config(rm1), boot_id=BOOT)
+    device = CoreDevice(device_config(rm1), boot_id=BOOT)
     device.attach_line()
     device.receive_serial(packet(heartbeat(1)))
     device.advance(100_000)
@@ -62,7 +62,7 @@ def test_an_answer_goes_where_the_question_came_from_and_states_where_the_heartb
 
 
 def test_a_move_over_the_line_arrives_to_the_step(rm1: Arm):
-    device = Device(device_config(rm1), boot_id=BOOT)
+    device = CoreDevice(device_config(rm1), boot_id=BOOT)
     device.attach_line()
     device.advance(300_000)
     points = [smooth(0, 1000, 2.0, i * 0.02) for i in range(101)]
@@ -80,7 +80,7 @@ def test_a_move_over_the_line_arrives_to_the_step(rm1: Arm):
 
 
 def test_a_line_of_text_moves_the_joints_and_is_acknowledged(rm1: Arm):
-    device = Device(device_config(rm1), boot_id=BOOT)
+    device = CoreDevice(device_config(rm1), boot_id=BOOT)
     device.attach_line()
     device.advance(300_000)
     device.take_serial()
@@ -93,7 +93,7 @@ def test_a_line_of_text_moves_the_joints_and_is_acknowledged(rm1: Arm):
 
 
 def test_a_configuration_over_the_line_is_taken_by_a_device_that_has_none(rm1: Arm):
-    device = Device(None, boot_id=BOOT)
+    device = CoreDevice(None, boot_id=BOOT)
     device.attach_line()
     device.advance(50_000)
     assert device.mode == DeviceMode.BOOT

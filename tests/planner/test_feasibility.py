@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from schemas.motion import JointTrajectory
 from schemas.planning import StepMargin
 from schemas.robot import PullOut
@@ -67,7 +67,7 @@ def ideal(rm1: Arm) -> Arm:
 def test_the_stream_is_what_the_firmware_makes(rm1: Arm, goal: tuple[float, ...]) -> None:
     trajectory = line(rm1, goal)
     foreseen = [tuple(row) for row in step_stream(rm1, trajectory).steps.tolist()]
-    device = Device(device_config(rm1), steps=(0, 0, 0))
+    device = CoreDevice(device_config(rm1), steps=(0, 0, 0))
     device.advance(1_000_000)  # the drivers have their enable lead
     knots = math.ceil(trajectory.points[-1].time_from_start / 0.02)
     times = np.minimum(np.arange(knots + 1) * 0.02, trajectory.points[-1].time_from_start)
@@ -89,7 +89,7 @@ def test_the_stream_is_what_the_firmware_makes(rm1: Arm, goal: tuple[float, ...]
     assert made[first : first + last + 1] == foreseen[: last + 1]
 
 
-def send(device: Device, arm: Arm, samples, first: int, knots: int) -> None:
+def send(device: CoreDevice, arm: Arm, samples, first: int, knots: int) -> None:
     rows = range(first, min(first + 10, knots + 1))
     scale = [joint.steps.per_unit * 256 for joint in arm.joints]
     positions = tuple(

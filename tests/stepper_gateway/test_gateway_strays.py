@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.topics import JOINT_STATES
@@ -130,7 +130,7 @@ def test_a_device_that_cannot_be_asked_is_left_alone_and_heard_when_it_speaks() 
 
 
 def test_a_device_says_its_status_over_its_serial_line_too() -> None:
-    device = Device(device_config(rm1()), boot_id=77)
+    device = CoreDevice(device_config(rm1()), boot_id=77)
     device.attach_line()
     device.receive_serial(b"\0" + packet(encode(Sync(t0=1))))
     device.take_serial()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import msgspec
 
-from firmware.bindings.device import ConfigError, Device, joint_count
+from firmware.bindings.device import ConfigError, CoreDevice, joint_count
 from firmware.bindings.parsers import ProvisionRefused, asks_for_factory_reset
 from firmware.platform.host.firmware_slots import Booted, FirmwareSlots
 from firmware.platform.host.flash import Flash, NetworkCredentials
@@ -74,7 +74,7 @@ class Board:
         """Part of every topic."""
         return self._flash.credentials.device or self.name
 
-    def boot(self, reset_cause: str = "") -> Device:
+    def boot(self, reset_cause: str = "") -> CoreDevice:
         """The device after a reset; `reset_cause` says why, unless its memory knows better."""
         kept = self._flash.configuration
         text = self._factory if kept is None else kept.encode()
@@ -87,7 +87,7 @@ class Board:
             log.warning("%s; the board starts without a configuration", error)
             return self._boot(b"", cause, booted)
 
-    def remember(self, device: Device) -> None:
+    def remember(self, device: CoreDevice) -> None:
         """Keep what a restart must find; to be called often, writes seldom.
 
         A firmware on trial is not asked: it may say anything.
@@ -124,12 +124,12 @@ class Board:
             )
         )
 
-    def _boot(self, text: bytes, reset_cause: str, booted: Booted) -> Device:
+    def _boot(self, text: bytes, reset_cause: str, booted: Booted) -> CoreDevice:
         boot_state = self._memory.wake(self._reference)
         self._shaft = self._shaft or boot_state.shaft
         count = joint_count(text)
         is_known = count == len(boot_state.steps)
-        device = Device(
+        device = CoreDevice(
             text or None,
             boot_id=secrets.randbelow((1 << 32) - 1) + 1,
             steps=boot_state.steps if is_known else (0,) * count,
@@ -151,7 +151,7 @@ def _cause(boot_state: BootState, reset_cause: str) -> str:
     return reset_cause if reset_cause and boot_state.reset_cause == "power_on" else boot_state.reset_cause
 
 
-def provision(board: Board, device: Device, text: bytes) -> str:
+def provision(board: Board, device: CoreDevice, text: bytes) -> str:
     """Do what `text` asks for; why the device now starts anew. Raises ProvisionRefused."""
     is_reset = asks_for_factory_reset(text)
     if not device.still:

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from firmware.bindings.frames import OutFrame
 from firmware.platform.host.flash import NetworkCredentials
 from firmware.platform.host.link import REPORTS, DeviceLink, Item
@@ -40,7 +40,7 @@ class Network:
         self._denied: set[str] = set()  # what was said of the broker's ACL
         self.is_connected = False
 
-    def join(self, device: Device, name: str, credentials: NetworkCredentials) -> None:
+    def join(self, device: CoreDevice, name: str, credentials: NetworkCredentials) -> None:
         """Connect for as long as it takes, with this device's last will; whatever was connected vanishes."""
         self.break_off()
         self._offline_status = offline_status(name, device.boot_id)

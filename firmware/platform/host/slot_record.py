@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import struct
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 
 VARIABLE = "GEMELO_SLOTS"
 SLOT = 1000  # [us]
@@ -25,7 +25,7 @@ class SlotRecord:
         self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
         self._last: tuple[int, ...] = ()
 
-    def advance(self, device: Device, until_us: int) -> None:
+    def advance(self, device: CoreDevice, until_us: int) -> None:
         """As the device's own, slot by slot."""
         rows = b""
         while (now := device.now_us) < until_us:
@@ -36,7 +36,7 @@ class SlotRecord:
         if rows:
             os.write(self._file, rows)
 
-    def stand_still(self, device: Device, until_us: int) -> None:
+    def stand_still(self, device: CoreDevice, until_us: int) -> None:
         """As the device's own, with a row that says so."""
         os.write(self._file, row(device.now_us, STOOD, device.steps))
         device.stand_still(until_us)

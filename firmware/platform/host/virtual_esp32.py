@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from firmware.bindings.frames import PlatformRequest
 from firmware.bindings.injection import InjectRefused, inject, read_injection, within
 from firmware.bindings.parsers import ProvisionRefused
@@ -40,7 +40,7 @@ TRIAL = 30.0  # [s] that a new firmware has to say status to somebody
 REPLY_TIME = 0.1  # [s] that an answer has to leave, before the wire is lost
 LARGEST_DRIFT = 10_000.0  # [ppm]
 LONGEST_OFFLINE = 3600.0  # [s]
-Passing = Callable[[Device, int], None]  # lets the device's time pass, up to then [us]
+Passing = Callable[[CoreDevice, int], None]  # lets the device's time pass, up to then [us]
 
 
 class VirtualEsp32:
@@ -54,8 +54,8 @@ class VirtualEsp32:
         readiness: Readiness,
         record: SlotRecord | None = None,
     ) -> None:
-        self._advance_device: Passing = Device.advance if record is None else record.advance
-        self._stand_still: Passing = Device.stand_still if record is None else record.stand_still
+        self._advance_device: Passing = CoreDevice.advance if record is None else record.advance
+        self._stand_still: Passing = CoreDevice.stand_still if record is None else record.stand_still
         self._board = board
         self._wires = wires
         self._inbox = inbox
@@ -216,7 +216,7 @@ class VirtualEsp32:
         self._announce()
         self._join()
 
-    def _boot(self, cause: str = "") -> Device:
+    def _boot(self, cause: str = "") -> CoreDevice:
         device = self._board.boot(cause)
         self._booted = time.monotonic()
         self._wires.attach(device)

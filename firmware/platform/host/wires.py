@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from firmware.bindings.frames import OutFrame
 from firmware.platform.host.network import Network
 from firmware.platform.host.pty import SerialLine
@@ -31,7 +31,7 @@ class Wires:
         """Somebody can speak to the board."""
         return self.network.is_connected or self._line is not None
 
-    def attach(self, device: Device) -> None:
+    def attach(self, device: CoreDevice) -> None:
         """A device that has just started speaks over the line from now on."""
         if self._line is not None:
             device.attach_line()
@@ -47,7 +47,7 @@ class Wires:
         if self._line is not None:
             self._line.close()
 
-    def publish(self, device: Device, now: float) -> bool:
+    def publish(self, device: CoreDevice, now: float) -> bool:
         """Sends the device's frames, and its shaft positions ten times a second; `now` in [s] monotonic.
 
         True if `status` was among them and has reached somebody: the broker, or whoever speaks on the line.
@@ -68,7 +68,7 @@ class Wires:
         return has_told or device.told_status
 
 
-def say_event(device: Device, name: str, detail: str) -> None:
+def say_event(device: CoreDevice, name: str, detail: str) -> None:
     """As the firmware says its own; this one is the world's."""
     event = {"event": name, "t_us": device.now_us, "boot_id": device.boot_id, "stream": 0, "detail": detail}
     device.say(JsonFrame.EVENT, json.dumps(event).encode())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from schemas.device_config import UNUSED, InputConfig, InputRole, OutputConfig, SensorConfig
-from schemas.robot import Input, Output, PinLevel, Sensor
+from schemas.robot import DigitalOutput, Input, PinLevel, Sensor
 from services.arm.device.device_values import device_name, int32, nearest, pin_or_unused
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.description import Arm
@@ -38,7 +38,7 @@ def _joint_index(switch: Input, arm: Arm, where: str) -> int:
     return arm.joint_names.index(switch.joint)
 
 
-def output_config(output: Output) -> OutputConfig:
+def output_config(output: DigitalOutput) -> OutputConfig:
     """A digital output."""
     return OutputConfig(
         name=device_name(output.name, f'output "{output.name}"'),

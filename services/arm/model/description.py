@@ -15,10 +15,10 @@ from schemas.robot import (
     CLEARANCE,
     DeviceRecord,
     Dialect,
+    DigitalOutput,
     Driver,
     Gripper,
     Input,
-    Output,
     RobotFile,
     Sensor,
     StepperJoint,
@@ -80,7 +80,7 @@ class Arm:
     drivers: tuple[Driver, ...]
     joints: tuple[Joint, ...]
     inputs: tuple[Input, ...]
-    outputs: tuple[Output, ...]
+    outputs: tuple[DigitalOutput, ...]
     sensors: tuple[Sensor, ...]
     named_states: dict[str, tuple[float, ...]]  # [rad] or [m]
     partial_states: dict[str, dict[str, float]]  # of groups that have only some of the joints

@@ -38,7 +38,7 @@ GOOD, BAD, NEUTRAL = "#2f9e44", "#e03131", "#868e96"
 
 
 @dataclass(frozen=True)
-class Look:
+class Appearance:
     """What a browser's controls are built for."""
 
     language: str = "en"
@@ -58,9 +58,9 @@ class Page:
         self.lag = float("nan")  # [s] from a header that was sent to the word that it is drawn
         self._began = time.monotonic()
         self._marked = 0.0
-        self.wanted = Look()  # set by any thread: `refresh` builds it
+        self.wanted = Appearance()  # set by any thread: `refresh` builds it
         self.was_chosen = False  # by the browser's own settings, or by a person
-        self.built: Look | None = None
+        self.built: Appearance | None = None
         self._is_plain = False  # drawn without shadows
         self._told = 0
         self._stops = Stops()
@@ -96,12 +96,12 @@ class Page:
         if self.built is not None:
             self.scene.close()
 
-    def _build(self, look: Look) -> None:
+    def _build(self, appearance: Appearance) -> None:
         joints = {joint.name: joint for joint in self._operator.arm.description.joints}
-        self._words = words = Words(look.language, joints)
+        self._words = words = Words(appearance.language, joints)
         self.kit = kit = Kit(self.client, self._operator, words)
         gui = self.client.gui
-        gui.configure_theme(dark_mode=look.is_dark, show_logo=False, show_share_button=False, brand_color=BRAND)
+        gui.configure_theme(dark_mode=appearance.is_dark, show_logo=False, show_share_button=False, brand_color=BRAND)
         gui.set_panel_label(f"gemelo · {self._operator.arm.name}")
         gui.main_panel.dock_right()
         gui.main_panel.set_width(WIDTH)
@@ -137,16 +137,16 @@ class Page:
             self.cameras = CameraBox(kit)
         with tabs.add_tab(words("tab_state")):
             self.state = StateTab(kit)
-            self._settings(look)
+            self._settings(appearance)
         self._add_commands()
         self._channel = gui.add_text(CHANNEL, CHANNEL)
         self._channel.on_update(at_once(self._hear_stops))  # before all that a thread is needed for
         self._channel.on_update(lambda event: self.hear(event.target.value))
 
-    def _settings(self, look: Look) -> None:
+    def _settings(self, appearance: Appearance) -> None:
         words, gui = self._words, self.client.gui
         language = gui.add_dropdown("Language / Idioma", tuple(NAMES.values()), initial_value=NAMES[words.language])
-        dark = gui.add_checkbox(words("dark"), look.is_dark)
+        dark = gui.add_checkbox(words("dark"), appearance.is_dark)
 
         @language.on_update
         def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
@@ -176,12 +176,12 @@ class Page:
         self.client.scene.remove_click_callback()  # of the page as it was built before
         self.client.scene.on_click(modifier="shift")(self._world.place_goal)
 
-    def _rebuild(self, look: Look) -> None:
+    def _rebuild(self, appearance: Appearance) -> None:
         self.close()
         self.client.gui.reset()
         self._told, self._said = 0, ""
-        self._build(look)
-        self.built = look
+        self._build(appearance)
+        self.built = appearance
 
     def hear(self, text: str) -> None:
         """What the browser tells of itself, as its script writes it into the hidden field."""
@@ -202,7 +202,7 @@ class Page:
             self._world.step_back(self.client, max(1.0, browser.width - WIDTH) / browser.height)
         if not self.was_chosen:
             self.was_chosen = True
-            self.wanted = Look(language_of(browser.language), browser.dark)
+            self.wanted = Appearance(language_of(browser.language), browser.dark)
 
     def _stop(self) -> None:
         self._stops.come += 1

@@ -20,7 +20,7 @@ class MotionCaller(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Client:
+class ControlClient:
     """A node, by the key of its token and by its session."""
 
     key: str
@@ -35,11 +35,11 @@ class Client:
         return bool(caller.node) and caller.node == self.node
 
 
-def client_of(key: str, session: str) -> Client:
+def client_of(key: str, session: str) -> ControlClient:
     """The node whose token is `key`; raises `GoalRejected` for a key that no node of this bus has."""
     found = TOKEN.fullmatch(key)
     if found is None:
         raise invalid(f'client "{key[:80]}" is not the key of a liveliness token: `gemelo control take` sends its own')
     if not session:
         raise invalid("the request does not say which session it comes from: use `gemelo control`, or its Python API")
-    return Client(key, found[1], found[2], session)
+    return ControlClient(key, found[1], found[2], session)

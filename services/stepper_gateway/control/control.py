@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from schemas.control import ControlGive, ControlJoin, ControlState, ControlTake
 from schemas.system import LogLevel
-from services.stepper_gateway.control.clients import Client, MotionCaller, client_of
+from services.stepper_gateway.control.clients import ControlClient, MotionCaller, client_of
 from services.stepper_gateway.goals.rejections import invalid
 from services.stepper_gateway.moment import Moment
 
@@ -30,7 +30,7 @@ class Claim:
     """One who has asked for control, or holds it."""
 
     name: str
-    client: Client
+    client: ControlClient
     digest: bytes  # of the secret, which is not kept
     ticket: int  # of the request
 
@@ -47,7 +47,7 @@ class ControlHolder:
         self._robot, self._epoch, self._number = robot, epoch, 0
         self._holder: Claim | None = None
         self._since = Moment(0, 0.0)
-        self._members: dict[str, Client] = {}  # by the key of the token
+        self._members: dict[str, ControlClient] = {}  # by the key of the token
         self._absence = 0.0  # [s] for which the holder's token has been missing
         self._was_given = False
         self._claim: Claim | None = None

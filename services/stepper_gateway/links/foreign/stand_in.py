@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 import msgspec
 
-from firmware.bindings.device import Device
+from firmware.bindings.device import CoreDevice
 from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.device_config import config_text
 from services.arm.device.device_config import device_config
@@ -49,7 +49,7 @@ class StandIn:
         """Begin anew at `now` [s], as after a reset, at these steps; no path goes on."""
         self._zero = self._advanced = now
         self._is_stopping = False
-        self._device = Device(self._config, self._new_boot(), steps=steps, referenced=referenced)
+        self._device = CoreDevice(self._config, self._new_boot(), steps=steps, referenced=referenced)
         self.report_status()
 
     @property
