@@ -20,6 +20,7 @@ from services.arm.model.description import Arm as Description
 
 PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
 ANSWER = 3.0  # [s] of jogging without a word of the planner, after which it counts as lost
+BEGIN = 0.5  # [s] of a jog in which a refusal may be about the past: the planner hears a goal's end after its client
 PAUSE = 0.5  # [s] without a command, after which the next one begins a new jog
 SILENT = "the planner does not answer to jogging: is it running? `gemelo node list`"
 GAP = 1.0  # [s] without a word in the middle: the planner of a jog says ten a second, the gateway of a stream fifty
@@ -54,7 +55,8 @@ class JogCommands:
                 f"the planner has said nothing for {GAP:g} s: the arm has stopped in the middle of the jog; "
                 "`gemelo node list`"
             )
-        if heard is not None and not heard.active and heard.limited_by and now - self._began > PERIOD:
+        is_refused = heard is not None and not heard.active and bool(heard.limited_by)
+        if heard is not None and is_refused and now - self._began > (PERIOD if heard.check else BEGIN):
             raise _refused(heard)
         return heard
 
