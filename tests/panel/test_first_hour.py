@@ -13,7 +13,7 @@ from services.panel.words.words import TABLES
 from services.stack.stack import Stack
 from tests.panel.conftest import SIZE
 from tests.panel.person import Person, until
-from tests.panel.test_page import is_moving, rests
+from tests.panel.test_page import is_moving, rests, slowed
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {"en": DOCS / "first_hour.md", "es": DOCS / "es" / "primera_hora.md"}
@@ -90,10 +90,11 @@ def moves(person: Newcomer, arm: gemelo.Arm) -> None:
     person.reads(person.words("ended_succeeded"))
     assert arm.joints["brazo_joint"] == pytest.approx(0.5236, abs=1e-3)
     person.types("brazo_joint [°]", -150)
-    person.press(person.words("plan_and_execute"))
-    until(lambda: is_moving(arm), bool)
-    person.page.keyboard.press("Space")
-    rests(arm)
+    with slowed(arm):
+        person.press(person.words("plan_and_execute"))
+        until(lambda: is_moving(arm), bool)
+        person.page.keyboard.press("Space")
+        rests(arm)
     person.reads(person.words("check_ended"))
 
 
@@ -149,7 +150,7 @@ def teaches(person: Newcomer, arm: gemelo.Arm, folder: Path) -> None:
 def breaks_it(person: Newcomer, arm: gemelo.Arm) -> None:
     person.tab(person.words("tab_device"))
     person.page.get_by_text(person.words("virtual")).filter(visible=True).first.click()
-    motion = arm.start(named="home", speed=0.1)
+    motion = arm.start(named="home", speed=0.02)  # a minute, of which the page gets what it needs
     until(lambda: is_moving(arm), bool)
     person.press(person.words("estop_press"))
     with pytest.raises(gemelo.Aborted):
