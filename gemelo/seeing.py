@@ -26,6 +26,7 @@ IMAGES = 5  # of which the median is taken
 ENOUGH = 3  # of them that must show a thing
 ANSWER = 2.0  # [s] for the camera's process to tell its time
 PATIENCE = 3.0  # [s] for the first image, beside the time that `IMAGES` of them take
+BUSY = 6.0  # [s] beyond it where the camera streams: a detector on a busy host needs seconds for an image
 TO_REST = 1.0  # [s] that an arm which is just arriving may take
 AT_REST = 1e-3  # [rad/s] or [m/s]
 STILL = 1e-3  # [rad] or [m] that it may be elsewhere after the images
@@ -158,7 +159,9 @@ class Eyes:
         ]
         patience = PATIENCE + IMAGES / cell.camera(camera).fps
         try:
-            self._session.wait_for(lambda: len(heard) >= IMAGES, patience)
+            if not self._session.wait_for(lambda: len(heard) >= IMAGES, patience) and not late and streams(status):
+                patience += BUSY
+                self._session.wait_for(lambda: len(heard) >= IMAGES, BUSY)
         finally:
             for each in subscriptions:
                 each.close()
@@ -247,6 +250,11 @@ def _apart(first: Sequence[float], second: Sequence[float]) -> float:
     return float(sum((a - b) ** 2 for a, b in zip(first, second, strict=True)) ** 0.5)
 
 
+def streams(status: Sequence[CameraStatus]) -> bool:
+    """True if the camera's newest status says that images come."""
+    return bool(status) and status[-1].condition is CameraCondition.STREAMING
+
+
 def _why_none(camera: str, status: Sequence[CameraStatus], late: Sequence[float], patience: float) -> str:
     if status and status[-1].text:
         return status[-1].text
@@ -255,7 +263,7 @@ def _why_none(camera: str, status: Sequence[CameraStatus], late: Sequence[float]
             f'every image of camera "{camera}" is {min(late):.1f} s old when it comes (at most {OLDEST:g}): what lags '
             "there, the camera, the network, or a `detector` with too much to do?"
         )
-    if status and status[-1].condition is CameraCondition.STREAMING:
+    if streams(status):
         return f"nothing is heard of the detector for {patience:.1f} s: is the process `detector` running?"
     return f'no image of camera "{camera}" within {patience:.1f} s: `gemelo camera list`'
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from gemelo.seeing import Seen, add_to_scene, body_of, combined, why_unclear
+from gemelo.seeing import Seen, add_to_scene, body_of, combined, streams, why_unclear
 from gemelo.units import Pose
+from schemas.camera import CameraCondition, CameraStatus
 from schemas.cell import ColourThing, TagThing
 from schemas.detections import Detection, DetectionKind, Detections, Unclear
 from schemas.frames import Transform
@@ -95,3 +96,9 @@ def test_a_tag_without_a_body_is_a_sheet_and_a_block_is_itself() -> None:
     assert body_of(TagThing(name="flat", id=1, size=0.03))[0] == (0.03, 0.03, 0.002)
     block = ColourThing(name="red", colour="red", box=(0.03, 0.02, 0.01))  # type: ignore[arg-type]
     assert body_of(block) == ((0.03, 0.02, 0.01), ((0.0, 0.0, 0.0), TURN))
+
+
+@pytest.mark.parametrize(("condition", "is_so"), [(CameraCondition.STREAMING, True), (CameraCondition.FROZEN, False)])
+def test_a_detector_is_waited_for_longer_only_while_its_camera_streams(condition, is_so):
+    assert not streams([])
+    assert streams([CameraStatus(condition=condition)]) is is_so
