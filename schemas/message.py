@@ -15,7 +15,7 @@ import msgspec
 from msgspec.structs import astuple
 
 Vector = tuple[float, ...]
-UNLIKE_FLOATS = frozenset((str, int, bool))  # they are finite, and hold nothing
+UNSURE = frozenset((float, tuple, list))  # what may not be finite, or hold what is not: messages have seen to that
 
 
 class BadMessage(ValueError):
@@ -48,7 +48,7 @@ M = TypeVar("M", bound=Message)
 
 def _is_plainly_finite(values: Sequence[object]) -> bool:
     """A quick answer: True only where nothing in `values` can be anything but finite."""
-    return has_finite_sum(values) if type(values[0]) is float else UNLIKE_FLOATS.issuperset(map(type, values))
+    return has_finite_sum(values) if type(values[0]) is float else UNSURE.isdisjoint(map(type, values))
 
 
 def _require_finite(field: str, values: Sequence[object]) -> None:
