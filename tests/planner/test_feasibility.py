@@ -197,8 +197,25 @@ def test_compiled_and_in_python_the_peaks_are_the_same_to_the_bit(rm1: Arm):
         states = states_of(line(rm1, goal))
         knots = len(stream.first)
         for part in ((0, knots), (0, (knots + 1) // 2), (knots // 2, knots)):
-            python = feasibility.stream_rates_in_python(rm1, states, part)
-            assert np.array_equal(feasibility.stream_rates(rm1, states, part), python), part
+            assert feasibility.demands(rm1, states, part) == feasibility.demands_in_python(rm1, states, part), part
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_compiled_and_in_python_a_motor_needs_the_same_torque_to_the_bit(ideal: Arm, seed: int):
+    random = np.random.default_rng(seed)
+    speed = (0.0, *np.cumsum(random.uniform(1.0, 2000.0, 4)).tolist())
+    torque = tuple(sorted(random.uniform(0.0, 0.5, 5).tolist(), reverse=True))
+    curve = PullOut(speed=speed, torque=torque, inertia=random.uniform(0.0, 1e-3), friction=random.uniform(0.0, 0.1))
+    arm = with_motor(ideal, int(random.integers(3)), curve)
+    states = states_of(line(arm, tuple(random.uniform((-2.0, -2.0, 0.0), (2.0, 2.0, 0.2)).tolist())))
+    part = (0, math.ceil(float(states.times[-1]) / feasibility.KNOT - 1e-9))
+    assert feasibility.demands(arm, states, part) == feasibility.demands_in_python(arm, states, part)
+
+
+def test_compiled_and_in_python_braking_takes_as_long(rm1: Arm):
+    velocities, accelerations = states_of(line(rm1)).velocities, np.array([2.0, 3.0, 0.1])
+    compiled = feasibility.longest_braking(velocities, accelerations)
+    assert compiled == feasibility.longest_braking_in_python(velocities, accelerations) > 0.0
 
 
 def test_a_rate_that_is_not_a_number_is_seen_however_many_numbers_come_behind_it():

@@ -121,6 +121,18 @@ def test_of_a_quick_look_each_limit_is_told_in_the_same_words(rm1: Arm, trajecto
         verify.require_limits(rm1, states, verify.look(states), limits, False)
 
 
+def test_compiled_and_in_python_each_number_beyond_what_it_may_be_is_seen():
+    most = np.vstack((-np.ones(3), np.ones((4, 3))))
+    assert verify.is_within(most, most)
+    assert verify.is_within_in_python(most, most)
+    for row, column in np.ndindex(most.shape):
+        for wrong in (1.1 * most[row, column], np.nan):
+            reached = most.copy()
+            reached[row, column] = wrong
+            assert not verify.is_within(reached, most)
+            assert not verify.is_within_in_python(reached, most)
+
+
 def test_wrong_ends_are_refused(trajectory: JointTrajectory):
     require_ends(trajectory, START, GOAL)
     with pytest.raises(BadTrajectory, match="from the start to the goal"):

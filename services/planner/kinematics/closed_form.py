@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 JOINTS = 6  # with fewer, EAIK answers positions or pairs of turns only
 SAMPLES = 8  # configurations at which EAIK's forward kinematics is held against ours
 AGREEMENT = 1e-9  # [m], and per entry of the rotation; chosen: rounding of six joints, a hundred times over
+IDENTITY = np.eye(4)
 
 log = logging.getLogger(__name__)
 
@@ -35,7 +36,7 @@ class ClosedForm:
 
     def __init__(self, arm: Arm, robot: Robot, order: list[int]) -> None:
         self._robot = robot
-        self._order = order  # the arm's joints from the base to the tool
+        self._places = np.argsort(order)  # of the arm's joints, from the base to the tool
         self.turns = FullTurns(arm)
 
     def configurations(self, position: Array, rotation: Array, near: Array) -> tuple[Array, list[Array]]:
@@ -46,6 +47,8 @@ class ClosedForm:
         `near` (n,). Least-squares solutions are out of reach, or, where axes coincide, lack one turn.
         """
         branches, is_guess = self.branches(position, rotation)
+        if not is_guess.any():
+            return self.turns.within_limits(branches, near), []
         return self.turns.within_limits(branches[~is_guess], near), [
             *branches[is_guess & np.isfinite(branches).all(axis=1)]
         ]
@@ -55,11 +58,10 @@ class ClosedForm:
 
         `position` (3,) [m] and `rotation` (3, 3) are the tool's in the base frame.
         """
-        pose = np.eye(4)
+        pose = IDENTITY.copy()
         pose[:3, :3], pose[:3, 3] = rotation, position
         answer = self._robot.calculate_IK(pose)
-        branches = np.empty_like(answer.Q)
-        branches[:, self._order] = answer.Q
+        branches = answer.Q.take(self._places, axis=1)
         return branches, np.array(answer.is_LS, dtype=bool)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,7 @@ LARGEST_STEP = 0.8  # [rad] or [m] a joint may move in one iteration; chosen: be
 NOTHING = np.zeros(0)
 
 
-@dataclass(frozen=True)
-class Attempt:
+class Attempt(NamedTuple):
     """Where one descent ended: joint values (n,), and how far the tool is from its target."""
 
     positions: Array

@@ -70,6 +70,8 @@ class Goals:
     def other_ways_round(self, configurations: Sequence[Start], start: Start) -> list[Start]:
         """Where the arm stands as in one of the `configurations` (n,) [rad] or [m], with joints without limits a full
         turn away; the fastest to reach from `start` (n,) first."""
+        if not self._turns.has_endless:
+            return []
         near = np.array(start)
         rows = [
             tuple(row.tolist())

@@ -14,7 +14,7 @@ from services.arm.model.description import Arm
 from services.planner.kinematics.centring import Centring
 from services.planner.kinematics.closed_form import ClosedForm, chain_order, closed_form, completed, turns_about
 from services.planner.kinematics.descent import Attempt, Descent
-from services.planner.kinematics.joint_ranges import one_turn, spread
+from services.planner.kinematics.joint_ranges import nearest_first, one_turn, spread
 from services.planner.kinematics.parallel_axes import ParallelAxes, parallel_axes
 from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import Deadline
@@ -66,10 +66,11 @@ class InverseKinematics:
         """Distinct joint values (n,) [rad] or [m] that meet the target: all of the closed form, the nearest to `near`
         (n,) first; where that gives none, what `near` leads to and its mirror images, then batches, each nearest
         first."""
-        found: list[Array] = []
+        found: list[list[float]] = []
         for positions in chain(self._closed_form_solutions(target, near), self._at_limits(target, near, found)):
-            if self._is_new(positions, found, SAME):
-                found.append(positions)
+            values = positions.tolist()
+            if self._is_new(values, found, SAME):
+                found.append(values)
                 yield positions
         if not found:
             is_known = self._parallel is not None or (self._closed is not None and target.rotation is not None)
@@ -95,8 +96,7 @@ class InverseKinematics:
         rows = self._closed_form_configurations(target, near)
         if not len(rows):
             return
-        travels = np.abs(rows - near) / self._speed
-        nearest = rows[np.argsort(travels.max(axis=1), kind="stable")]
+        nearest = nearest_first(rows, near, self._speed)
         begins = [0, *range(1, len(nearest), REFINED)]
         for begin, end in pairwise([*begins, len(nearest)]):
             for attempt in self._descent.descend_all(target, nearest[begin:end]):
@@ -109,15 +109,17 @@ class InverseKinematics:
             return self._parallel.configurations(target.position, near)
         if self._closed is None:
             return near[None][:0]
-        configurations = [near[None][:0]]
+        configurations = []
         for rotation in self._rotations(target, near):
             exact, guesses = self._closed.configurations(target.position, rotation, near)
             configurations.append(exact)
             for guess in guesses:
                 configurations += [row[None] for row in self._from_guess(self._closed, target, guess, near)]
-        return np.concatenate(configurations)
+        if len(configurations) == 1:
+            return configurations[0]
+        return np.concatenate(configurations) if configurations else near[None][:0]
 
-    def _at_limits(self, target: ToolTarget, near: Array, found: list[Array]) -> Iterator[Array]:
+    def _at_limits(self, target: ToolTarget, near: Array, found: list[list[float]]) -> Iterator[Array]:
         """Where nothing was found, for the free turn leaves hardly any configuration within the limits: what those of a
         fine turn lead to that miss the limits least."""
         if found or self._closed is None or target.pointing is None:
@@ -166,8 +168,9 @@ class InverseKinematics:
         return MORE_STARTS if len(arm.joints) >= FULL_POSE_JOINTS and self._closed is None else STARTS
 
     def _searched(self, target: ToolTarget, near: Array, deadline: Deadline, starts: int) -> Iterator[Array]:
-        found = self._first(target, near)
-        yield from list(found)
+        first = self._first(target, near)
+        yield from first
+        found = [positions.tolist() for positions in first]
         attempts = islice(self._attempts(target, near, deadline), starts)
         while batch := list(islice(attempts, BATCH)):
             new: list[Array] = []
@@ -189,23 +192,27 @@ class InverseKinematics:
                 start[joint] = self._lower[joint] + self._upper[joint] - start[joint]
                 attempt = self.descend(target, start)
                 positions = self._as_near(attempt.positions, near)
-                if attempt.is_solution and self._is_new(positions, found, SAME):
+                known = [other.tolist() for other in found]
+                if attempt.is_solution and self._is_new(positions.tolist(), known, SAME):
                     found.append(positions)
         return sorted(found, key=lambda positions: self.travel(near, positions))
 
-    def _collect(self, target: ToolTarget, positions: Array, near: Array, found: list[Array], new: list[Array]) -> None:
+    def _collect(
+        self, target: ToolTarget, positions: Array, near: Array, found: list[list[float]], new: list[Array]
+    ) -> None:
         """Puts a solution that is none of those found into both lists; far from `near`, freedom goes to the middles."""
         centred = self._centring.centred(target, positions)
         is_redundant = centred is not None
         positions = self._as_near(positions if centred is None else centred, near)
-        if self._is_new(positions, found, SAME_REDUNDANT if is_redundant else SAME):
-            found.append(positions)
+        values = positions.tolist()
+        if self._is_new(values, found, SAME_REDUNDANT if is_redundant else SAME):
+            found.append(values)
             new.append(positions)
 
-    def _is_new(self, positions: Array, found: list[Array], same: float) -> bool:
-        values, speeds = positions.tolist(), self._speeds
+    def _is_new(self, values: list[float], found: list[list[float]], same: float) -> bool:
+        speeds = self._speeds
         for other in found:  # without generators: most differ in the first joint already
-            for a, b, speed in zip(other.tolist(), values, speeds, strict=True):
+            for a, b, speed in zip(other, values, speeds, strict=True):
                 if abs(a - b) / speed > same:
                     break
             else:

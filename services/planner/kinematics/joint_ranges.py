@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.model.description import Arm, Joint
+from services.planner.native.compiled import motion, where_built
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,7 @@ class FullTurns:
         self._speed = np.array([joint.velocity for joint in arm.joints])
         self._period = np.array([math.tau if joint.unit == "rad" else NEVER for joint in arm.joints])
         self._is_limited = bool(np.isfinite((self._lower, self._upper)).all())
+        self.has_endless = bool(np.isinf(self._upper).any())  # a joint without limits
 
     def within_limits(self, branches: Array, near: Array) -> Array:
         """The branches (m, n) or one of them (n,), [rad] or [m], with every full turn within the limits, (k, n); joints
@@ -37,18 +39,12 @@ class FullTurns:
         if not self._is_limited:
             lower = np.where(np.isinf(lower), near - 0.5 * self._period, lower)
             upper = np.where(np.isinf(upper), near + 0.5 * self._period, upper)
-        first = branches + self._period * np.ceil((lower - branches) / self._period)
-        more = np.floor((upper - first) / self._period)
-        fits = (more >= 0.0).all(axis=1)  # false for what is not a number, too
-        configurations = [
-            values + _turns(tuple(turns)) for values, turns in zip(first[fits], more[fits].tolist(), strict=True)
-        ]
-        return np.concatenate(configurations) if configurations else first[:0]
+        return turned(branches, lower, upper, self._period)
 
     def other_ways_round(self, values: Array, near: Array, most: int) -> list[Array]:
         """`values` (n,) [rad] or [m] with a full turn more or less of one or more joints without limits, where the arm
         stands as it does at `values`: at most `most`, the fastest to reach from `near` (n,) first."""
-        if not np.isinf(self._upper).any():
+        if not self.has_endless:
             return []
         choices = [(-1, 0, 1) if endless else (0,) for endless in np.isinf(self._upper).tolist()]
         turns = np.array([each for each in product(*choices) if any(each)], dtype=float).reshape(-1, len(values))
@@ -64,6 +60,38 @@ class FullTurns:
         away = branches - middle
         away = away - self._period * np.rint(away / self._period)
         return middle + away, np.maximum(np.abs(away) - half, 0.0).max(axis=1)
+
+
+def turned_in_python(branches: Array, lower: Array, upper: Array, period: Array) -> Array:
+    """`turned` of `branches` (m, n) from `lower` to `upper` with `period` (n,), [rad] or [m], where the core is not
+    built."""
+    first = branches + period * np.ceil((lower - branches) / period)
+    more = np.floor((upper - first) / period)
+    fits = (more >= 0.0).all(axis=1)  # false for what is not a number, too
+    configurations = [
+        values + _turns(tuple(turns)) for values, turns in zip(first[fits], more[fits].tolist(), strict=True)
+    ]
+    return np.concatenate(configurations) if configurations else first[:0]
+
+
+@where_built(turned_in_python)
+def turned(branches: Array, lower: Array, upper: Array, period: Array) -> Array:
+    """The `branches` (m, n) with every full turn from `lower` to `upper` (n,), all [rad] or [m], (k, n); after its
+    `period` (n,) a joint stands as before."""
+    return motion.turned(np.ascontiguousarray(branches), lower, upper, period, math.tau, MOST_TURNS)
+
+
+def nearest_first_in_python(rows: Array, near: Array, speed: Array) -> Array:
+    """`nearest_first` of `rows` (m, n) from `near` (n,) at `speed` (n,), where the core is not built."""
+    travels = np.abs(rows - near) / speed
+    return np.asarray(rows[np.argsort(travels.max(axis=1), kind="stable")])
+
+
+@where_built(nearest_first_in_python)
+def nearest_first(rows: Array, near: Array, speed: Array) -> Array:
+    """The `rows` (m, n) [rad] or [m], those first that the slowest joint reaches soonest from `near` (n,) at `speed`
+    (n,) [rad/s] or [m/s]."""
+    return motion.nearest_first(np.ascontiguousarray(rows), near, speed)
 
 
 @lru_cache(maxsize=1024)

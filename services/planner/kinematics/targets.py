@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -20,16 +20,14 @@ EDGE = 0.99  # share of a tolerance that is used, so that rounding does not put 
 METRES_PER_RADIAN = 0.2  # how much a turn of the tool counts against its position while searching
 
 
-@dataclass(frozen=True)
-class AxisPointing:
+class AxisPointing(NamedTuple):
     """An axis (3,) of the tool, in the tool's frame, that is to point along `direction` (3,) in the base frame."""
 
     axis: Array
     direction: Array
 
 
-@dataclass(frozen=True)
-class ToolTarget:
+class ToolTarget(NamedTuple):
     """A tool position (3,) [m] in the base frame and, where it matters, its rotation (3, 3) or where it points."""
 
     position: Array

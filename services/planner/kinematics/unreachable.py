@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -80,7 +79,7 @@ class UnreachableRefusals:
         self, target: ToolTarget, place: ToolTarget, fallback: Array, near: Array, deadline: Deadline
     ) -> Array:
         """At the place, the configuration that turns the tool as nearly as it can be, and touches nothing."""
-        light = replace(target, metres_per_radian=LIGHT, rotation_tolerance=0.0)
+        light = target._replace(metres_per_radian=LIGHT, rotation_tolerance=0.0)
         turned: list[Array] = []
         for configuration in self._ik.nearest(place, near, deadline)[:NEAREST_TRIED]:
             attempt = self._ik.descend(place, self._ik.descend(light, configuration).positions)

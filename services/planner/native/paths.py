@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,7 @@ class FailureReason(IntEnum):
     CANCELLED = 4
 
 
-@dataclass(frozen=True)
-class Effort:
+class Effort(NamedTuple):
     """What it took: [s] of each phase, samples of the search, configurations checked."""
 
     search: float
@@ -31,16 +30,14 @@ class Effort:
     checks: int
 
 
-@dataclass(frozen=True)
-class NoPath:
+class NoPath(NamedTuple):
     """None was found."""
 
     reason: FailureReason
     effort: Effort
 
 
-@dataclass(frozen=True)
-class FreePath:
+class FreePath(NamedTuple):
     """A free path: `corners` (m, n) of the polyline, and `control` (k, n) points of the curve in its place.
 
     The curve is the uniform cubic B-spline of the control points, twice continuously differentiable in its parameter,

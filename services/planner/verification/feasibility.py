@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +36,7 @@ Q8 = 256  # standard: 1/256 step, firmware/PROTOCOL.md
 FULL = 1.0 + 1e-3  # knots are rounded to 1/256 step, so a profile that touches its limit may look so much beyond
 MOST_KNOTS = 30_000  # that are looked at at once; chosen: some tens of megabytes of slots
 SLOWEST = 0.01  # time scale below which slowing down is no remedy
+MOST_SHARE = 1e6  # of the pull-out torque that is told: none is left at that rate
 HALVINGS = 24  # chosen: the time scale to 1 in 2^24, finer than the duration is told
 PLACES = np.arange(1, round(KNOT / SLOT) + 1, dtype=np.float64) * SLOT / KNOT  # of slots between two knots, 0 to 1
 SHARES: Array = PLACES[None, :, None]
@@ -122,28 +122,20 @@ def margins(arm: Arm, stream: StepStream) -> tuple[StepMargin, ...]:
     return tuple(map(_margin, _rate_limits(arm), stream.peaks.tolist(), torques))
 
 
-def _part_margins(arm: Arm, states: States, part: tuple[int, int]) -> tuple[StepMargin, ...]:
-    """The `margins` from one knot to another; without the stream where no motor says how its torque falls."""
-    if _has_pull_out(arm):
-        return margins(arm, _stream(arm, states, part))
-    return tuple(map(_margin, _rate_limits(arm), stream_rates(arm, states, part).tolist(), repeat(0.0)))
+def demands_in_python(arm: Arm, states: States, part: tuple[int, int]) -> tuple[list[float], list[float]]:
+    """`demands`, where the core is not built."""
+    stream = _stream(arm, states, part)
+    return stream.peaks.tolist(), [_torque_share(joint, index, stream) for index, joint in enumerate(arm.joints)]
 
 
-@once_per_arm
-def _has_pull_out(arm: Arm) -> bool:
-    return any(joint.drive.motor.pull_out is not None for joint in arm.joints)
-
-
-def stream_rates_in_python(arm: Arm, states: States, part: tuple[int, int]) -> Array:
-    """`stream_rates`, where the core is not built."""
-    return _stream(arm, states, part).peaks
-
-
-@where_built(stream_rates_in_python)
-def stream_rates(arm: Arm, states: States, part: tuple[int, int]) -> Array:
-    """(n,) [steps/s] the largest rate of each joint from one knot to another of the stream through `states`."""
+@where_built(demands_in_python)
+def demands(arm: Arm, states: States, part: tuple[int, int]) -> tuple[list[float], list[float]]:
+    """From one knot to another of the stream through `states`: the largest rate [steps/s] of each joint, and the
+    largest share of the pull-out torque of its motor."""
     last = _knots(float(states.times[-1]))
-    return motion.stream_rates(*states, _scale(arm), PLACES, *part, last, KNOT, Q8)
+    found = motion.stream_demands(*states, _scale(arm), *_motors(arm), PLACES, *part, last, KNOT, Q8)
+    rates, torques = found.tolist()
+    return rates, [min(share, MOST_SHARE) for share in torques]
 
 
 @once_per_arm
@@ -152,11 +144,24 @@ def _scale(arm: Arm) -> Array:
     return np.array([joint.steps.per_unit * Q8 for joint in arm.joints])
 
 
+@once_per_arm
+def _motors(arm: Arm) -> tuple[Array, Array]:
+    """(n, 3) inertia [kg m^2], friction [Nm] and the turn of a step [rad] of each joint, and (k, 3) joint, rate
+    [steps/s] and pull-out torque [Nm] of each point of their curves."""
+    loads, curves = np.zeros((len(arm.joints), 3)), []
+    for index, joint in enumerate(arm.joints):
+        curve = joint.drive.motor.pull_out
+        if curve is not None:
+            loads[index] = curve.inertia, curve.friction, math.tau / joint.drive.motor.pulses_per_turn
+            curves += [(index, *point) for point in zip(curve.speed, curve.torque, strict=True)]
+    return loads, np.array(curves, dtype=np.float64).reshape(-1, 3)
+
+
 def _margins(arm: Arm, states: States) -> tuple[StepMargin, ...]:
     """Of all of it, by parts that the memory holds."""
     knots = _knots(float(states.times[-1]))
     parts = [(begin, min(begin + MOST_KNOTS, knots)) for begin in range(0, knots, MOST_KNOTS)]
-    found = [_part_margins(arm, states, part) for part in parts]
+    found = [tuple(map(_margin, _rate_limits(arm), *demands(arm, states, part))) for part in parts]
     if len(found) == 1:
         return found[0]
     worst = (max(of_joint, key=lambda margin: margin.share) for of_joint in zip(*found, strict=True))
@@ -174,8 +179,19 @@ def queue_share(arm: Arm, trajectory: JointTrajectory) -> float:
 
 
 def _queue_share(arm: Arm, states: States) -> float:
-    braking = float((np.abs(states.velocities).max(axis=0) / _accelerations(arm)).max())
+    braking = longest_braking(states.velocities, _accelerations(arm))
     return float(LEAD + 0.5 * braking) / (arm.device.queue_capacity * KNOT)
+
+
+def longest_braking_in_python(velocities: Array, accelerations: Array) -> float:
+    """`longest_braking` from `velocities` (m, n) with `accelerations` (n,), where the core is not built."""
+    return float((np.abs(velocities).max(axis=0) / accelerations).max())
+
+
+@where_built(longest_braking_in_python)
+def longest_braking(velocities: Array, accelerations: Array) -> float:
+    """[s] that braking from the largest of `velocities` (m, n) takes at most, with `accelerations` (n,)."""
+    return motion.longest_braking(velocities, accelerations)
 
 
 @once_per_arm
@@ -312,4 +328,4 @@ def _torque_share(joint: Joint, index: int, stream: StepStream) -> float:
     available = np.interp(np.abs(signed), curve.speed, curve.torque, right=0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(needed > 0.0, needed / available, 0.0)
-    return float(min(shares.max(), 1e6))
+    return float(min(shares.max(), MOST_SHARE))

@@ -23,7 +23,6 @@ Array = NDArray[np.float64]
 DENSITY = 10  # samples between two points; chosen: a quintic between two points 0.05 s apart bends little in 5 ms
 ROUNDING = 1e-9  # [rad] or [m], and a share of limits: what floating point may add
 
-SIDES = np.array([[-1.0], [1.0], [1.0], [1.0], [1.0]])  # a position is above its lower limit, all else below
 LOOSE_JERK = 1.01  # share of the limit; chosen: third differences of neighbouring points have few digits left
 
 
@@ -155,11 +154,21 @@ def limit_shares(samples: Samples, limits: JointLimits) -> tuple[float, float, f
     return float(velocity.max()), float(acceleration.max()), float(jerk.max())
 
 
+def is_within_in_python(reached: Array, most: Array) -> bool:
+    """`is_within` of `reached` and `most`, (5, n) each, where the core is not built."""
+    return bool((reached[0] >= most[0]).all() and (reached[1:] <= most[1:]).all())
+
+
+@where_built(is_within_in_python)
+def is_within(reached: Array, most: Array) -> bool:
+    """True if `reached` (5, n), as of `Look`, is within `most` (5, n); what is not a number is not."""
+    return motion.is_within(reached, most)
+
+
 def require_limits(arm: Arm, states: States, seen: Look, limits: JointLimits, is_jerk_limited: bool) -> None:
     """`require_within_limits` and, where it is jerk-limited, `require_jerk` of the trajectory through `states`, at
     which `seen` has looked; raises `BadTrajectory`."""
-    is_within = bool((seen.reached * SIDES <= _most(arm, limits, is_jerk_limited)).all())
-    if not is_within:
+    if not is_within(seen.reached, _most(arm, limits, is_jerk_limited)):
         samples = sample_between(*states)
         require_within_limits(arm, samples, limits)
         if is_jerk_limited:
@@ -168,11 +177,11 @@ def require_limits(arm: Arm, states: States, seen: Look, limits: JointLimits, is
 
 @once_per_arm
 def _most(arm: Arm, limits: JointLimits, is_jerk_limited: bool) -> Array:
-    """(5, n) that each row of `Look.reached` may be, times `SIDES`."""
+    """(5, n) that each row of `Look.reached` may be, the first at least and the others at most."""
     lower, upper = _bounds(arm)
     loose = 1.0 + ROUNDING
     jerk = LOOSE_JERK * limits.jerk if is_jerk_limited else np.full(len(lower), np.inf)
-    return np.array((-lower, upper, loose * limits.velocity, loose * limits.acceleration, jerk))
+    return np.array((lower, upper, loose * limits.velocity, loose * limits.acceleration, jerk))
 
 
 @once_per_arm

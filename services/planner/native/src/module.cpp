@@ -14,6 +14,7 @@
 #include "plan.h"
 #include "polytope.h"
 #include "trajectories.h"
+#include "turns.h"
 
 namespace gemelo {
 namespace {
@@ -124,6 +125,32 @@ nb::ndarray<nb::numpy, double> descend(const ToolDescent& arm, const Rows& start
         }
     }
     return array_of(std::move(rows), {count, dof + 2});
+}
+
+// `branches` (m, n) with every choice of full turns [rad] within the limits, (k, n), `most` choices of each at most.
+nb::ndarray<nb::numpy, double> turned(const Rows& branches, const Row& lower, const Row& upper, const Row& period,
+                                      double turn, double most) {
+    const size_t dof = branches.shape(1);
+    for (const Row* row : {&lower, &upper, &period}) require_columns(row->size(), dof, "ranges");
+    require(dof >= 1 && most >= 1.0, "one choice of a joint at least");
+    std::vector<double> rows;
+    for (size_t i = 0; i < branches.shape(0); ++i) {
+        append_turns({lower.data(), upper.data(), period.data(), dof}, &branches(i, 0), turn, most, rows);
+    }
+    const size_t count = rows.size() / dof;
+    return array_of(std::move(rows), {count, dof});
+}
+
+// `rows` (m, n), those first that the slowest joint reaches soonest from `near` (n,) at `speed` (n,).
+nb::ndarray<nb::numpy, double> nearest_first(const Rows& rows, const Row& near, const Row& speed) {
+    const size_t dof = rows.shape(1), count = rows.shape(0);
+    for (const Row* row : {&near, &speed}) require_columns(row->size(), dof, "joint values");
+    std::vector<double> sorted;
+    sorted.reserve(rows.size());
+    for (const size_t at : by_travel(rows.data(), count, near.data(), speed.data(), dof)) {
+        sorted.insert(sorted.end(), rows.data() + at * dof, rows.data() + (at + 1) * dof);
+    }
+    return array_of(std::move(sorted), {count, dof});
 }
 
 std::vector<Sphere> spheres_of(const Rows& rows) {
@@ -442,6 +469,8 @@ NB_MODULE(_motion, module) {
                "position_tolerance"_a, "rotation_tolerance"_a);
     module.def("centre", &centre, "arm"_a, "joints"_a, "middle"_a, "weight"_a, "position"_a, "rotation"_a,
                "metres_per_radian"_a, "position_tolerance"_a, "rotation_tolerance"_a);
+    module.def("turned", &turned, "branches"_a, "lower"_a, "upper"_a, "period"_a, "turn"_a, "most"_a);
+    module.def("nearest_first", &nearest_first, "rows"_a, "near"_a, "speed"_a);
     module.def("part", &make_part, "frame"_a, "spheres"_a, "solids"_a);
     module.def("cover", &cover, "cells"_a, "candidates"_a, "least"_a);
     module.def("depths", &depths, "sides"_a, "points"_a);

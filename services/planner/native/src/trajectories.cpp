@@ -4,7 +4,7 @@
 #include <array>
 
 #include "arrays.h"
-#include "quintic.h"
+#include "step_stream.h"
 #include "timing/timed_path.h"
 
 namespace gemelo {
@@ -87,22 +87,75 @@ double most_aside(const Rows& line, const Rows& rows) {
     return aside(line.data(), rows.data(), rows.shape(0), rows.shape(1));
 }
 
-// The largest rate (n,) of the step stream of a trajectory from the knot `begin` to the knot `end`, at `shares` of its
-// knots; `scale` (n,) is in parts of a step, of which there are `subdivision`.
-nb::ndarray<nb::numpy, double> stream_rates(const Row& stamps, const Rows& p, const Rows& v, const Rows& a,
-                                            const Row& scale, const Row& shares, size_t begin, size_t end, size_t last,
-                                            double knot, double subdivision) {
+// By joints; `loads` (n, 3): inertia, friction, and the turn of a step, 0 where nothing is known of the motor; `curves`
+// (k, 3): joint, rate and pull-out torque.
+std::vector<MotorView> motors_of(const Rows& loads, const Rows& curves, size_t dof) {
+    require(loads.shape(0) == dof, "each joint needs its load");
+    require_columns(loads.shape(1), 3, "loads");
+    require_columns(curves.shape(1), 3, "curves");
+    std::vector<MotorView> motors;
+    for (size_t i = 0; i < dof; ++i) motors.push_back({loads(i, 0), loads(i, 1), loads(i, 2), {}, {}});
+    for (size_t row = 0; row < curves.shape(0); ++row) {
+        require(curves(row, 0) >= 0.0 && curves(row, 0) < static_cast<double>(dof), "a curve's joint must exist");
+        MotorView& motor = motors[static_cast<size_t>(curves(row, 0))];
+        motor.speed.push_back(curves(row, 1));
+        motor.torque.push_back(curves(row, 2));
+    }
+    return motors;
+}
+
+// The largest rate of the step stream of a trajectory from the knot `begin` to the knot `end`, at `shares` of its
+// knots, and the largest share of the pull-out torque, (2, n); `scale` (n,) is in parts of a step, of which there are
+// `subdivision`, the motors are as of `motors_of`.
+nb::ndarray<nb::numpy, double> stream_demands(const Row& stamps, const Rows& p, const Rows& v, const Rows& a,
+                                              const Row& scale, const Rows& loads, const Rows& curves,
+                                              const Row& shares, size_t begin, size_t end, size_t last, double knot,
+                                              double subdivision) {
     const TrajectoryView trajectory = trajectory_of(stamps, p, v, a);
-    require_columns(scale.size(), trajectory.dof, "scales");
+    const size_t dof = trajectory.dof;
+    require_columns(scale.size(), dof, "scales");
     require(begin < end, "a stream has two knots at least");
-    std::vector<double> peaks(trajectory.dof);
+    const std::vector<MotorView> motors = motors_of(loads, curves, dof);
+    std::vector<double> demands(2 * dof);
     {
         nb::gil_scoped_release release;
-        peak_rates_of(trajectory, {scale.data(), stamps.size(), begin, end, last, knot, subdivision}, shares.data(),
-                      shares.size(), peaks.data());
+        const Stream made = stream_of(trajectory, {scale.data(), stamps.size(), begin, end, last, knot, subdivision});
+        const StreamView stream{made.start.data(), made.square.data(), made.cube.data(), end - begin, dof,
+                                shares.size(),     knot * subdivision};
+        peak_rates(stream, shares.data(), demands.data());
+        for (size_t i = 0; i < dof; ++i) {
+            if (motors[i].speed.empty()) continue;
+            demands[dof + i] = torque_share(stream, shares.data(), i, motors[i], knot, subdivision);
+        }
     }
-    const size_t dof = peaks.size();
-    return array_of(std::move(peaks), {dof});
+    return array_of(std::move(demands), {size_t{2}, dof});
+}
+
+// How long [s] braking from the largest of `velocities` (m, n) takes the joint that takes longest, with
+// `accelerations` (n,).
+double longest_braking(const Rows& velocities, const Row& accelerations) {
+    const size_t dof = velocities.shape(1);
+    require_columns(accelerations.size(), dof, "accelerations");
+    double longest = 0.0;
+    for (size_t i = 0; i < dof; ++i) {
+        double most = 0.0;
+        for (size_t row = 0; row < velocities.shape(0); ++row) grow(std::abs(velocities(row, i)), most);
+        grow(most / accelerations(i), longest);
+    }
+    return longest;
+}
+
+// True if what has been `reached` (5, n), as of `sampled`, is within `most` (5, n), the first row of it from below.
+bool is_within(const Rows& reached, const Rows& most) {
+    const size_t dof = reached.shape(1);
+    require(reached.shape(0) == 5 && most.shape(0) == 5 && most.shape(1) == dof, "five rows each, of the same joints");
+    for (size_t i = 0; i < dof; ++i) {
+        if (!(reached(0, i) >= most(0, i))) return false;
+        for (size_t row = 1; row < 5; ++row) {
+            if (!(reached(row, i) <= most(row, i))) return false;
+        }
+    }
+    return true;
 }
 
 // The largest rate (n,) of a step stream, whose coefficients (k, n) are in 1/256 steps, at `shares` of its knots.
@@ -169,8 +222,10 @@ void add_trajectories(nb::module_& module) {
     module.def("sampled", &sampled, "stamps"_a, "positions"_a, "velocities"_a, "accelerations"_a, "shares"_a);
     module.def("tuples", &tuples, "rows"_a);
     module.def("most_aside", &most_aside, "line"_a, "rows"_a);
-    module.def("stream_rates", &stream_rates, "stamps"_a, "positions"_a, "velocities"_a, "accelerations"_a, "scale"_a,
-               "shares"_a, "begin"_a, "end"_a, "last"_a, "knot"_a, "subdivision"_a);
+    module.def("stream_demands", &stream_demands, "stamps"_a, "positions"_a, "velocities"_a, "accelerations"_a,
+               "scale"_a, "loads"_a, "curves"_a, "shares"_a, "begin"_a, "end"_a, "last"_a, "knot"_a, "subdivision"_a);
+    module.def("longest_braking", &longest_braking, "velocities"_a, "accelerations"_a);
+    module.def("is_within", &is_within, "reached"_a, "most"_a);
     module.def("timed_curve", &timed_curve, "control"_a, "velocity"_a, "acceleration"_a, "jerk"_a);
     module.def("timed_lines", &timed_lines, "corners"_a, "velocity"_a, "acceleration"_a, "jerk"_a);
 }
