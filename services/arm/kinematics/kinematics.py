@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -19,8 +19,7 @@ Array = NDArray[np.float64]
 Positions = Sequence[float] | Array
 
 
-@dataclass(frozen=True)
-class Pose:
+class Pose(NamedTuple):
     """`position` (3,) [m] and `rotation` (3, 3) in the base frame."""
 
     position: Array

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import threading
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -35,8 +34,7 @@ class Stretch(NamedTuple):
     pairs: frozenset[LinkPair] | None = None
 
 
-@dataclass(frozen=True)
-class Resolution:
+class Resolution(NamedTuple):
     """Answer about a polyline: a configuration (n,) that surely touches, or the stretches that are left unresolved."""
 
     touching: Array | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,7 @@ class PathNotFound(Exception):
         self.reason = reason
 
 
-@dataclass(frozen=True)
-class Path:
+class Path(NamedTuple):
     """A free path: the polyline of `corners` (m, n), and the uniform cubic B-spline of `control` (k, n) in its place.
 
     Both ends of the curve are there three times, so that it begins and ends exactly there.

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,8 +105,7 @@ class Search:
             return Path(corners, smooth(corners, sought.validity, deadline), planner_id)
 
 
-@dataclass(frozen=True)
-class _Sought:
+class _Sought(NamedTuple):
     """What all searches are asked: a path from `start` (n,) to one of `goals` (m, n)."""
 
     start: Array

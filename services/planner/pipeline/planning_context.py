@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from schemas.planning import PlanRequest
 from services.planner.path.path import Start
@@ -11,8 +11,7 @@ from services.planner.request.deadline import Deadline, Stopwatch
 from services.planner.timing.profile import JointLimits
 
 
-@dataclass(frozen=True)
-class PlanningContext:
+class PlanningContext(NamedTuple):
     """From `start`, within `limits`, `margin` [m] away from everything."""
 
     request: PlanRequest

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,8 +42,7 @@ class TrajectoryTouches(Exception):
         self.configuration = configuration
 
 
-@dataclass(frozen=True)
-class VerifiedTrajectory:
+class VerifiedTrajectory(NamedTuple):
     """What may be executed."""
 
     trajectory: JointTrajectory

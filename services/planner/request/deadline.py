@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from schemas.planning import PlanningTimes
 from services.planner.request.refusals import PlanRefused, timed_out
@@ -32,8 +31,7 @@ class DeadlinePassed(PlanRefused):
         super().__init__(refused.code, refused.refusal)
 
 
-@dataclass(frozen=True)
-class Deadline:
+class Deadline(NamedTuple):
     """`allowed` seconds from `began`, both by `clock` [s]; it has passed as soon as `cancel` is set.
 
     Without arguments it never passes.
