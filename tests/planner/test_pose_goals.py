@@ -14,7 +14,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from schemas.planning import PlanCode, PoseGoal, Refusal
-from services.arm.kinematics.kinematics import Kinematics, Pose
+from services.arm.kinematics.kinematics import FramePose, Kinematics
 from services.arm.model.description import Arm, load_arm
 from services.planner.kinematics.goals import Goals, Start
 from services.planner.request.deadline import NEVER
@@ -60,7 +60,7 @@ def quaternion(rotation: np.ndarray) -> tuple[float, ...]:
     return (turn.x, turn.y, turn.z, turn.w)
 
 
-def goal_of(form: str, pose: Pose, axis: np.ndarray) -> PoseGoal:
+def goal_of(form: str, pose: FramePose, axis: np.ndarray) -> PoseGoal:
     """The pose in one of the forms."""
     position = tuple(pose.position.tolist())
     match form:
@@ -76,7 +76,7 @@ def goal_of(form: str, pose: Pose, axis: np.ndarray) -> PoseGoal:
             return PoseGoal(position=position, tool_axis=tuple(axis.tolist()), direction=direction)
 
 
-def missing(form: str, wanted: Pose, got: Pose, axis: np.ndarray) -> tuple[float, float]:
+def missing(form: str, wanted: FramePose, got: FramePose, axis: np.ndarray) -> tuple[float, float]:
     """[m] and [rad] between two poses, as far as the form asks."""
     far = float(np.linalg.norm(wanted.position - got.position))
     if form == "position":

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from services.arm.kinematics.kinematics import Pose
+from services.arm.kinematics.kinematics import FramePose
 from services.planner.cartesian.arcs import arc_about, arc_through
 from services.planner.cartesian.tool_path import ToolPath, polyline
 from services.planner.path.path_curve import NO_LENGTH, CubicSpline, rounded_runs
@@ -17,19 +17,19 @@ from services.planner.request.refusals import PlanRefused
 
 NUMBERS = st.floats(-1.0, 1.0).map(lambda value: round(value, 4))
 POINTS = st.tuples(NUMBERS, NUMBERS, NUMBERS).map(np.array)
-POSES = st.tuples(POINTS, POINTS).map(lambda pair: Pose(pair[0], pin.exp3(2.0 * pair[1])))
+POSES = st.tuples(POINTS, POINTS).map(lambda pair: FramePose(pair[0], pin.exp3(2.0 * pair[1])))
 
 
-def place(*numbers: float) -> Pose:
-    return Pose(np.array(numbers), np.eye(3))
+def place(*numbers: float) -> FramePose:
+    return FramePose(np.array(numbers), np.eye(3))
 
 
-def turn_between(first: Pose, second: Pose) -> np.ndarray:
+def turn_between(first: FramePose, second: FramePose) -> np.ndarray:
     return pin.log3(second.rotation @ first.rotation.T)
 
 
 @given(POSES, POSES)
-def test_a_line_ends_where_it_should_and_turns_evenly(start: Pose, end: Pose):
+def test_a_line_ends_where_it_should_and_turns_evenly(start: FramePose, end: FramePose):
     paths = polyline([start, end], 0.0)
     if not paths:
         assert np.linalg.norm(end.position - start.position) <= NO_LENGTH
@@ -45,7 +45,7 @@ def test_a_line_ends_where_it_should_and_turns_evenly(start: Pose, end: Pose):
 
 @settings(max_examples=60)
 @given(st.lists(POSES, min_size=3, max_size=5), st.floats(1e-3, 0.3))
-def test_a_blended_corner_is_cut_within_its_radius_and_has_no_kink(poses: list[Pose], blend: float):
+def test_a_blended_corner_is_cut_within_its_radius_and_has_no_kink(poses: list[FramePose], blend: float):
     paths = polyline(poses, blend)
     assume(len(paths) == 1)
     path = paths[0]
@@ -85,7 +85,7 @@ def test_without_a_blend_every_corner_is_a_stop():
 
 @settings(max_examples=40)
 @given(POSES, POINTS, POSES)
-def test_an_arc_keeps_its_radius_and_passes_its_point(start: Pose, interim: np.ndarray, end: Pose):
+def test_an_arc_keeps_its_radius_and_passes_its_point(start: FramePose, interim: np.ndarray, end: FramePose):
     try:
         arc = arc_through(start, interim, end)
     except PlanRefused as refused:
@@ -105,8 +105,8 @@ def test_an_arc_about_a_centre_is_the_shorter_one(angle: float, centre: np.ndarr
         return
     normal = axis / np.linalg.norm(axis)
     spoke = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    start = Pose(centre + spoke, np.eye(3))
-    end = Pose(centre + pin.exp3(angle * normal) @ spoke * (1.0 + off), np.eye(3))
+    start = FramePose(centre + spoke, np.eye(3))
+    end = FramePose(centre + pin.exp3(angle * normal) @ spoke * (1.0 + off), np.eye(3))
     arc = arc_about(start, centre, end)
     assert arc.angle == pytest.approx(angle, abs=1e-3)
     assert np.linalg.norm(arc.centre - centre) < 2e-4 / math.sin(0.5 * angle)

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Positions = Sequence[float] | Array
 
 
-class Pose(NamedTuple):
+class FramePose(NamedTuple):
     """`position` (3,) [m] and `rotation` (3, 3) in the base frame."""
 
     position: Array
@@ -60,17 +60,17 @@ class Kinematics:
         """The base frame in pinocchio's world."""
         return self._base.copy()
 
-    def tool(self, positions: Positions) -> Pose:
+    def tool(self, positions: Positions) -> FramePose:
         """The tool's pose in the base frame at joint values (n,) [rad] or [m]."""
         pin.forwardKinematics(self._model, self._data, self._configuration.to_pinocchio(positions))
         placement = self._in_base(pin.updateFramePlacement(self._model, self._data, self._tool))
-        return Pose(placement.translation.copy(), placement.rotation.copy())
+        return FramePose(placement.translation.copy(), placement.rotation.copy())
 
     def jacobian(self, positions: Positions) -> Array:
         """(6, n): the tool point's velocity [m/s] above its angular velocity [rad/s], along the base's axes."""
         return self.tool_and_jacobian(positions)[1]
 
-    def tool_and_jacobian(self, positions: Positions) -> tuple[Pose, Array]:
+    def tool_and_jacobian(self, positions: Positions) -> tuple[FramePose, Array]:
         """The tool's pose in the base frame and the Jacobian (6, n) as of `jacobian`, at joint values (n,) [rad] or
         [m]; one computation gives both."""
         q = self._configuration.to_pinocchio(positions)
@@ -81,7 +81,7 @@ class Kinematics:
         if not self._base_is_root:
             turn = self._base.rotation.T
             jacobian = np.vstack((turn @ jacobian[:3], turn @ jacobian[3:]))
-        return Pose(placement.translation.copy(), placement.rotation.copy()), jacobian
+        return FramePose(placement.translation.copy(), placement.rotation.copy()), jacobian
 
     def link_poses(self, positions: Positions) -> dict[str, Transform]:
         """Every link's pose in the base frame at joint values (n,) [rad] or [m]."""

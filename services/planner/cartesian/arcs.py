@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from schemas.planning import PlanCode, Refusal
-from services.arm.kinematics.kinematics import Pose
+from services.arm.kinematics.kinematics import FramePose
 from services.planner.cartesian.tool_path import ArcPiece
 from services.planner.request.refusals import PlanRefused
 
@@ -22,7 +22,7 @@ STRAIGHT = 1e-4  # sine of an angle below which three points are on a line
 FARTHEST = 1e6  # [m] chosen: beyond any cell, and a float still tells a micrometre there
 
 
-def arc_through(start: Pose, interim: Array, end: Pose) -> ArcPiece:
+def arc_through(start: FramePose, interim: Array, end: FramePose) -> ArcPiece:
     """The arc from `start` through `interim` (3,) [m] in the base frame to `end`; raises `PlanRefused`."""
     to_interim, to_end = interim - start.position, end.position - start.position
     _require_way("interim", interim, start.position, end.position)
@@ -36,7 +36,7 @@ def arc_through(start: Pose, interim: Array, end: Pose) -> ArcPiece:
     return _arc(start, end, centre, normal, _angle(start.position - centre, end.position - centre, normal))
 
 
-def arc_about(start: Pose, centre: Array, end: Pose) -> ArcPiece:
+def arc_about(start: FramePose, centre: Array, end: FramePose) -> ArcPiece:
     """The shorter arc from `start` to `end` about `centre` (3,) [m] in the base frame; raises `PlanRefused`."""
     _require_way("center", centre, start.position, end.position)
     first, last = start.position - centre, end.position - centre
@@ -56,7 +56,7 @@ def arc_about(start: Pose, centre: Array, end: Pose) -> ArcPiece:
     return _arc(start, end, centre, normal, _angle(start.position - centre, end.position - centre, normal))
 
 
-def _arc(start: Pose, end: Pose, centre: Array, normal: Array, angle: float) -> ArcPiece:
+def _arc(start: FramePose, end: FramePose, centre: Array, normal: Array, angle: float) -> ArcPiece:
     return ArcPiece(start, centre, normal, angle, pin.log3(end.rotation @ start.rotation.T))
 
 

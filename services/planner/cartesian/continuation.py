@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import Kinematics, Pose
+from services.arm.kinematics.kinematics import FramePose, Kinematics
 from services.arm.model.description import Arm
 from services.planner.cartesian.tool_path import ToolPath
 from services.planner.cartesian.tool_solver import ToolSolver
@@ -138,7 +138,7 @@ class Continuation:
                 )
         return lengths, configurations, None
 
-    def _next(self, pose: Pose, last: Array, guess: Array, jump: float) -> Array | StopReason:
+    def _next(self, pose: FramePose, last: Array, guess: Array, jump: float) -> Array | StopReason:
         found = self.solver.solve(pose, guess)
         if found is None:
             return self._lost(last)

@@ -18,7 +18,7 @@ from schemas.planning import (
     WaypointGoal,
 )
 from services.arm.frames.transforms import IDENTITY, compose
-from services.arm.kinematics.kinematics import Kinematics, Pose
+from services.arm.kinematics.kinematics import FramePose, Kinematics
 from services.arm.model.description import Arm, Joint
 from services.planner.cartesian.arcs import arc_about, arc_through
 from services.planner.cartesian.cartesian_planner import CartesianPath, CartesianPlanner, CartesianTerms
@@ -79,7 +79,9 @@ class ToolMotions:
             poses.append(self._pose(point, start, poses[-1], configuration))
         return polyline(poses, goal.blend if isinstance(goal, WaypointGoal) else 0.0)
 
-    def _arc(self, motion: CircularMotion, goal: Goal, start: Start, begin: Pose, wanted: Start | None) -> ToolPath:
+    def _arc(
+        self, motion: CircularMotion, goal: Goal, start: Start, begin: FramePose, wanted: Start | None
+    ) -> ToolPath:
         if isinstance(goal, WaypointGoal):
             raise malformed(INVALID, "goal", "an arc has one goal, not waypoints", "ask for one arc after the other")
         if bool(motion.interim) == bool(motion.center):
@@ -98,18 +100,18 @@ class ToolMotions:
         x, y, z = values
         return np.array(compose(frame, ((x, y, z), IDENTITY[1]))[0])
 
-    def _pose(self, goal: Goal, start: Start, before: Pose, wanted: Start | None) -> Pose:
+    def _pose(self, goal: Goal, start: Start, before: FramePose, wanted: Start | None) -> FramePose:
         """Where the tool is to be; as it was turned before, where the goal leaves that open."""
         if wanted is not None:
             return self._kinematics.tool(wanted)
         assert isinstance(goal, PoseGoal)
         target = self._target(goal, start)
         if target.rotation is not None:
-            return Pose(target.position, target.rotation)
+            return FramePose(target.position, target.rotation)
         if target.pointing is None:
-            return Pose(target.position, before.rotation)
+            return FramePose(target.position, before.rotation)
         turn = turn_between(before.rotation @ target.pointing.axis, target.pointing.direction)
-        return Pose(target.position, pin.exp3(turn) @ before.rotation)
+        return FramePose(target.position, pin.exp3(turn) @ before.rotation)
 
     def _target(self, goal: PoseGoal, start: Start) -> ToolTarget:
         return target_of(goal, self._goals.frame(goal, start))

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import Pose
+from services.arm.kinematics.kinematics import FramePose
 from services.planner.path.path_curve import NO_LENGTH, blending, cut
 
 Array = NDArray[np.float64]
@@ -34,7 +34,7 @@ class Piece(Protocol):
     def metres(self) -> float:
         """Length [m] of the tool's translation."""
 
-    def at(self, along: float) -> Pose:
+    def at(self, along: float) -> FramePose:
         """Pose of the tool in the base after the length `along` [m] of this piece."""
 
 
@@ -42,7 +42,7 @@ class Piece(Protocol):
 class Straight:
     """From `start` with an even `twist` (6,): metres above radians per unit of length."""
 
-    start: Pose
+    start: FramePose
     twist: Array
     length: float
 
@@ -51,7 +51,7 @@ class Straight:
         """Length [m] of the tool's translation."""
         return self.length * float(np.linalg.norm(self.twist[:3]))
 
-    def at(self, along: float) -> Pose:
+    def at(self, along: float) -> FramePose:
         """Pose of the tool in the base after the length `along` [m] of this piece."""
         return moved(self.start, along * self.twist)
 
@@ -67,7 +67,7 @@ class Corner:
     The twist is at every moment a mean of both, so the path stays in the triangle of its ends and the corner.
     """
 
-    corner: Pose
+    corner: FramePose
     coming: Array
     leaving: Array
     radius: float
@@ -84,7 +84,7 @@ class Corner:
         rows = np.array([self.at(along).position for along in np.linspace(0.0, self.length, CORNER_ROWS)])
         return float(np.linalg.norm(np.diff(rows, axis=0), axis=1).sum())
 
-    def at(self, along: float) -> Pose:
+    def at(self, along: float) -> FramePose:
         """Pose of the tool in the base after the length `along` [m] of this piece."""
         turned = self.length * blending(along / self.length)
         offset = (along - self.radius) * self.coming + turned * (self.leaving - self.coming)
@@ -95,7 +95,7 @@ class Corner:
 class ArcPiece:
     """About `centre` (3,) and the unit `normal` (3,) by `angle` [rad], the tool itself turning by `turn` (3,) [rad]."""
 
-    start: Pose
+    start: FramePose
     centre: Array
     normal: Array
     angle: float
@@ -111,11 +111,11 @@ class ArcPiece:
         """Length of the piece: [m], or the weighted turn if that is longer."""
         return max(self.metres, METRES_PER_RADIAN * float(np.linalg.norm(self.turn)))
 
-    def at(self, along: float) -> Pose:
+    def at(self, along: float) -> FramePose:
         """Pose of the tool in the base after the length `along` [m] of this piece."""
         share = along / self.length
         spoke = pin.exp3(share * self.angle * self.normal) @ (self.start.position - self.centre)
-        return Pose(self.centre + spoke, pin.exp3(share * self.turn) @ self.start.rotation)
+        return FramePose(self.centre + spoke, pin.exp3(share * self.turn) @ self.start.rotation)
 
 
 class ToolPath:
@@ -127,7 +127,7 @@ class ToolPath:
         self.length = self._ends[-1]
         self.metres = sum(piece.metres for piece in pieces)
 
-    def at(self, along: float) -> Pose:
+    def at(self, along: float) -> FramePose:
         """Pose of the tool in the base at `along` [m], a length in [0, length]."""
         index, begin = self._locate(along)
         return self._pieces[index].at(min(along - begin, self._pieces[index].length))
@@ -148,7 +148,7 @@ class ToolPath:
         return index, self._ends[index - 1] if index else 0.0
 
 
-def polyline(poses: Sequence[Pose], blend: float) -> list[ToolPath]:
+def polyline(poses: Sequence[FramePose], blend: float) -> list[ToolPath]:
     """Straight from pose to pose, corners cut within `blend` [m] of them; one path for each part without a stop.
 
     Empty where all poses are one.
@@ -168,14 +168,14 @@ def polyline(poses: Sequence[Pose], blend: float) -> list[ToolPath]:
     return [ToolPath(run) for run in runs]
 
 
-def straight(start: Pose, end: Pose) -> Straight:
+def straight(start: FramePose, end: FramePose) -> Straight:
     """The line between two poses, by the shorter turn."""
     twist = np.concatenate((end.position - start.position, pin.log3(end.rotation @ start.rotation.T)))
     length = max(float(np.linalg.norm(twist[:3])), METRES_PER_RADIAN * float(np.linalg.norm(twist[3:])))
     return Straight(start, twist / length if length > 0.0 else twist, length)
 
 
-def moved(pose: Pose, offset: Array) -> Pose:
+def moved(pose: FramePose, offset: Array) -> FramePose:
     """`pose` after a translation (3,) [m] and a rotation vector (3,) [rad], one above the other in `offset` (6,), both
     along the base's axes."""
-    return Pose(pose.position + offset[:3], pin.exp3(offset[3:]) @ pose.rotation)
+    return FramePose(pose.position + offset[:3], pin.exp3(offset[3:]) @ pose.rotation)

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import Kinematics, Pose
+from services.arm.kinematics.kinematics import FramePose, Kinematics
 from services.planner.cartesian.tool_path import METRES_PER_RADIAN
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ class ToolSolver:
     def __init__(self, kinematics: Kinematics, holds_turn: bool) -> None:
         self._kinematics, self._holds_turn = kinematics, holds_turn
 
-    def solve(self, pose: Pose, guess: Array) -> Array | None:
+    def solve(self, pose: FramePose, guess: Array) -> Array | None:
         """Joint values (n,) [rad] or [m] near `guess` (n,) with the tool at `pose` in the base frame, joint limits
         ignored; None where Newton's method finds none."""
         configuration = guess
@@ -51,7 +51,7 @@ class ToolSolver:
         held = WEIGHTS * jacobian if self._holds_turn else jacobian[:3]
         return float(np.linalg.svd(held, compute_uv=False)[-1])
 
-    def error(self, pose: Pose, configuration: Array) -> float:
+    def error(self, pose: FramePose, configuration: Array) -> float:
         """[m] that the tool at `configuration` (n,) [rad] or [m] is off `pose`; where turns are held, each counts as on
         the path."""
         now = self._kinematics.tool(configuration)
@@ -60,7 +60,7 @@ class ToolSolver:
             return missing
         return max(missing, METRES_PER_RADIAN * _length(pin.log3(pose.rotation @ now.rotation.T)))
 
-    def _newton(self, pose: Pose, configuration: Array) -> tuple[Array, float, float]:
+    def _newton(self, pose: FramePose, configuration: Array) -> tuple[Array, float, float]:
         """The step of the joints, what is missing [m], and what of that a straight arm would still miss after it.
 
         The turn that is not held is followed as far as it may.

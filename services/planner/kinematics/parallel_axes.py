@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import Kinematics, Pose
+from services.arm.kinematics.kinematics import FramePose, Kinematics
 from services.arm.model.description import Arm
 from services.planner.kinematics.closed_form import chain_order
 from services.planner.kinematics.joint_ranges import FullTurns, one_turn
@@ -30,7 +30,7 @@ STRETCHED = 1e-9  # how far a cosine may be beyond 1 by rounding
 class ParallelAxes:
     """All configurations of one arm for a position of the tool; joint values are (3,) in the arm's order."""
 
-    def __init__(self, arm: Arm, pose: Pose, jacobian: Array, order: tuple[int, int, int]) -> None:
+    def __init__(self, arm: Arm, pose: FramePose, jacobian: Array, order: tuple[int, int, int]) -> None:
         """The tool's pose and Jacobian (6, 3) at zero; `order` is of the shoulder, the elbow and the slide."""
         self._turns = FullTurns(arm)
         self._first, self._second, self._slide = order

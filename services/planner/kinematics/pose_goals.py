@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from schemas.message import Vector
 from schemas.planning import PlanCode, PoseGoal
 from services.arm.frames.transforms import IDENTITY, Point, Quaternion, Rigid, compose, inverse, rotate
-from services.arm.kinematics.kinematics import Pose
+from services.arm.kinematics.kinematics import FramePose
 from services.planner.kinematics.targets import AxisPointing, ToolTarget, turn_between
 from services.planner.request.refusals import malformed
 
@@ -42,7 +42,7 @@ def target_of(goal: PoseGoal, frame: Rigid) -> ToolTarget:
     return ToolTarget(position, rotation, None, *tolerances)
 
 
-def as_goal(goal: PoseGoal, pose: Pose, frame: Rigid) -> Vector:
+def as_goal(goal: PoseGoal, pose: FramePose, frame: Rigid) -> Vector:
     """`pose` (in the base) in the form of `goal` and in `frame`: position (3,) [m], then the quaternion x y z w, the
     unit direction (3,), or nothing."""
     back = inverse(frame)
@@ -60,7 +60,7 @@ def as_goal(goal: PoseGoal, pose: Pose, frame: Rigid) -> Vector:
     return (*point, *compose(back, (IDENTITY[0], (turn.x, turn.y, turn.z, turn.w)))[1])
 
 
-def _least_turned(asked: Array, goal: PoseGoal, pose: Pose) -> Array:
+def _least_turned(asked: Array, goal: PoseGoal, pose: FramePose) -> Array:
     """Of the rotations that have the free axis where `pose` has it, the one nearest to what was asked."""
     axis = np.array(_unit(goal.free_axis))
     turned: Array = pin.exp3(turn_between(asked @ axis, pose.rotation @ axis)) @ asked

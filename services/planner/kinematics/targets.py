@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import Kinematics, Pose
+from services.arm.kinematics.kinematics import FramePose, Kinematics
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ class ToolTarget(NamedTuple):
             return turn_between(rotation @ self.pointing.axis, self.pointing.direction)
         return np.zeros(3)
 
-    def misses(self, pose: Pose) -> tuple[float, float]:
+    def misses(self, pose: FramePose) -> tuple[float, float]:
         """[m] and [rad] that `pose` is away."""
         return float(np.linalg.norm(self.position - pose.position)), float(np.linalg.norm(self.turn(pose.rotation)))
 

@@ -73,7 +73,7 @@ class Deadline(NamedTuple):
 NEVER = Deadline()
 
 
-class Phase:
+class TimedPhase:
     """One phase of a plan, as the block of a `with`: no `contextmanager`, which takes longer, a dozen times a plan."""
 
     def __init__(self, watch: Stopwatch, name: str) -> None:
@@ -96,9 +96,9 @@ class Stopwatch:
         self._inner = 0.0
         self.newest = ""  # name of the phase begun last; may be read from another thread
 
-    def phase(self, name: str) -> Phase:
+    def phase(self, name: str) -> TimedPhase:
         """Counts the time of the `with` block for the field `name` of `PlanningTimes`."""
-        return Phase(self, name)
+        return TimedPhase(self, name)
 
     def begin(self) -> tuple[float, float]:
         """The time [s], and what has been counted [s] within the phase around the one that begins."""

@@ -183,7 +183,7 @@ def solved(demand: InputParameter, what: str) -> Trajectory:
     return profile
 
 
-class Phase(NamedTuple):
+class ProfilePhase(NamedTuple):
     """Of steady jerk: how long it lasts [s], and the length, its derivatives and the jerk at its begin."""
 
     duration: float
@@ -193,12 +193,12 @@ class Phase(NamedTuple):
     jerk: float
 
 
-def phases_of(profile: Trajectory) -> list[Phase]:
+def phases_of(profile: Trajectory) -> list[ProfilePhase]:
     """The profile of one variable, from one change of its jerk to the next."""
     found = profile.profiles[0][0]
-    phases: list[Phase] = []
+    phases: list[ProfilePhase] = []
     for row in zip(found.t, found.p, found.v, found.a, found.j, strict=False):
-        phase = Phase(*row)
+        phase = ProfilePhase(*row)
         if phase.duration <= NO_TIME:
             continue
         if phases and phases[-1].jerk == phase.jerk:

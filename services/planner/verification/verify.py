@@ -41,7 +41,7 @@ class Samples:
     jerks: Array
 
 
-class Look(NamedTuple):
+class SampledStates(NamedTuple):
     """`positions` (m, n) of samples, and what they all have `reached`, (5, n): the least and the largest position, and
     the largest size of each derivative."""
 
@@ -49,19 +49,19 @@ class Look(NamedTuple):
     reached: Array
 
 
-def look_in_python(states: States) -> Look:
+def look_in_python(states: States) -> SampledStates:
     """`look`, where the core is not built."""
     samples = sample_between(*states)
     sizes = (np.abs(rows).max(axis=0) for rows in (samples.velocities, samples.accelerations, samples.jerks))
     reached = np.array((samples.positions.min(axis=0), samples.positions.max(axis=0), *sizes))
-    return Look(samples.positions, reached)
+    return SampledStates(samples.positions, reached)
 
 
 @where_built(look_in_python)
-def look(states: States) -> Look:
+def look(states: States) -> SampledStates:
     """At the samples of `sample_between`, in a tenth of the time: most trajectories are within their limits, and then
     nobody asks where they come nearest to them."""
-    return Look(*motion.sampled(*states, _shares(DENSITY)))
+    return SampledStates(*motion.sampled(*states, _shares(DENSITY)))
 
 
 def aside_in_python(line: Array, rows: Array) -> float:
@@ -161,11 +161,11 @@ def is_within_in_python(reached: Array, most: Array) -> bool:
 
 @where_built(is_within_in_python)
 def is_within(reached: Array, most: Array) -> bool:
-    """True if `reached` (5, n), as of `Look`, is within `most` (5, n); what is not a number is not."""
+    """True if `reached` (5, n), as of `SampledStates`, is within `most` (5, n); what is not a number is not."""
     return motion.is_within(reached, most)
 
 
-def require_limits(arm: Arm, states: States, seen: Look, limits: JointLimits, is_jerk_limited: bool) -> None:
+def require_limits(arm: Arm, states: States, seen: SampledStates, limits: JointLimits, is_jerk_limited: bool) -> None:
     """`require_within_limits` and, where it is jerk-limited, `require_jerk` of the trajectory through `states`, at
     which `seen` has looked; raises `BadTrajectory`."""
     if not is_within(seen.reached, _most(arm, limits, is_jerk_limited)):
@@ -177,7 +177,7 @@ def require_limits(arm: Arm, states: States, seen: Look, limits: JointLimits, is
 
 @once_per_arm
 def _most(arm: Arm, limits: JointLimits, is_jerk_limited: bool) -> Array:
-    """(5, n) that each row of `Look.reached` may be, the first at least and the others at most."""
+    """(5, n) that each row of `SampledStates.reached` may be, the first at least and the others at most."""
     lower, upper = _bounds(arm)
     loose = 1.0 + ROUNDING
     jerk = LOOSE_JERK * limits.jerk if is_jerk_limited else np.full(len(lower), np.inf)
