@@ -49,7 +49,7 @@ from schemas.topics import (
     STOPPING_DISTANCE,
 )
 from services.arm.errors import suggestion
-from services.arm.model.description import Arm as Description
+from services.arm.model.description import ArmDescription
 from services.runtime.node import Node
 
 
@@ -102,7 +102,7 @@ class Arm:
         return self.description.name
 
     @property
-    def description(self) -> Description:
+    def description(self) -> ArmDescription:
         """URDF, SRDF and robot.toml as one: joints with their limits, links, named states, inputs, outputs, sensors.
 
         >>> arm.description.joint("brazo_joint").unit

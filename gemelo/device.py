@@ -37,7 +37,7 @@ from schemas.topics import (
     DEVICE_STOP,
 )
 from services.arm.errors import suggestion
-from services.arm.model.description import Arm as Description
+from services.arm.model.description import ArmDescription
 
 TO_ANSWER = 3.0  # [s] for a command
 TO_CONFIGURE = 10.0  # [s]: a board may write it to its flash first
@@ -234,14 +234,14 @@ class Device:
             raise BadArgument(f'"{kind}" needs a target; there is no "{target}"{suggestion(target, known)}')
 
 
-def fault_of(arm: Description, state: DeviceState) -> str:
+def fault_of(arm: ArmDescription, state: DeviceState) -> str:
     """The fault in `state`, what it means, and what to do; empty if there is none."""
     if state.fault == DeviceFault.NONE:
         return ""
     return fault_text(state.fault, joint_name(arm, state.fault_joint))
 
 
-def reference_command(arm: Description, values: Mapping[str, float]) -> ReferenceCommand:
+def reference_command(arm: ArmDescription, values: Mapping[str, float]) -> ReferenceCommand:
     """The command with every joint named: at `values` [rad] or [m], the others at robot.toml's reference position."""
     whole = {**dict(zip(arm.joint_names, arm.reference_position, strict=True)), **values}
     return ReferenceCommand(name=tuple(whole), position=tuple(whole.values()))

@@ -14,8 +14,7 @@ from schemas.device_faults import fault_text
 from schemas.robot import HomingDirection
 from schemas.topics import DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
 from services.arm.errors import suggestion
-from services.arm.model.description import Arm as Description
-from services.arm.model.description import Joint
+from services.arm.model.description import ArmDescription, Joint
 
 TO_BEGIN = 3.0  # [s] from the device's yes to its first word of homing
 LAST_WORDS = 0.5  # [s] for events that come after the state
@@ -32,7 +31,7 @@ OnHoming = Callable[[HomingProgress], object]
 class HomingWait:
     """The homing of some joints: takes events and states from before the command on. Pure."""
 
-    def __init__(self, arm: Description, joints: Sequence[Joint]) -> None:
+    def __init__(self, arm: ArmDescription, joints: Sequence[Joint]) -> None:
         self.joints = tuple(joints)
         self.has_begun = False
         self.reason = ""  # why it ended before its end
@@ -117,7 +116,7 @@ def home(
         session.changed()
 
 
-def homing_joints(arm: Description, names: Iterable[str]) -> list[Joint]:
+def homing_joints(arm: ArmDescription, names: Iterable[str]) -> list[Joint]:
     """The joints to home: those named, or all that have a switch; raises `BadArgument` or `Refused`."""
     asked = []
     for name in names:
@@ -139,7 +138,7 @@ def homing_joints(arm: Description, names: Iterable[str]) -> list[Joint]:
     return found
 
 
-def joint_name(arm: Description, name: str) -> str:
+def joint_name(arm: ArmDescription, name: str) -> str:
     """The joint's name for what the device calls it; any other text is left as it is."""
     return next((joint.name for joint in arm.joints if name in (joint.name, joint.wire_name)), name)
 

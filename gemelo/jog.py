@@ -16,7 +16,7 @@ from schemas.device import DeviceEvent
 from schemas.joints import JointTargets
 from schemas.planning import JogCommand, JogStatus
 from schemas.topics import DEVICE_EVENTS, JOG, JOG_STATUS, JOINT_STATES, JOINT_TARGETS
-from services.arm.model.description import Arm as Description
+from services.arm.model.description import ArmDescription
 
 PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
 ANSWER = 3.0  # [s] of jogging without a word of the planner, after which it counts as lost
@@ -148,7 +148,7 @@ def _refused(status: JogStatus) -> Refused:
     return Refused(f"refused: {status.limited_by}", check=status.check or "jog", reason=status.limited_by)
 
 
-def jog_command(arm: Description, joints: Joints | None, twist: Vector | None, frame: str) -> JogCommand:
+def jog_command(arm: ArmDescription, joints: Joints | None, twist: Vector | None, frame: str) -> JogCommand:
     """The command; raises `BadArgument` for what cannot be meant.
 
     `joints`: speeds [rad/s] or [m/s]; `twist`: (3,) [m/s] or (6,) [m/s] and [rad/s], along the axes of `frame`.
@@ -181,7 +181,7 @@ def _require_speed(owner: str, value: float, unit: str, most: float) -> None:
         raise BadArgument(f"{owner}: {value:g} {unit}/s is far beyond {most:.3g} {unit}/s: {hint}")
 
 
-def _require_within(arm: Description, values: dict[str, float]) -> None:
+def _require_within(arm: ArmDescription, values: dict[str, float]) -> None:
     for name, value in values.items():
         joint = arm.joint(name)
         if not joint.is_within(value):

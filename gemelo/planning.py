@@ -37,7 +37,7 @@ from schemas.planning import (
 )
 from schemas.scene import Contact
 from schemas.topics import FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS, STATE_VALIDITY
-from services.arm.model.description import Arm as Description
+from services.arm.model.description import ArmDescription
 from services.runtime.requests.client import PendingCall
 
 MARGIN = 2.0  # [s] that a planner may take beyond its allowed time before it counts as gone
@@ -222,7 +222,7 @@ def require_valid(session: Session, joints: Joints) -> None:
 
 
 def refused(
-    arm: Description,
+    arm: ArmDescription,
     refusal: Refusal,
     request: PlanRequest,
     target: Target,
@@ -255,7 +255,7 @@ def words_of(target: Mapping[str, object]) -> str:
     return ", ".join(f"{name}={_short(value)}" for name, value in target.items())
 
 
-def _nearest(arm: Description, refusal: Refusal, request: PlanRequest, target: Target) -> Target:
+def _nearest(arm: ArmDescription, refusal: Refusal, request: PlanRequest, target: Target) -> Target:
     """The nearest goal that can, in the form of the target; empty where there is none."""
     values, goal = refusal.nearest, request.goal
     sizes = (3, 6, 7) if isinstance(goal, PoseGoal) else (len(arm.joints), len(getattr(goal, "name", ())))
@@ -275,7 +275,7 @@ NOT_THE_GOAL = ("start state",)  # checks whose nearest value is of something el
 GOALS = ("named", "joints", "position", "orientation", "rpy", "pose", "offset", "along")
 
 
-def _by_joint(arm: Description, values: tuple[float, ...]) -> dict[str, float]:
+def _by_joint(arm: ArmDescription, values: tuple[float, ...]) -> dict[str, float]:
     return dict(zip(arm.joint_names, values, strict=True)) if values else {}
 
 

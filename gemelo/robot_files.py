@@ -12,7 +12,7 @@ from gemelo.errors import BadArgument, Error, Lost
 from schemas.deployment import Deployment
 from services.arm.errors import suggestion
 from services.arm.model import description as descriptions
-from services.arm.model.description import Arm as Description
+from services.arm.model.description import ArmDescription
 from services.runtime.deployment import deployment_of_arm, load_deployment, project_root, when_silent
 
 LOOK_TIMEOUT = 1.0  # [s] of one look for the router
@@ -26,7 +26,7 @@ class Robot(NamedTuple):
     """
 
     deployment: Deployment  # router, broker, folders
-    description: Description  # URDF, SRDF and robot.toml as one
+    description: ArmDescription  # URDF, SRDF and robot.toml as one
 
 
 def load_robot(robot: str = "", *, deployment: str | Path | None = None) -> Robot:

@@ -16,7 +16,7 @@ from gemelo.errors import Error, Lost, Refused
 from schemas.deployment import Deployment
 from schemas.message import Message
 from schemas.topics import Request, Topic
-from services.arm.model.description import Arm as Description
+from services.arm.model.description import ArmDescription
 from services.runtime import errors as runtime
 from services.runtime.node import Node
 from services.runtime.node_clock import NodeClock
@@ -37,7 +37,7 @@ _numbers = count(1)
 class Session:
     """The node, its thread, and the newest message of every topic that was asked for. Any thread may use it."""
 
-    def __init__(self, deployment: Deployment, description: Description, node: Node) -> None:
+    def __init__(self, deployment: Deployment, description: ArmDescription, node: Node) -> None:
         """Takes over a `node` that does not spin yet, and closes it in the end."""
         self.deployment, self.description, self._node = deployment, description, node
         self.news = threading.Condition()  # notified after every message that was handled

@@ -34,7 +34,7 @@ from schemas.planning import (
 from schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
 from services.arm.errors import suggestion
 from services.arm.frames.transforms import from_rpy
-from services.arm.model.description import Arm as Description
+from services.arm.model.description import ArmDescription
 
 LookUp = Callable[[str, str], Pose]  # (target, source): where the frame `source` is in `target` now
 
@@ -49,7 +49,7 @@ def as_target(goal: ToolGoal) -> Target:
     return cast(Target, dict(goal))
 
 
-def request_of(arm: Description, target: Target, look_up: LookUp) -> PlanRequest:
+def request_of(arm: ArmDescription, target: Target, look_up: LookUp) -> PlanRequest:
     """The planner's request; raises `BadArgument` for what cannot be meant."""
     _require_known(target, Target)
     speed = _share("speed", target.get("speed", 1.0))
@@ -67,7 +67,7 @@ def request_of(arm: Description, target: Target, look_up: LookUp) -> PlanRequest
 
 
 def ik_request(
-    arm: Description, target: ToolGoal, look_up: LookUp, near: Joints | None, solutions: int, touching: bool
+    arm: ArmDescription, target: ToolGoal, look_up: LookUp, near: Joints | None, solutions: int, touching: bool
 ) -> IkRequest:
     """The planner's request for configurations; raises `BadArgument`."""
     _require_known(target, ToolGoal)
@@ -81,7 +81,7 @@ def ik_request(
     )
 
 
-def goal_of(arm: Description, target: Target, look_up: LookUp) -> PoseGoal | JointGoal | NamedGoal:
+def goal_of(arm: ArmDescription, target: Target, look_up: LookUp) -> PoseGoal | JointGoal | NamedGoal:
     """The one goal among the arguments."""
     given = [name for name in ("named", "joints", "position", "pose", "offset") if name in target]
     if len(given) != 1:
@@ -97,14 +97,14 @@ def goal_of(arm: Description, target: Target, look_up: LookUp) -> PoseGoal | Joi
     return _pose_goal(arm, target, look_up)
 
 
-def named_goal(arm: Description, name: str) -> NamedGoal:
+def named_goal(arm: ArmDescription, name: str) -> NamedGoal:
     """A named state of the SRDF; raises `BadArgument` with the nearest name."""
     if name not in arm.state_names:
         raise BadArgument(f'no named state "{name}"{suggestion(name, arm.state_names)}')
     return NamedGoal(name=name)
 
 
-def joint_state(arm: Description, joints: Joints, owner: str) -> JointState:
+def joint_state(arm: ArmDescription, joints: Joints, owner: str) -> JointState:
     """Joint values [rad] or [m] by the names of the arm; raises `BadArgument`."""
     values = named_joints(arm, joints, owner)
     for name, value in values.items():
@@ -112,7 +112,7 @@ def joint_state(arm: Description, joints: Joints, owner: str) -> JointState:
     return JointState(name=tuple(values), position=tuple(values.values()))
 
 
-def named_joints(arm: Description, joints: Joints, owner: str) -> dict[str, float]:
+def named_joints(arm: ArmDescription, joints: Joints, owner: str) -> dict[str, float]:
     """Finite numbers [rad] or [m] by the names of the arm's joints; raises `BadArgument`."""
     if not isinstance(joints, Mapping):
         values = vector(owner, joints, len(arm.joints), "one for every joint")
@@ -176,7 +176,7 @@ def turned(owner: str, values: Iterable[float]) -> tuple[float, float, float, fl
     return from_rpy(*angles)
 
 
-def _pose_goal(arm: Description, target: Target, look_up: LookUp) -> PoseGoal:
+def _pose_goal(arm: ArmDescription, target: Target, look_up: LookUp) -> PoseGoal:
     turns = [name for name in ("orientation", "rpy", "pose", "along") if name in target]
     if len(turns) > 1:
         raise BadArgument(f"say how the tool is turned once, not by {' and '.join(turns)}")
@@ -211,7 +211,7 @@ def _axes(target: Target) -> dict[str, tuple[float, ...]]:
     return axes
 
 
-def _offset_goal(arm: Description, target: Target, look_up: LookUp) -> PoseGoal:
+def _offset_goal(arm: ArmDescription, target: Target, look_up: LookUp) -> PoseGoal:
     """From where the tool is now. An arm of less than six joints keeps the direction of its tool's z axis alone."""
     now = look_up(arm.base_frame, arm.tool_frame)
     frame = _link(arm, target.get("frame", ""))
@@ -230,7 +230,7 @@ def _offset_goal(arm: Description, target: Target, look_up: LookUp) -> PoseGoal:
     return _pose_goal(arm, goal, look_up)
 
 
-def _by_way_of(goal: PoseGoal | JointGoal | NamedGoal, arm: Description, target: Target) -> Goal:
+def _by_way_of(goal: PoseGoal | JointGoal | NamedGoal, arm: ArmDescription, target: Target) -> Goal:
     """By the points of via=; positions among them are turned as the goal is."""
     if "via" not in target:
         _refuse_with(target, "a goal without via=", ("blend",))
@@ -242,7 +242,7 @@ def _by_way_of(goal: PoseGoal | JointGoal | NamedGoal, arm: Description, target:
     return WaypointGoal(points=(*points, goal), blend=_positive("blend", blend, "m", LARGEST) if blend else 0.0)
 
 
-def _waypoint(given: Waypoint, arm: Description, like: PoseGoal) -> PoseGoal | JointGoal | NamedGoal:
+def _waypoint(given: Waypoint, arm: ArmDescription, like: PoseGoal) -> PoseGoal | JointGoal | NamedGoal:
     if isinstance(given, str):
         return named_goal(arm, given)
     if isinstance(given, Mapping):
@@ -310,7 +310,7 @@ def _refuse_with(target: Target, what: str, names: Iterable[str]) -> None:
             raise BadArgument(f"{name}= does not go with {what}")
 
 
-def _link(arm: Description, name: str) -> str:
+def _link(arm: ArmDescription, name: str) -> str:
     if name and name not in arm.model.link_names:
         raise BadArgument(f'{arm.name} has no link "{name}"{suggestion(name, arm.model.link_names)}')
     return name
@@ -345,7 +345,7 @@ def _positive(name: str, value: float, unit: str, most: float) -> float:
     return found
 
 
-def _require_unit(arm: Description, name: str, value: float) -> None:
+def _require_unit(arm: ArmDescription, name: str, value: float) -> None:
     """Refuses what is out of the limits as it stands, and within them in degrees or millimetres."""
     joint = arm.joint(name)
     factor, unit, helper = (

@@ -13,8 +13,7 @@ from schemas.device_config import InputRole
 from schemas.ledger import VerifiedBy
 from schemas.robot import HomingDirection
 from services.arm.errors import suggestion
-from services.arm.model.description import Arm as Description
-from services.arm.model.description import Joint
+from services.arm.model.description import ArmDescription, Joint
 
 if TYPE_CHECKING:
     from gemelo.arm import Arm
@@ -70,7 +69,7 @@ def verify(arm: Arm, names: Iterable[str], run: Callable[[Plan], object], tell: 
     )
 
 
-def trip_of(arm: Description, names: Iterable[str], referenced: Sequence[bool], at: Mapping[str, float]) -> Trip:
+def trip_of(arm: ArmDescription, names: Iterable[str], referenced: Sequence[bool], at: Mapping[str, float]) -> Trip:
     """How each joint can be verified from `at` [rad] or [m]; raises `BadArgument`, or `Refused` where none can."""
     trip, known = Trip(), dict(zip(arm.joint_names, referenced, strict=False))
     for name in tuple(names) or arm.joint_names:
@@ -94,7 +93,7 @@ def trip_of(arm: Description, names: Iterable[str], referenced: Sequence[bool], 
     return trip
 
 
-def is_passable(arm: Description, joint: Joint) -> bool:
+def is_passable(arm: ArmDescription, joint: Joint) -> bool:
     """True if a motion may close the joint's switch: one that is no limit switch, within the joint's limits."""
     homing = joint.drive.homing
     if homing is None:

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 
 # A run in the background begins with Ctrl-C ignored, and every process that a test starts would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -34,7 +34,7 @@ def rm1_folder() -> Path:
 
 
 @pytest.fixture(scope="session")
-def rm1(rm1_folder: Path) -> Arm:
+def rm1(rm1_folder: Path) -> ArmDescription:
     return load_arm(rm1_folder)
 
 

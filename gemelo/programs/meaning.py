@@ -16,27 +16,27 @@ from gemelo.programs.steps import AnyStep, Attach, Call, Grip, MotionStep, Outpu
 from gemelo.programs.values import DEEPEST, Wrong, in_words_of_a_file
 from gemelo.targets import joint_state
 from services.arm.errors import suggestion
-from services.arm.model.description import Arm as Description
+from services.arm.model.description import ArmDescription
 
 PointsByName = Mapping[str, Point]
 ProgramsByName = Mapping[str, Program]
 
 
 def find_mistakes(
-    program: Program, robot: Description, points: PointsByName, programs: ProgramsByName
+    program: Program, robot: ArmDescription, points: PointsByName, programs: ProgramsByName
 ) -> tuple[Mistake, ...]:
     """All mistakes of a program and of those that it calls, in the order of each file; empty if it can be planned."""
     return tuple(_Search(robot, points, programs).of(program, (program.name,)))
 
 
-def require_right(program: Program, robot: Description, points: PointsByName, programs: ProgramsByName) -> None:
+def require_right(program: Program, robot: ArmDescription, points: PointsByName, programs: ProgramsByName) -> None:
     """Raises `ProgramError` with all mistakes, if there are any."""
     if found := find_mistakes(program, robot, points, programs):
         raise ProgramError(found)
 
 
 def find_mistakes_in_file(
-    path: Path, robot: Description, points: PointsByName, programs: ProgramsByName
+    path: Path, robot: ArmDescription, points: PointsByName, programs: ProgramsByName
 ) -> tuple[Mistake, ...]:
     """The same for a file, those of its form included: whatever can be seen at once."""
     try:
@@ -50,7 +50,7 @@ def find_mistakes_in_file(
 
 
 class _Search:
-    def __init__(self, robot: Description, points: PointsByName, programs: ProgramsByName) -> None:
+    def __init__(self, robot: ArmDescription, points: PointsByName, programs: ProgramsByName) -> None:
         self._robot, self._points, self._programs = robot, points, programs
         self._seen: set[str] = set()
 
@@ -144,7 +144,7 @@ class _Search:
         return self.of(called, (*callers, step.program))
 
 
-def _unknown(key: str, kind: str, name: str, known: object, robot: Description) -> Iterator[Wrong]:
+def _unknown(key: str, kind: str, name: str, known: object, robot: ArmDescription) -> Iterator[Wrong]:
     assert isinstance(known, list | tuple)
     if name not in known:
         yield key, f'{robot.name} has no {kind} "{name}"{suggestion(name, known)}'

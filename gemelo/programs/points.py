@@ -19,7 +19,7 @@ from gemelo.programs.toml_text import key_text, value_text
 from gemelo.targets import Joints, named_joints
 from gemelo.whole_files import write_whole
 from services.arm.errors import suggestion
-from services.arm.model.description import Arm as Description
+from services.arm.model.description import ArmDescription
 
 LARGEST_PICTURE = 10_000_000  # [bytes]
 KINDS = {b"\x89PNG\r\n\x1a\n": "png", b"\xff\xd8\xff": "jpg"}  # of pictures, by how they begin
@@ -45,14 +45,14 @@ class Points(Mapping[str, Point]):
     (['above the box'], True)
     """
 
-    def __init__(self, folder: Path, robot: Description) -> None:
+    def __init__(self, folder: Path, robot: ArmDescription) -> None:
         self.file = folder / f"{robot.name}.points.toml"
         self._robot = robot
         self._lock = threading.RLock()
         self._points: dict[str, Point] = {}
 
     @classmethod
-    def load(cls, folder: str | Path, robot: Description) -> Points:
+    def load(cls, folder: str | Path, robot: ArmDescription) -> Points:
         """Those of `<folder>/<robot>.points.toml`, none if there is no file; raises `ProgramError`.
 
         >>> from gemelo.programs import Points
@@ -138,7 +138,7 @@ class Points(Mapping[str, Point]):
                 picture.unlink(missing_ok=True)
 
 
-def _whole(robot: Description, name: str, joints: Joints) -> dict[str, float]:
+def _whole(robot: ArmDescription, name: str, joints: Joints) -> dict[str, float]:
     """Values of all joints, in their order, each within its limits; raises `BadArgument`."""
     values = named_joints(robot, joints, f'point "{name}"')
     missing = [joint for joint in robot.joint_names if joint not in values]
@@ -162,7 +162,7 @@ def _text(robot: str, points: Mapping[str, Point]) -> str:
     return "\n".join([*parts, ""])
 
 
-def _read(file: Path, robot: Description) -> dict[str, Point]:
+def _read(file: Path, robot: ArmDescription) -> dict[str, Point]:
     text = read_text(file)
     data = load_toml(text, str(file))
     lines = toml_lines(text)
@@ -193,7 +193,7 @@ def _read(file: Path, robot: Description) -> dict[str, Point]:
     return found
 
 
-def _point(name: str, given: object, robot: Description, file: Path, say: object) -> Point:
+def _point(name: str, given: object, robot: ArmDescription, file: Path, say: object) -> Point:
     assert callable(say)
     point_name(name)
     if not isinstance(given, dict) or not isinstance(given.get("joints"), dict):

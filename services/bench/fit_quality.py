@@ -22,7 +22,7 @@ from schemas.joints import JointState
 from schemas.planning import JointGoal, PlanRequest
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.arm.model.urdf_edit import with_collisions
 from services.bench.figures import Figure, FigureGoal, of_samples
 from services.collision_fitting.fit_writing import write_fits
@@ -69,7 +69,7 @@ def bracket(index: int) -> trimesh.Trimesh:
     return whole
 
 
-def imported(folder: Path, link: Callable[[int], trimesh.Trimesh]) -> Arm:
+def imported(folder: Path, link: Callable[[int], trimesh.Trimesh]) -> ArmDescription:
     """The robot that `gemelo import` makes of an arm with such links."""
     source = export(folder / "six_description", link)
     words = ("import", str(source), "--yes", "--output", str(folder))
@@ -88,7 +88,7 @@ def compared(name: str, fits: Fits) -> dict[str, float]:
     return found
 
 
-def plans_solved(name: str, arm: Arm, fits: Fits) -> dict[str, float]:
+def plans_solved(name: str, arm: ArmDescription, fits: Fits) -> dict[str, float]:
     """[%] of problems between boxes solved, with the arm of one shape for each link and with the bounded one."""
     solids = with_meshes(arm)
     scene = crowded()
@@ -100,21 +100,21 @@ def plans_solved(name: str, arm: Arm, fits: Fits) -> dict[str, float]:
     return found
 
 
-def solved(arm: Arm, scene: PlanningScene, problems: list[PlanRequest]) -> int:
+def solved(arm: ArmDescription, scene: PlanningScene, problems: list[PlanRequest]) -> int:
     """How many are planned."""
     planner = Planner(arm)
     planner.set_world(World(arm, planner.kinematics, scene))
     return sum(planner.plan(problem, None).refusal is None for problem in problems)
 
 
-def copied(arm: Arm, name: str) -> Arm:
+def copied(arm: ArmDescription, name: str) -> ArmDescription:
     """The same robot in a folder of its own."""
     folder = arm.folder.parent / name
     shutil.copytree(arm.folder, folder)
     return load_arm(folder)
 
 
-def with_meshes(arm: Arm) -> Arm:
+def with_meshes(arm: ArmDescription) -> ArmDescription:
     """The same robot with its meshes as they are as collision shapes: what is true."""
     copy = copied(arm, "meshes")
     blocks = {
@@ -139,7 +139,7 @@ def crowded() -> PlanningScene:
     return PlanningScene(version=1, objects=tuple(boxes))
 
 
-def requests(arm: Arm, scene: PlanningScene) -> list[PlanRequest]:
+def requests(arm: ArmDescription, scene: PlanningScene) -> list[PlanRequest]:
     """Between configurations that stand near something: at most three times `CLEAR`."""
     world, generator = World(arm, Kinematics(arm), scene), random.Random(SEED)
     found: list[tuple[float, ...]] = []

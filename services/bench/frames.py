@@ -15,7 +15,7 @@ from schemas.topics import DEVICE_STATE, FRAMES
 from services.arm.frames.frame_buffer import FrameBuffer
 from services.arm.frames.transforms import to_message
 from services.arm.kinematics.chain import joint_transform
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from services.bench.scenes import rm1
 from services.bench.stack import Running, Stacks
@@ -46,7 +46,7 @@ def frame_lookup_us() -> Figure:
     return of_samples(samples, LOOKUP_GOAL, reference, note)
 
 
-def filled_buffer(arm: Arm) -> FrameBuffer:
+def filled_buffer(arm: ArmDescription) -> FrameBuffer:
     """A buffer of all joints of `arm` on sines, `RATE` [Hz] over `SPAN` [s]."""
     buffer = FrameBuffer()
     for joint in arm.model.joints:
@@ -60,7 +60,7 @@ def filled_buffer(arm: Arm) -> FrameBuffer:
     return buffer
 
 
-def yourdfpy_us(arm: Arm) -> float:
+def yourdfpy_us(arm: ArmDescription) -> float:
     """Median time [us] of yourdfpy's forward kinematics to the tool; raises NotMeasured if it is not installed."""
     try:
         import yourdfpy  # slow to load

@@ -25,7 +25,7 @@ from schemas.topics import (
     PLAN,
 )
 from services.arm.interpolation import TrajectorySampler
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
 from services.bench.stack import Running, Stacks
 
@@ -177,7 +177,7 @@ def move_accept_to_first_step_ms(stacks: Stacks) -> Figure:
     return of_samples(sharp, START_GOAL, reference=reference, note=note)
 
 
-def sharp_start(arm: Arm, here: Vector, direction: float, ramp: float = RAMP) -> JointTrajectory:
+def sharp_start(arm: ArmDescription, here: Vector, direction: float, ramp: float = RAMP) -> JointTrajectory:
     """The first joint from `here` [rad] or [m] with constant acceleration and deceleration of `ramp` [s] each."""
     joint = arm.joints[0]
     acceleration = SHARE * joint.acceleration * direction
@@ -209,7 +209,7 @@ def follow(running: Running, trajectory: JointTrajectory) -> int:
     return handle.accepted
 
 
-def first_step_due(arm: Arm, trajectory: JointTrajectory) -> float:
+def first_step_due(arm: ArmDescription, trajectory: JointTrajectory) -> float:
     """Time [s] from the start until some joint's path, rounded to whole steps, leaves the steps it started on."""
     sampler = TrajectorySampler(trajectory)
     scales = [arm.joint(name).steps for name in trajectory.joint_names]

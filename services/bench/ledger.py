@@ -20,7 +20,7 @@ from msgspec.structs import replace
 
 from schemas.robot import Motor
 from schemas.topics import STEP_LEDGER
-from services.arm.model.description import Arm, Joint
+from services.arm.model.description import ArmDescription, Joint
 from services.bench.figures import Figure, rounded
 from services.bench.scenes import rm1
 from services.bench.stopping import random_place, smooth_move
@@ -96,7 +96,7 @@ def _row(name: str, seen: Sequence[StateAfterMove]) -> tuple[str, ...]:
     return name, str(len(seen)), str(kept), f"{100.0 * kept / len(seen):.2f} %", f"{mean:.3f}"
 
 
-def _arm(rng: random.Random) -> Arm:
+def _arm(rng: random.Random) -> ArmDescription:
     """rm1 with limits that ask more of its motors, differently for each joint."""
     joints = tuple(_quicker(joint, rng) for joint in rm1().joints)
     return dataclasses.replace(rm1(), joints=joints)
@@ -120,7 +120,9 @@ def _weakened(joint: Joint, share: float) -> Motor:
     return replace(joint.drive.motor, pull_out=weak)
 
 
-def _verified(arm: Arm, motors: Sequence[Motor], before: VirtualArm | None, rng: random.Random) -> VirtualArm:
+def _verified(
+    arm: ArmDescription, motors: Sequence[Motor], before: VirtualArm | None, rng: random.Random
+) -> VirtualArm:
     """The arm with counters that agree with its shafts, and a ledger that has been told what a homing found."""
     off: list[int] | None = None
     start = tuple(random_place(joint, rng, REACH) for joint in arm.joints)

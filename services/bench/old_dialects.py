@@ -28,7 +28,7 @@ from firmware.platform.host.sketch import AustinStepper, HostSketch
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from schemas.robot import Dialect
 from services.arm.device.device_config import device_config
-from services.arm.model.description import Arm, heard_by_the_board
+from services.arm.model.description import ArmDescription, heard_by_the_board
 from services.arm.motors.relative_moves import ramp_of
 from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
 from services.bench.scenes import rm1
@@ -80,7 +80,7 @@ def text_link_ms() -> Figure:
     return of_samples(trips, FigureGoal(median=10.0), {"published": PUBLISHED}, note)
 
 
-def round_trips(arm: Arm, path: str) -> list[float]:
+def round_trips(arm: ArmDescription, path: str) -> list[float]:
     """[ms] of every line that was answered."""
     exchange, reader, trips = TextExchange(), AnswerReader(), list[float]()
     target = [0.0] * len(arm.joints)
@@ -103,7 +103,7 @@ def round_trips(arm: Arm, path: str) -> list[float]:
 class PacedBoard:
     """The firmware's core at the other end of a pseudo-terminal, as slow as its baud rate."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: ArmDescription) -> None:
         self._end, self._other = os.openpty()
         tty.setraw(self._other)
         self.path = os.ttyname(self._other)
@@ -158,7 +158,7 @@ def seed_move_percent() -> Figure:
     )
 
 
-def our_share(arm: Arm, name: str) -> float:
+def our_share(arm: ArmDescription, name: str) -> float:
     """Share [%] of the turn, to the nearest step, that the shaft makes through gateway and firmware."""
     index = arm.joint_names.index(name)
     world = VirtualArm(tcp_wire(), arm=arm, motors=[joint.drive.motor for joint in arm.joints])
@@ -171,7 +171,7 @@ def our_share(arm: Arm, name: str) -> float:
     return 100.0 * world.device.shaft[index] / round(arm.joints[index].steps.to_steps(TURN))
 
 
-def seed_share(arm: Arm, name: str) -> float:
+def seed_share(arm: ArmDescription, name: str) -> float:
     """Share [%] of the turn that the shaft makes when each message discards the rest of the last one."""
     joint = arm.joint(name)
     asked = joint.steps.to_steps(TURN)
@@ -184,7 +184,7 @@ def seed_share(arm: Arm, name: str) -> float:
     return 100.0 * motor.shaft / asked
 
 
-def turn(arm: Arm, index: int) -> JointTrajectory:
+def turn(arm: ArmDescription, index: int) -> JointTrajectory:
     """The joint `index` from rest to rest on a quintic, the others at rest."""
     points = []
     for number in range(round(DURATION / 0.05) + 1):

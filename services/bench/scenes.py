@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from schemas.frames import Transform
 from schemas.message import Vector
 from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.runtime.deployment import project_root
 
 Array = NDArray[np.float64]
@@ -19,17 +19,17 @@ BARS = 10  # of the cage
 SEED = 3  # of the random configurations
 
 
-def rm1() -> Arm:
+def rm1() -> ArmDescription:
     """The arm of `urdf/rm1`: three joints."""
     return load_arm(project_root() / "urdf/rm1")
 
 
-def parol6() -> Arm:
+def parol6() -> ArmDescription:
     """The arm of `urdf/parol6`: six joints."""
     return load_arm(project_root() / "urdf/parol6")
 
 
-def random_configurations(arm: Arm, count: int) -> Array:
+def random_configurations(arm: ArmDescription, count: int) -> Array:
     """(count, n) joint values [rad] or [m] within the limits, one turn if unlimited; the same ones in every run."""
     lower = [joint.lower if math.isfinite(joint.lower) else -math.pi for joint in arm.joints]
     upper = [joint.upper if math.isfinite(joint.upper) else math.pi for joint in arm.joints]

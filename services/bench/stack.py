@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import psutil
 
 from schemas.deployment import Deployment
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.node import Node
@@ -35,7 +35,7 @@ class Running:
 
     stack: Stack
     deployment: Deployment
-    arm: Arm
+    arm: ArmDescription
     node: Node
 
 

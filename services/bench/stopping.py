@@ -21,7 +21,7 @@ from schemas.message import Vector
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.topics import STOPPING_DISTANCE
 from services.arm.kinematics.tool_jacobian import ToolJacobian
-from services.arm.model.description import Arm, Joint
+from services.arm.model.description import ArmDescription, Joint
 from services.bench.figures import Figure, NotMeasured, quantile, rounded
 from services.bench.scenes import rm1
 from services.virtual_arm.gateway_driver import asked
@@ -102,7 +102,7 @@ def _set_off(rig: VirtualArm, rng: random.Random) -> float:
     return trajectory.points[-1].time_from_start
 
 
-def smooth_move(arm: Arm, start: Vector, end: Vector, slower: float) -> JointTrajectory:
+def smooth_move(arm: ArmDescription, start: Vector, end: Vector, slower: float) -> JointTrajectory:
     """From rest to rest (n,) along a quintic in time, `slower` times, dimensionless, as long as the limits allow."""
     duration = 0.2
     for joint, a, b in zip(arm.joints, start, end, strict=True):
@@ -133,7 +133,7 @@ def random_place(joint: Joint, rng: random.Random, share: float = 0.9) -> float:
     return joint.lower + (joint.upper - joint.lower) * (0.5 + share * rng.uniform(-0.5, 0.5))
 
 
-def _place(arm: Arm, rng: random.Random) -> Vector:
+def _place(arm: ArmDescription, rng: random.Random) -> Vector:
     return tuple(random_place(joint, rng) for joint in arm.joints)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from schemas.device import CommandAck, CommandChunk, DeviceMode
 from schemas.message import Message
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from services.bench.scenes import rm1
 from services.stepper_gateway.device.clock import ClockSync
@@ -72,7 +72,7 @@ def lost_of_45000_at_25hz() -> Figure:
     )  # fmt: skip
 
 
-def swinging(arm: Arm, seconds: float) -> JointTrajectory:
+def swinging(arm: ArmDescription, seconds: float) -> JointTrajectory:
     """All joints from zero to twice their amplitudes and back to zero, again and again for `seconds` [s], at rest at
     both ends; points with velocities."""
     amplitudes = [amplitude_of(arm, index) for index in range(len(arm.joints))]
@@ -90,7 +90,7 @@ def swinging(arm: Arm, seconds: float) -> JointTrajectory:
     return JointTrajectory(joint_names=arm.joint_names, points=tuple(points))
 
 
-def amplitude_of(arm: Arm, index: int) -> float:
+def amplitude_of(arm: ArmDescription, index: int) -> float:
     """Amplitude [rad] or [m] at half of the joint's limits."""
     joint, rate = arm.joints[index], math.tau / SWING
     fastest = SPEED_SHARE * min(joint.velocity / rate, joint.acceleration / rate**2)

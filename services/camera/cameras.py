@@ -18,7 +18,7 @@ from schemas.topics import (
 )
 from services.arm.cell.camera_model import believed_info, exact_info
 from services.arm.cell.cell_file import Cell
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.camera.core import CameraCore
 from services.camera.reader import ImageReader
 from services.camera.sources.source import CameraSource, EncodedImage
@@ -35,7 +35,7 @@ REOPEN = 3_000_000_000  # [ns] between two attempts to wake a camera that gives 
 class Cameras:
     """Every camera of the cell, from the first image to the last."""
 
-    def __init__(self, node: Node, arm: Arm, cell: Cell) -> None:
+    def __init__(self, node: Node, arm: ArmDescription, cell: Cell) -> None:
         """Starts a thread for each camera; raises `DescriptionError` where the arm cannot be drawn."""
         cv2.setNumThreads(1)
         self._world = _watched_world(node, arm, cell)
@@ -61,7 +61,9 @@ class Cameras:
 class _Camera:
     """One camera between its thread and the bus."""
 
-    def __init__(self, node: Node, arm: Arm, cell: Cell, record: CameraRecord, world: CameraWorld | None) -> None:
+    def __init__(
+        self, node: Node, arm: ArmDescription, cell: Cell, record: CameraRecord, world: CameraWorld | None
+    ) -> None:
         self._node, self._record, self._cell = node, record, cell
         self._exact, self._world = exact_info(record, arm.base_frame), world
         self._image = node.publisher(camera_image(record.name))
@@ -122,7 +124,7 @@ class _Camera:
                 return VirtualCamera(record, record.source, self._exact, self._world.snapshot)
 
 
-def _watched_world(node: Node, arm: Arm, cell: Cell) -> CameraWorld | None:
+def _watched_world(node: Node, arm: ArmDescription, cell: Cell) -> CameraWorld | None:
     """The world that virtual cameras look at, kept up to date; None where there is none of them."""
     if not any(isinstance(record.source, VirtualSource) for record in cell.cameras):
         return None

@@ -10,7 +10,7 @@ from schemas.deployment import Deployment
 from services.arm.cell.camera_file import CAMERA_FILE
 from services.arm.cell.cell_file import Cell, load_cell
 from services.arm.errors import DescriptionError
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
@@ -41,7 +41,7 @@ def run(node: Node, deployment: Deployment) -> None:
         cameras.close()
 
 
-def _watch(node: Node, arm: Arm, cell: Cell, tell: Callable[[Cell], None]) -> Callable[[], None]:
+def _watch(node: Node, arm: ArmDescription, cell: Cell, tell: Callable[[Cell], None]) -> Callable[[], None]:
     """Tells the cell anew whenever the wizard has written camera.toml."""
     file, known = cell.path.with_name(CAMERA_FILE), -1
 

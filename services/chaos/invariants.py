@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from schemas.device import DeviceState
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 SLOT = 0.001  # [s] of the device's path: a state may be one older than it says
 STEPS = 2.0  # by which two rounded positions may be off
@@ -32,7 +32,7 @@ def segments(states: Sequence[DeviceState], late: Sequence[int]) -> list[list[De
     return pieces
 
 
-def jumps(arm: Arm, states: Sequence[DeviceState]) -> list[str]:
+def jumps(arm: ArmDescription, states: Sequence[DeviceState]) -> list[str]:
     """Every place where a joint went farther between two states of one segment than its velocity limit allows."""
     found = []
     for before, after in pairwise(states):
@@ -44,7 +44,7 @@ def jumps(arm: Arm, states: Sequence[DeviceState]) -> list[str]:
     return found
 
 
-def jerks(arm: Arm, states: Sequence[DeviceState]) -> list[str]:
+def jerks(arm: ArmDescription, states: Sequence[DeviceState]) -> list[str]:
     """Every place where a joint's velocity changed faster over three states than its acceleration limit allows.
 
     Velocities are differences of counters, so each is off by rounding to steps and by a slot of time; both are taken
@@ -66,7 +66,7 @@ def jerks(arm: Arm, states: Sequence[DeviceState]) -> list[str]:
     return found
 
 
-def moved(arm: Arm, at_rest: Sequence[float], now: Sequence[float]) -> list[str]:
+def moved(arm: ArmDescription, at_rest: Sequence[float], now: Sequence[float]) -> list[str]:
     """Every joint that is elsewhere [rad] or [m] than where it rested, by more than rounding."""
     return [
         f"{joint.name} moved by itself from {old:.6f} to {new:.6f}"
@@ -75,7 +75,7 @@ def moved(arm: Arm, at_rest: Sequence[float], now: Sequence[float]) -> list[str]
     ]
 
 
-def misses(arm: Arm, goal: Sequence[float], shaft: Sequence[float]) -> list[str]:
+def misses(arm: ArmDescription, goal: Sequence[float], shaft: Sequence[float]) -> list[str]:
     """Every joint whose true shaft [rad] or [m] is not at the goal that was called reached."""
     return [
         f"{joint.name} was called at {wanted:.6f}, its shaft is at {true:.6f}"

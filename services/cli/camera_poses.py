@@ -35,7 +35,7 @@ from services.vision.rigid import Array, from_transform, rigid, to_transform
 
 if TYPE_CHECKING:
     from gemelo import Arm
-    from services.arm.model.description import Arm as Description
+    from services.arm.model.description import ArmDescription
 
 POSES, MOST_POSES = 15, 60
 IMAGES = 3  # of each pose
@@ -78,7 +78,7 @@ def add_options(parser: Parser) -> None:
     parser.add_argument("-y", "--yes", action="store_true", help="do not ask before the arm goes")
 
 
-def task_of(options: Options, camera: Subject, arm: Description) -> Task:
+def task_of(options: Options, camera: Subject, arm: ArmDescription) -> Task:
     """What the options and cell.toml ask for; raises `CommandError`."""
     if not FEWEST_POSES <= options.poses <= MOST_POSES:
         raise usage(f"--poses {options.poses} is not {FEWEST_POSES} to {MOST_POSES}")
@@ -220,7 +220,7 @@ def _carrying(arm: Arm, task: Task, belief: Belief) -> Iterator[None]:
             arm.scene.remove(MOUNT_BOARD)
 
 
-def _rigid_links(arm: Description, link: str) -> list[str]:
+def _rigid_links(arm: ArmDescription, link: str) -> list[str]:
     """The links that are fixed to `link`, itself included."""
     found = {link}
     fixed = [joint for joint in arm.model.joints if joint.kind is JointKind.FIXED]

@@ -23,7 +23,7 @@ from services.cli.units import parse_joints, share, show
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
-    from services.arm.model.description import Arm as Description
+    from services.arm.model.description import ArmDescription
 
 BY_NAME: dict[str, DeviceCommand | StopKind] = {
     "arm": ArmCommand(),
@@ -112,7 +112,7 @@ def reference(arm: Arm, assignments: Sequence[str]) -> ExitCode:
     return code
 
 
-def reference_request(arm: Description, assignments: Sequence[str]) -> ReferenceCommand:
+def reference_request(arm: ArmDescription, assignments: Sequence[str]) -> ReferenceCommand:
     """The command with every joint named."""
     from gemelo.device import reference_command  # slow to load: half of `gemelo`
 

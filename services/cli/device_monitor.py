@@ -22,7 +22,7 @@ from services.cli.terminal import LiveBlock
 from services.cli.units import positive_seconds
 
 if TYPE_CHECKING:
-    from services.arm.model.description import Arm
+    from services.arm.model.description import ArmDescription
 
 REFRESH = 5.0  # [Hz]
 
@@ -128,7 +128,7 @@ def configuration_changes(before: DeviceConfiguration | None, after: DeviceConfi
     return [f"configuration {after.crc32:08x} {said}"]
 
 
-def state_changes(arm: Arm, before: DeviceState | None, after: DeviceState) -> list[str]:
+def state_changes(arm: ArmDescription, before: DeviceState | None, after: DeviceState) -> list[str]:
     """A line for every change of the state, steps and times left out."""
     old = before or DeviceState()
     lines = [] if before is not None and old.mode is after.mode else [f"mode {after.mode.name}"]

@@ -16,7 +16,7 @@ from services.cli.units import LENGTH, TIME, parse_quantity
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
-    from services.arm.model.description import Arm as Description
+    from services.arm.model.description import ArmDescription
 
 HELD = {"on": 1.0, "off": 0.0, "auto": -1.0}
 
@@ -60,10 +60,10 @@ class Press:
 
     follows: tuple[str, ...]
     about: str
-    request: Callable[[Description, Sequence[str]], InjectRequest]
+    request: Callable[[ArmDescription, Sequence[str]], InjectRequest]
 
 
-def request_of(arm: Description, word: str, rest: Sequence[str]) -> InjectRequest:
+def request_of(arm: ArmDescription, word: str, rest: Sequence[str]) -> InjectRequest:
     """The request that the words ask for; raises `CommandError` with the right form."""
     if word not in PRESSES:
         raise unknown("thing to press", word, PRESSES)
@@ -103,31 +103,31 @@ def seconds(text: str) -> float:
     return value
 
 
-def _switch(arm: Description, rest: Sequence[str]) -> InjectRequest:
+def _switch(arm: ArmDescription, rest: Sequence[str]) -> InjectRequest:
     name = require_name("input", rest[0], arm.inputs)
     if rest[1] not in HELD:
         raise usage(f'a switch is held on, held off, or left on auto, not "{rest[1]}"')
     return InjectRequest(kind=InjectKind.SWITCH, target=name, value=HELD[rest[1]])
 
 
-def _joint(kind: InjectKind, value: float) -> Callable[[Description, Sequence[str]], InjectRequest]:
+def _joint(kind: InjectKind, value: float) -> Callable[[ArmDescription, Sequence[str]], InjectRequest]:
     return lambda arm, rest: InjectRequest(kind=kind, target=joint_of(arm, rest[0]).name, value=value)
 
 
-def _slip(arm: Description, rest: Sequence[str]) -> InjectRequest:
+def _slip(arm: ArmDescription, rest: Sequence[str]) -> InjectRequest:
     return InjectRequest(kind=InjectKind.SLIP, target=joint_of(arm, rest[0]).name, value=number(rest[1], "steps"))
 
 
-def _sensor(arm: Description, rest: Sequence[str]) -> InjectRequest:
+def _sensor(arm: ArmDescription, rest: Sequence[str]) -> InjectRequest:
     name = require_name("sensor", rest[0], arm.sensors)
     return InjectRequest(kind=InjectKind.SENSOR, target=name, value=number(rest[1], f"sensor {name}"))
 
 
-def _object(arm: Description, rest: Sequence[str]) -> InjectRequest:
+def _object(arm: ArmDescription, rest: Sequence[str]) -> InjectRequest:
     return InjectRequest(kind=InjectKind.OBJECT, value=parse_quantity(rest[0], LENGTH))
 
 
-def _timed(kind: InjectKind) -> Callable[[Description, Sequence[str]], InjectRequest]:
+def _timed(kind: InjectKind) -> Callable[[ArmDescription, Sequence[str]], InjectRequest]:
     return lambda arm, rest: InjectRequest(kind=kind, value=seconds(rest[0]))
 
 

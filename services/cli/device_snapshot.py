@@ -15,7 +15,7 @@ from services.cli.errors import CommandError, ExitCode
 from services.cli.session import CommandSession, other_robots
 
 if TYPE_CHECKING:
-    from services.arm.model.description import Arm
+    from services.arm.model.description import ArmDescription
 
 PATIENCE = 2.0  # [s] for the first messages
 POLL = 0.02  # [s]
@@ -122,7 +122,7 @@ def snapshot_of(view: DeviceView) -> DeviceSnapshot:
 
 
 def device_snapshot(
-    arm: Arm,
+    arm: ArmDescription,
     status: DeviceStatus | None,
     state: DeviceState | None,
     configuration: DeviceConfiguration | None,
@@ -151,7 +151,7 @@ def device_snapshot(
     )
 
 
-def readings(arm: Arm, sensors: SensorReadings | None) -> tuple[Reading, ...]:
+def readings(arm: ArmDescription, sensors: SensorReadings | None) -> tuple[Reading, ...]:
     """Every sensor of robot.toml with its reading, None if there is none."""
     sensors = sensors or SensorReadings()
     values = dict(zip(sensors.name, sensors.value, strict=False))
@@ -169,7 +169,7 @@ def _configured(status: DeviceStatus, configuration: DeviceConfiguration | None)
     return False, f"NOT in force: {reason or f'{has}, robot.toml asks for {wanted:08x}; `gemelo device config --push`'}"
 
 
-def _joint(arm: Arm, name: str, state: DeviceState | None, active: frozenset[str]) -> DeviceJoint:
+def _joint(arm: ArmDescription, name: str, state: DeviceState | None, active: frozenset[str]) -> DeviceJoint:
     switches = {each.name: each.name in active for each in arm.inputs if each.joint == name}
     if state is None or name not in state.name:
         return DeviceJoint(name=name, switches=switches)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from schemas.robot import DigitalOutput, Input, Sensor
-    from services.arm.model.description import Arm, Joint
+    from services.arm.model.description import ArmDescription, Joint
 
 
 class ExitCode(IntEnum):
@@ -55,7 +55,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> CommandError:
     return usage(f'no {kind} "{name}": there is {", ".join(known) if known else "none at all"}')
 
 
-def joint_of(arm: Arm, name: str) -> Joint:
+def joint_of(arm: ArmDescription, name: str) -> Joint:
     """The joint of that name, or of that name on the wire; raises `CommandError` with the nearest name."""
     for joint in arm.joints:
         if name in (joint.name, joint.wire_name):

@@ -22,7 +22,7 @@ from services.cli.units import SPEED_OF, angular_speed, parse_joints, positive_s
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
-    from services.arm.model.description import Arm as Description
+    from services.arm.model.description import ArmDescription
 
 PERIOD = 0.02  # [s] between two commands while a key is held
 DRAWN = 0.1  # [s] between two drawings
@@ -88,7 +88,7 @@ def choices(robot: Robot | None) -> Choices:
 
 
 def command_of(
-    arm: Description, joints: Sequence[str], twist: Sequence[float], turn: Sequence[float], in_tool: bool
+    arm: ArmDescription, joints: Sequence[str], twist: Sequence[float], turn: Sequence[float], in_tool: bool
 ) -> JogCommand:
     """The command for joint speeds as text, or for a twist of the tool along its own axes if `in_tool`.
 
@@ -102,7 +102,7 @@ def command_of(
     return JogCommand(linear=tuple(twist), angular=tuple(turn), frame=arm.tool_frame if in_tool else "")
 
 
-def command_text(command: JogCommand, arm: Description) -> str:
+def command_text(command: JogCommand, arm: ArmDescription) -> str:
     """The command as a line, in degrees and millimetres a second."""
     if command.name:
         return joints_text(command.name, command.velocity, arm, "/s")

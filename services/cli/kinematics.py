@@ -21,7 +21,7 @@ from services.cli.units import SHOWN, angle, length, parse_joints, rotation
 
 if TYPE_CHECKING:
     from gemelo import Arm, Configurations, Pose, Robot
-    from services.arm.model.description import Arm as Description
+    from services.arm.model.description import ArmDescription
 
 XYZ = ("X", "Y", "Z")
 IK_EXAMPLES = """examples:
@@ -88,7 +88,7 @@ def ik_choices(robot: Robot | None) -> Choices:
     }
 
 
-def ik_request(options: Options, arm: Description) -> IkRequest:
+def ik_request(options: Options, arm: ArmDescription) -> IkRequest:
     """The request in SI units."""
     near = parse_joints(options.near, arm.joints)
     goal = PoseGoal(
@@ -158,7 +158,7 @@ def as_text(response: IkResponse | FkResponse) -> str:
     return msgspec.json.encode(response).decode()
 
 
-def configurations_text(arm: Description, found: Configurations) -> str:
+def configurations_text(arm: ArmDescription, found: Configurations) -> str:
     """A table with a row for each configuration."""
     units = [SHOWN[joint.unit] for joint in map(arm.joint, found.response.name)]
     headings = [f"{name} [{unit}]" for name, (unit, _) in zip(found.response.name, units, strict=True)]

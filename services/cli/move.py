@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from argparse import _ArgumentGroup as Group
 
     from gemelo import Arm, Motion, Plan, Robot
-    from services.arm.model.description import Arm as Description
+    from services.arm.model.description import ArmDescription
 
 XYZ = ("X", "Y", "Z")
 EXAMPLES = """examples:
@@ -161,7 +161,7 @@ def execute(arm: Arm, plan: Plan, as_json: bool) -> ExitCode:
     return _print(follow(arm, plan, quiet=as_json), plan, arm.description, as_json)
 
 
-def _print(report: MoveReport, plan: Plan, arm: Description, as_json: bool) -> ExitCode:
+def _print(report: MoveReport, plan: Plan, arm: ArmDescription, as_json: bool) -> ExitCode:
     if plan.response.stopped_by is not None:
         report = replace(report, fraction=plan.response.fraction, stopped_by=plan.response.stopped_by.message)
     print(report.as_json() if as_json else summary(report, arm, isinstance(report, PlanReport)))

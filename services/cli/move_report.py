@@ -16,7 +16,7 @@ from services.cli.units import show
 
 if TYPE_CHECKING:
     from gemelo import Plan
-    from services.arm.model.description import Arm as Description
+    from services.arm.model.description import ArmDescription
 
 
 class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -58,7 +58,7 @@ class PlanReport(MoveReport, frozen=True, kw_only=True):
 
 
 def report_of(
-    arm: Description,
+    arm: ArmDescription,
     plan: Plan,
     status: GoalStatusCode,
     result: FollowJointTrajectoryResult,
@@ -83,7 +83,7 @@ def report_of(
     )
 
 
-def summary(report: MoveReport, arm: Description, plan_only: bool = False) -> str:
+def summary(report: MoveReport, arm: ArmDescription, plan_only: bool = False) -> str:
     """The report as one line for a person."""
     planned = f"planned in {1e3 * report.planned_s:.1f} ms"
     if report.stopped_by:
@@ -103,7 +103,7 @@ def summary(report: MoveReport, arm: Description, plan_only: bool = False) -> st
     return f"{planned}, took {report.took_s:.2f} s, final error {millimetres}, steps: {steps}"
 
 
-def tool_error(arm: Description, trajectory: JointTrajectory, errors: Mapping[str, float]) -> float:
+def tool_error(arm: ArmDescription, trajectory: JointTrajectory, errors: Mapping[str, float]) -> float:
     """The tool's distance from the end of the trajectory [m], from the joints' final `errors` [steps].
 
     Forward kinematics of both: the goal, and the goal minus the error.

@@ -29,7 +29,7 @@ from services.cli.parser import Options
 from services.cli.units import parse_joints
 
 if TYPE_CHECKING:
-    from services.arm.model.description import Arm
+    from services.arm.model.description import ArmDescription
 
 DEFAULT_TIME = 1.0  # [s] that planning may take if nothing is said
 LONGEST_TIME = 3600.0  # [s] that planning may be allowed
@@ -43,7 +43,7 @@ GOAL_OPTIONS = (
 TOOL_MOTION = ("tool_speed", "tool_acceleration", "fraction", "max_step", "jump")
 
 
-def request_from(options: Options, arm: Arm) -> PlanRequest:
+def request_from(options: Options, arm: ArmDescription) -> PlanRequest:
     """The request in SI units; raises `CommandError` naming options that do not go together."""
     goal = goal_of(arm, options.to, options.joints or (), options.named)
     speed = 1.0 if options.speed is None else options.speed
@@ -55,7 +55,7 @@ def request_from(options: Options, arm: Arm) -> PlanRequest:
     return replace(request, motion=motion_of(options), allowed_time=time, clearance=_clearance(options), timing=timing)
 
 
-def goal_of(arm: Arm, to: Sequence[float] | None, joints: Sequence[str], named: str | None) -> Goal:
+def goal_of(arm: ArmDescription, to: Sequence[float] | None, joints: Sequence[str], named: str | None) -> Goal:
     """The goal: exactly one of a tool position (3,) [m], joint assignments, and a named state."""
     given = [bool(to), bool(joints), named is not None]
     if sum(given) != 1:

@@ -14,7 +14,7 @@ from services.cli.errors import CommandError, usage
 
 if TYPE_CHECKING:
     from gemelo import Plan
-    from services.arm.model.description import Arm
+    from services.arm.model.description import ArmDescription
 
 STANDARD_INPUT = "-"
 LARGEST_FILE = 100_000_000  # [bytes] a trajectory of an hour has a tenth of it
@@ -28,7 +28,7 @@ class PlanFile(msgspec.Struct, frozen=True, kw_only=True):
     response: PlanResponse
 
 
-def read_plan(source: str, arm: Arm) -> Plan:
+def read_plan(source: str, arm: ArmDescription) -> Plan:
     """The plan in a file, or on standard input for `-`.
 
     Raises `CommandError` naming the file if it holds no plan, or one that `arm` cannot follow. Whether the arm stands
@@ -57,7 +57,7 @@ def _read(source: str, name: str) -> bytes:
         raise usage(f"{name} cannot be read: {error.strerror}") from error
 
 
-def _require_trajectory(plan: PlanResponse, name: str, arm: Arm) -> None:
+def _require_trajectory(plan: PlanResponse, name: str, arm: ArmDescription) -> None:
     """Raises `CommandError` for a refused plan, an empty one, and one whose points are not of `arm`'s joints."""
     if plan.refusal is not None:
         raise CommandError(f"{name} holds a refusal, no plan: {plan.refusal.message}")

@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from services.arm.model.description import Arm, Joint
+    from services.arm.model.description import ArmDescription, Joint
 
 OUTPUT = "avanzar"
 LARGEST = 256  # [bytes] of a message
@@ -30,7 +30,7 @@ class RequestedMotion(NamedTuple):
 class RaIntake:
     """Where the arm is to be, in exact fractions of a step: no remainder of any message is lost."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: ArmDescription) -> None:
         self._joints = arm.joints
         self._names = tuple(joint.wire_name for joint in arm.joints)
         self.target_steps: tuple[Fraction, ...] | None = None  # [steps] of each joint; None if nothing is asked for

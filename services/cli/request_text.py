@@ -26,10 +26,10 @@ from services.cli.units import DEGREE, SHOWN
 
 if TYPE_CHECKING:
     from gemelo import Refused
-    from services.arm.model.description import Arm
+    from services.arm.model.description import ArmDescription
 
 
-def request_text(request: PlanRequest, arm: Arm) -> str:
+def request_text(request: PlanRequest, arm: ArmDescription) -> str:
     """A request as one line: `brazo_joint 30 deg; in a straight line of the joints; at 50 % speed`."""
     speed = f"at {100.0 * request.velocity_scaling:g} % speed" if request.velocity_scaling != 1.0 else ""
     timing = "without a jerk limit" if request.timing is Timing.TIME_OPTIMAL else ""
@@ -38,7 +38,7 @@ def request_text(request: PlanRequest, arm: Arm) -> str:
     return _joined([goal_text(request.goal, arm), motion_text(request.motion), speed, timing, clearance, time])
 
 
-def goal_text(goal: Goal, arm: Arm) -> str:
+def goal_text(goal: Goal, arm: ArmDescription) -> str:
     """A goal in degrees and millimetres."""
     match goal:
         case NamedGoal():
@@ -52,7 +52,7 @@ def goal_text(goal: Goal, arm: Arm) -> str:
             return f"{', then '.join(goal_text(point, arm) for point in goal.points)}{blend}"
 
 
-def joints_text(names: Iterable[str], values: Iterable[float], arm: Arm, per: str = "") -> str:
+def joints_text(names: Iterable[str], values: Iterable[float], arm: ArmDescription, per: str = "") -> str:
     """`brazo_joint 30 deg, efector_joint 40 mm` from [rad] or [m]; `per` is appended to the unit, as "/s"."""
     shown = []
     for name, value in zip(names, values, strict=True):
@@ -124,7 +124,7 @@ def _tool_limits(motion: LinearMotion | CircularMotion) -> list[str]:
     ]
 
 
-def refusal_text(refusal: Refusal, goal: Goal, arm: Arm) -> str:
+def refusal_text(refusal: Refusal, goal: Goal, arm: ArmDescription) -> str:
     """One sentence: the reason, and the nearest goal that can be reached as options, else the remedy."""
     text = f"refused ({refusal.check}): {refusal.message}" if refusal.check else f"refused: {refusal.message}"
     if refusal.nearest:
@@ -132,12 +132,12 @@ def refusal_text(refusal: Refusal, goal: Goal, arm: Arm) -> str:
     return f"{text}; {refusal.remedy}" if refusal.remedy else text
 
 
-def refusal_error(error: Refused, goal: Goal, arm: Arm) -> CommandError:
+def refusal_error(error: Refused, goal: Goal, arm: ArmDescription) -> CommandError:
     """The end of a command whose `goal` was refused, in options where `gemelo` says arguments."""
     return CommandError(refusal_text(error.refusal, goal, arm) if error.refusal is not None else str(error))
 
 
-def as_typed(goal: Goal, values: Sequence[float], arm: Arm) -> str:
+def as_typed(goal: Goal, values: Sequence[float], arm: ArmDescription) -> str:
     """`values` [m, rad] in the form of `goal`, as options of `gemelo move`."""
     if isinstance(goal, PoseGoal):
         turn = f" {'--along' if goal.tool_axis else '--quaternion'} {_numbers(values[3:], 6)}" if values[3:] else ""
@@ -162,6 +162,6 @@ def _direction(values: Iterable[float]) -> str:
     return f"({', '.join(_number(value) for value in values)})"
 
 
-def _assignment(arm: Arm, name: str, value: float) -> str:
+def _assignment(arm: ArmDescription, name: str, value: float) -> str:
     shown, factor = SHOWN[arm.joint(name).unit]
     return f"{name}={value * factor:.6g}{shown}"

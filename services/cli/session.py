@@ -13,7 +13,7 @@ from services.cli.errors import CommandError, ExitCode, in_commands, usage
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
     from schemas.deployment import Deployment
-    from services.arm.model.description import Arm as Description
+    from services.arm.model.description import ArmDescription
     from services.runtime.node import Node
 
 
@@ -21,7 +21,7 @@ class CommandSession(NamedTuple):
     """A robot, and this command's own node on its bus."""
 
     deployment: Deployment
-    arm: Description
+    arm: ArmDescription
     node: Node
 
 
@@ -101,7 +101,7 @@ def require_router(deployment: Deployment) -> None:
         raise CommandError(str(error), ExitCode.NO_STACK) from error
 
 
-def other_robots(deployment: Deployment, arm: Description) -> str:
+def other_robots(deployment: Deployment, arm: ArmDescription) -> str:
     """A sentence that names the robots on the router if `arm`'s own gateway is not there; else empty."""
     robots = gemelo.robots(deployment)
     if not robots or arm.name in robots:

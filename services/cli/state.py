@@ -31,7 +31,7 @@ from services.cli.text_table import table
 from services.cli.units import SHOWN
 
 if TYPE_CHECKING:
-    from services.arm.model.description import Arm
+    from services.arm.model.description import ArmDescription
 
 PATIENCE = 2.0  # [s] for the first messages
 TO_HEAR_OF_CONTROL = 0.5  # [s] for what the gateway keeps for late joiners
@@ -86,7 +86,7 @@ class StateSnapshot(msgspec.Struct, frozen=True):
 
 
 def snapshot(
-    arm: Arm,
+    arm: ArmDescription,
     states: JointState | None,
     errors: StepErrors | None,
     device: DeviceState | None,

@@ -11,7 +11,7 @@ import trimesh
 
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.arm.model.urdf import Triple
 from services.arm.model.urdf_edit import with_collisions
 from services.collision_fitting.excess import depth_in
@@ -63,7 +63,7 @@ def _words(values: Sequence[float]) -> str:
     return " ".join(f"{round(value, 9) + 0.0:.9g}" for value in values)
 
 
-def write_fits(arm: Arm, fits: Sequence[LinkFit]) -> Arm:
+def write_fits(arm: ArmDescription, fits: Sequence[LinkFit]) -> ArmDescription:
     """Puts the shapes into the URDF in place of those that the links have, hulls into files beside it, and returns the
     arm, loaded again.
 
@@ -116,7 +116,7 @@ def _restored(folder: Path) -> Iterator[None]:
         raise
 
 
-def touching_states(arm: Arm) -> list[str]:
+def touching_states(arm: ArmDescription) -> list[str]:
     """The named states in which two links touch that are no neighbours, in words: shapes hold more than meshes do."""
     own = Kinematics(arm).collisions
     neighbours = {frozenset((joint.parent, joint.child)) for joint in arm.model.joints}
@@ -128,7 +128,7 @@ def touching_states(arm: Arm) -> list[str]:
     ]
 
 
-def _require_there(arm: Arm, fits: Sequence[LinkFit], wanted: dict[str, list[str]]) -> None:
+def _require_there(arm: ArmDescription, fits: Sequence[LinkFit], wanted: dict[str, list[str]]) -> None:
     loaded = link_shapes(arm)
     for fit in fits:
         shapes = loaded.get(fit.link, ())

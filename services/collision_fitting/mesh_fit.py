@@ -15,7 +15,7 @@ from multiprocessing import get_context
 import numpy as np
 
 from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.collision_fitting.excess import SHARE, Excess, excess_of
 from services.collision_fitting.fitted_shape import Fitted
 from services.collision_fitting.link_meshes import visual_mesh
@@ -55,7 +55,7 @@ def _tell_nobody(_: str) -> None:
 
 
 def fit_links(
-    arm: Arm,
+    arm: ArmDescription,
     within: float | None = None,
     most: int = MOST,
     only: Sequence[str] = (),

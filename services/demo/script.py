@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from gemelo import Target
 from services.arm.frames.transforms import compose, inverse
 from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import Arm, Joint
+from services.arm.model.description import ArmDescription, Joint
 
 SINE_RATE = 10.0  # [Hz] of the targets
 SINE_TIME = 10.0  # [s]
@@ -51,7 +51,7 @@ def sine_of(joint: Joint, start: float) -> Sine:
     return Sine(joint.name, centre, amplitude)
 
 
-def tour(arm: Arm) -> tuple[TourMove, ...]:
+def tour(arm: ArmDescription) -> tuple[TourMove, ...]:
     """Every named state, home, some joint goals and tool positions; the last goal has step counts other than zero."""
     named = [TourMove(f"named {name}", Target(named=name)) for name in arm.named_states if name != "home"]
     joints = [
@@ -66,7 +66,7 @@ def tour(arm: Arm) -> tuple[TourMove, ...]:
     return (*named, TourMove("home", home), *joints, *poses)
 
 
-def positions_at(arm: Arm, shares: tuple[float, ...]) -> tuple[float, ...]:
+def positions_at(arm: ArmDescription, shares: tuple[float, ...]) -> tuple[float, ...]:
     """Joint values [rad] or [m] at these shares of their travel."""
     return tuple(
         joint.lower + shares[index % len(shares)] * (joint.upper - joint.lower)
@@ -74,7 +74,7 @@ def positions_at(arm: Arm, shares: tuple[float, ...]) -> tuple[float, ...]:
     )
 
 
-def tool_at(arm: Arm, positions: tuple[float, ...]) -> tuple[float, ...]:
+def tool_at(arm: ArmDescription, positions: tuple[float, ...]) -> tuple[float, ...]:
     """Position (3,) [m] of the tool in the base frame at `positions` (n,) [rad] or [m]."""
     links = link_transforms(arm.model, dict(zip(arm.joint_names, positions, strict=True)))
     return tuple(compose(inverse(links[arm.base_frame]), links[arm.tool_frame])[0])

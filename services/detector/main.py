@@ -19,7 +19,7 @@ from schemas.topics import CAMERA, GATEWAY, JOINT_STATES, camera_detections, cam
 from services.arm.cell.cell_file import Cell, load_cell
 from services.arm.frames.transforms import compose, inverse, to_message
 from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
@@ -98,7 +98,7 @@ class Clocks(NamedTuple):
 class Places:
     """Where the frames that carry cameras were at a moment; all stamps are by this node's clock."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: ArmDescription) -> None:
         self._arm = arm
         self._states: deque[JointState] = deque(maxlen=64)  # 1.3 s of them
 

@@ -14,7 +14,7 @@ from schemas.errors import ConfigurationError
 from schemas.roles import ROLES
 from schemas.site import Site
 from services.arm.cell.cell_file import load_cell
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.credentials.authority import DAYS
 from services.hosts.certificates import AUTHORITY_FOLDER
 from services.hosts.deployments import HOST
@@ -207,7 +207,7 @@ def _robots(site: Site, problems: Problems, project: Path) -> None:
         _cell(site, robot, arm, problems, project)
 
 
-def _cell(site: Site, robot: str, arm: Arm, problems: Problems, project: Path) -> None:
+def _cell(site: Site, robot: str, arm: ArmDescription, problems: Problems, project: Path) -> None:
     """What is around the arm; cameras and detector have nothing to do without it."""
     cell, place = site.robots[robot].cell, ("robots", robot, "cell")
     eyes = [(name, each) for name, host in site.hosts.items() for each in EYES if each in host.services.get(robot, ())]

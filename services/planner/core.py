@@ -23,7 +23,7 @@ from schemas.planning import (
 )
 from schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.cartesian.tool_motions import ToolMotions
 from services.planner.collision.checker import CollisionChecker
 from services.planner.collision.world import World
@@ -64,7 +64,7 @@ TOOL = "tool"  # the planner_id of lines and arcs of the tool
 class Planner:
     """Plans from rest to rest for one arm: the straight line of the joints, or a path around."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics | None = None) -> None:
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics | None = None) -> None:
         self.arm = arm
         self.kinematics = kinematics or Kinematics(arm)
         self.checker = CollisionChecker(World(arm, self.kinematics))

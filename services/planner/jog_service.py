@@ -8,7 +8,7 @@ from schemas.joints import JointState
 from schemas.planning import JogCommand, JogStatus
 from schemas.topics import CONTROL, DEVICE_STATUS, FOLLOW_JOINT_TRAJECTORY, JOG, JOG_INPUTS, JOG_STATUS, JOINT_TARGETS
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.world import World
 from services.planner.jog.jog import NEVER, PERIOD, SILENCE, STATUS_PERIOD, Jog, signed
 from services.planner.jog.jog_log import JogLog, digest_of
@@ -27,7 +27,7 @@ class JogService:
     def __init__(
         self,
         node: Node,
-        arm: Arm,
+        arm: ArmDescription,
         states: Latest[JointState],
         newest: Callable[[], World],
         is_recorded: Callable[[], bool],

@@ -8,7 +8,7 @@ from typing import TypeVar
 from schemas.joints import JointState
 from schemas.message import Message
 from schemas.topics import FK, IK, STATE_VALIDITY, Request
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.world import World
 from services.planner.kinematics.kinematic_requests import KinematicRequests
 from services.planner.scene.answer_log import AnswerLog
@@ -25,7 +25,7 @@ class KinematicService:
     """Serves the three requests; `newest` gives the world of the scene as it is."""
 
     def __init__(
-        self, node: Node, arm: Arm, states: Latest[JointState], newest: Callable[[], World], log: AnswerLog
+        self, node: Node, arm: ArmDescription, states: Latest[JointState], newest: Callable[[], World], log: AnswerLog
     ) -> None:
         self._node, self._states, self._newest, self._log = node, states, newest, log
         requests = KinematicRequests(arm)

@@ -21,7 +21,7 @@ from schemas.joints import JointState
 from schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse
 from services.arm.checks.findings import Finding, error, warning
 from services.arm.kinematics.self_collisions import LinkPair
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.arm.model.urdf import JointKind
 from services.planner.core import Planner
 from services.planner.native import assembly
@@ -44,7 +44,7 @@ UNCONNECTED = "nothing, where no path can be: the limits may leave two free regi
 MOST_NAMED = 3  # findings about pairs, and about plans; chosen: what a person reads
 
 
-def trial(arm: Arm, seconds: float = SECONDS) -> list[Finding]:
+def trial(arm: ArmDescription, seconds: float = SECONDS) -> list[Finding]:
     """What keeps plans from succeeding within `seconds` [s], by name; empty where they do."""
     planner = Planner(arm)
     planner.prepare()
@@ -94,14 +94,14 @@ def _sampled(planner: Planner, deadline: Deadline) -> tuple[list[Array], dict[Li
     return free, near, count
 
 
-def _drawn(arm: Arm, random: np.random.Generator) -> Array:
+def _drawn(arm: ArmDescription, random: np.random.Generator) -> Array:
     """(n,) [rad] or [m], uniform within the limits; a whole turn where there are none."""
     lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
     bounds = np.where(np.isfinite(lower), lower, -np.pi), np.where(np.isfinite(upper), upper, np.pi)
     return random.uniform(*bounds)
 
 
-def _nowhere_free(arm: Arm, near: dict[LinkPair, list[float]], count: int) -> list[Finding]:
+def _nowhere_free(arm: ArmDescription, near: dict[LinkPair, list[float]], count: int) -> list[Finding]:
     """The pairs that are in the way most often, with how near they come."""
     most = sorted(near.items(), key=lambda item: -len(item[1]))
     most = [item for item in most if len(item[1]) > OFTEN * len(most[0][1])][:MOST_NAMED]
@@ -141,7 +141,7 @@ def _plans(planner: Planner, free: list[Array], deadline: Deadline) -> Iterator[
         yield severe(planner.arm.urdf_path.name, f"plans, {subject or 'any'}", message, remedy)
 
 
-def looking_the_same(arm: Arm, start: Array, goal: Array) -> Iterator[Array]:
+def looking_the_same(arm: ArmDescription, start: Array, goal: Array) -> Iterator[Array]:
     """(n,) configurations within the limits that look as `goal`: each joint within half a turn of `start` [rad], then
     one joint after the other from the base on turned the other way round.
 

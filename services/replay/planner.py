@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from schemas.planning import PlanCode, PlanInputs, PlanningTimes, PlanRequest, PlanResponse, SceneVersion
 from schemas.topics import JOG_INPUTS, PLAN, PLAN_INPUTS, PLANNED_PATH, SCENE
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.core import LONGEST, Planner
 from services.recordings.table import exchanges_of
 from services.replay import planner_answers, planner_jog
@@ -52,7 +52,7 @@ def replay(recorded: Recorded, comparison: Comparison) -> None:
 class PlansAgain:
     """The core of the planner, and the recorded plans that are made with it."""
 
-    def __init__(self, recorded: Recorded, comparison: Comparison, arm: Arm, scenes: Scenes) -> None:
+    def __init__(self, recorded: Recorded, comparison: Comparison, arm: ArmDescription, scenes: Scenes) -> None:
         self.comparison = comparison
         self._recorded, self._scenes = recorded, scenes
         self._planner = Planner(arm)

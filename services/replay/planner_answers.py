@@ -13,7 +13,7 @@ from schemas.planning import AnswerInputs
 from schemas.scene import SceneResponse
 from schemas.topics import ANSWER_INPUTS, FK, IK, SCENE, SCENE_EDIT, STATE_VALIDITY
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.kinematics.kinematic_requests import KinematicRequests
 from services.planner.scene.scene_store import SceneStore, changed
 from services.planner.scene.standing import link_poses, standing
@@ -33,7 +33,7 @@ UNSEEN = "scenes of edits that are not in the recording"
 class AnswersAgain:
     """What answers these requests in the planner; `compare` holds all recorded answers against it."""
 
-    def __init__(self, recorded: Recorded, comparison: Comparison, arm: Arm, scenes: Scenes) -> None:
+    def __init__(self, recorded: Recorded, comparison: Comparison, arm: ArmDescription, scenes: Scenes) -> None:
         self._recorded, self._comparison, self._arm, self._scenes = recorded, comparison, arm, scenes
         self._kinematics = Kinematics(arm)
         self._requests = KinematicRequests(arm, self._kinematics)

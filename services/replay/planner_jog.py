@@ -8,7 +8,7 @@ from typing import Any
 from schemas.planning import JogTaken, JogTick
 from schemas.topics import JOG_INPUTS, JOG_STATUS, JOINT_TARGETS, SCENE
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.jog.jog import Jog, signed
 from services.planner.jog.jog_log import digest_of
 from services.replay.comparison import ABSENT, Comparison
@@ -25,7 +25,7 @@ OTHERS = "targets and statuses of others than the jog"
 class JogAgain:
     """The jog, and the recorded messages beside which its own are held; `compare` goes through all of them."""
 
-    def __init__(self, recorded: Recorded, comparison: Comparison, arm: Arm, scenes: Scenes) -> None:
+    def __init__(self, recorded: Recorded, comparison: Comparison, arm: ArmDescription, scenes: Scenes) -> None:
         self._recorded, self._comparison, self._arm, self._scenes = recorded, comparison, arm, scenes
         self._kinematics = Kinematics(arm)
         self._jog: Jog | None = None

@@ -14,7 +14,7 @@ import msgspec
 
 from schemas.message import Message
 from schemas.topics import Topic
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.recordings.channels import schema_of
 from services.recordings.mcap_file import DEPLOYMENT, METADATA, ROBOT
 from services.recordings.reader import RecordingReader, Row
@@ -110,7 +110,7 @@ class Recorded:
         """The software that was recorded, and the machine."""
         return self._reader.metadata.get(METADATA, {})
 
-    def arm(self) -> Arm:
+    def arm(self) -> ArmDescription:
         """The arm that was recorded, of this checkout's files; raises `NotReplayable` where they are not the same."""
         recorded = self._reader.metadata.get(ROBOT)
         if recorded is None:

@@ -8,7 +8,7 @@ from schemas.planning import SceneVersion
 from schemas.scene import PlanningScene
 from schemas.topics import SCENE
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.scene_shapes import SceneError
 from services.planner.collision.world import World
 from services.replay.recorded import Heard, NotReplayable, Recorded
@@ -18,7 +18,7 @@ from services.runtime.deployment import project_root
 class Scenes:
     """Every recorded scene by its version; `world` keeps the last one that it has made."""
 
-    def __init__(self, recorded: Recorded, arm: Arm, kinematics: Kinematics) -> None:
+    def __init__(self, recorded: Recorded, arm: ArmDescription, kinematics: Kinematics) -> None:
         self.folders = (project_root(), arm.folder)
         self._recorded, self._arm, self._kinematics = recorded, arm, kinematics
         self.heard: dict[tuple[int, int], Heard[PlanningScene]] = {}

@@ -22,7 +22,7 @@ from schemas.topics import (
     Delivery,
     Topic,
 )
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.recordings.table import action_topics, recorded_topics
 from services.replay.comparison import ABSENT, Comparison
 from services.replay.recorded import AGAIN, Heard, NotReplayable, Recorded
@@ -59,7 +59,7 @@ class GatewayAgain:
 
     def __init__(self, recorded: Recorded, comparison: Comparison) -> None:
         self._recorded, self._comparison = recorded, comparison
-        self._arm: Arm = recorded.arm()
+        self._arm: ArmDescription = recorded.arm()
         self._core: GatewayCore | None = None
         self._count, self._last = 0, 0  # of the inputs; [ns] of the last
         self._ended = {

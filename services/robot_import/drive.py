@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.urdf import JointKind, UrdfJoint
 from services.arm.motors.speed import speed_limits
 from services.arm.motors.steps import exact_ratio
@@ -168,7 +168,7 @@ def _homing_toml(drive: JointDrive) -> str:
     )
 
 
-def speed_lines(arm: Arm) -> list[str]:
+def speed_lines(arm: ArmDescription) -> list[str]:
     """The step rate of every joint at full speed, and its share of what driver and tick allow."""
     tick = arm.device.tick_hz
     lines = [f"step rates at a tick of {1e6 / tick:g} us ({tick / 1000:g} kHz, chosen from these):"]

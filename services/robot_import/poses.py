@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.kinematics.self_collisions import SelfCollisionChecker
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.urdf import JointKind, UrdfJoint
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ def _zero(lower: Array, upper: Array) -> Array:
     return np.where((lower <= 0.0) & (upper >= 0.0), 0.0, inside)
 
 
-def named_states(arm: Arm) -> dict[str, dict[str, float]]:
+def named_states(arm: ArmDescription) -> dict[str, dict[str, float]]:
     """`home`, near zero, and `ready`, away from it [rad] or [m]; raises `DescriptionError` where none is free."""
     checker = Kinematics(arm).collisions
     urdf = [arm.model.joint(name) for name in arm.joint_names]
@@ -72,7 +72,7 @@ def _inside(lower: Array, upper: Array) -> tuple[Array, Array]:
     return lower + aside, upper - aside
 
 
-def _first_free(checker: SelfCollisionChecker, states: Iterator[Array], name: str, arm: Arm) -> Array:
+def _first_free(checker: SelfCollisionChecker, states: Iterator[Array], name: str, arm: ArmDescription) -> Array:
     """(n,) [rad] or [m] the first that is CLEAR, else the one with the most room if that is above TIGHT."""
     best, most = np.empty(0), -math.inf
     for state in states:

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
 from schemas.errors import ConfigurationError
 from services.arm.errors import suggestion
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.hosts.quoting import Value, toml
 from services.runtime.deployment import ARMS
 
@@ -24,7 +24,7 @@ SHARED = ("router", "broker", "viewer")  # processes that serve all arms
 class StackedArm:
     """An arm among others on one machine."""
 
-    arm: Arm
+    arm: ArmDescription
     deployment: Deployment
 
     @property
@@ -85,7 +85,9 @@ def _folder(name: str, root: Path) -> Path:
     raise ConfigurationError(f'ARMS: there is no arm "{name}"{suggestion(name, known)}')
 
 
-def _deployment(common: Deployment, arm: Arm, folder: Path, all_folders: Sequence[Path], index: int) -> Deployment:
+def _deployment(
+    common: Deployment, arm: ArmDescription, folder: Path, all_folders: Sequence[Path], index: int
+) -> Deployment:
     paths = common.paths
     return replace(
         common,

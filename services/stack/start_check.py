@@ -9,7 +9,7 @@ from typing import TextIO
 from schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
 from schemas.errors import ConfigurationError
 from services.arm.cell.cell_file import load_cell
-from services.arm.model.description import Arm, load_arm, require_motors
+from services.arm.model.description import ArmDescription, load_arm, require_motors
 from services.arm.model.virtual_drive import NO_MOTORS
 from services.mqtt.access import device_access, gateway_access
 from services.mqtt.secure_folder import listener
@@ -97,7 +97,7 @@ def main() -> int:
     return 1 if found else 0
 
 
-def say_virtual(arm: Arm, to: TextIO) -> None:
+def say_virtual(arm: ArmDescription, to: TextIO) -> None:
     """What a person is to know of an arm without motors, as the stack starts."""
     if not arm.has_motors:
         said = f"{arm.name}: {NO_MOTORS}; a virtual device is generated, at {arm.device.tick_hz / 1000:g} kHz"

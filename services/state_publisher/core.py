@@ -10,7 +10,7 @@ from schemas.joints import JointState
 from services.arm.errors import suggestion
 from services.arm.frames.transforms import to_message
 from services.arm.kinematics.chain import complete, joint_transform, origin_of
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.urdf import JointKind
 
 
@@ -53,7 +53,7 @@ class FramesUpdate:
 class StatePublisher:
     """Static frames once, moving ones for every joint state, with that state's own stamp."""
 
-    def __init__(self, arm: Arm, rate: float = 0.0) -> None:
+    def __init__(self, arm: ArmDescription, rate: float = 0.0) -> None:
         """`rate` in [Hz] of the moving frames; 0: one for every joint state."""
         self._arm = arm
         self._moving = [j for j in arm.model.joints if j.kind is not JointKind.FIXED]

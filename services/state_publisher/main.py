@@ -10,7 +10,7 @@ from schemas.deployment import Deployment
 from schemas.frames import RobotDescription
 from schemas.joints import JointState
 from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
@@ -25,7 +25,7 @@ class StatePublisherParameters(msgspec.Struct, frozen=True, kw_only=True):
     rate: Annotated[float, msgspec.Meta(ge=0.0, description="frames a second [Hz]; 0: one for every joint state")] = 0.0
 
 
-def describe(arm: Arm) -> RobotDescription:
+def describe(arm: ArmDescription) -> RobotDescription:
     """The robot's own files."""
     return RobotDescription(
         robot=arm.name,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.stepper_gateway.control.control_handler import ControlHandler
 from services.stepper_gateway.device.command_handler import CommandHandler
 from services.stepper_gateway.device.echoes import Echoes
@@ -25,7 +25,7 @@ class Components:
     """Everything that moves the arm, or speaks for it, with one device."""
 
     def __init__(
-        self, arm: Arm, session_id: int, parameters: GatewayParameters, kept: LedgerRecord | None = None
+        self, arm: ArmDescription, session_id: int, parameters: GatewayParameters, kept: LedgerRecord | None = None
     ) -> None:
         self.out = Outbox()
         self.device = GatewayDevice(arm, session_id, parameters, self.out)

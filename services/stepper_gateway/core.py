@@ -24,7 +24,7 @@ from schemas.motion import FollowJointTrajectoryGoal
 from schemas.scene import PlanningScene
 from schemas.system import LogLevel
 from schemas.topics import DEVICE_STATUS
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.stepper_gateway.components import Components
 from services.stepper_gateway.control.clients import MotionCaller
 from services.stepper_gateway.control.control_handler import NOBODY
@@ -55,7 +55,7 @@ class GatewayCore:
 
     def __init__(
         self,
-        arm: Arm,
+        arm: ArmDescription,
         session_id: int,
         parameters: GatewayParameters | None = None,
         kept: LedgerRecord | None = None,

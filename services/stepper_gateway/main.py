@@ -10,7 +10,7 @@ from pathlib import Path
 
 from schemas.deployment import Deployment, DeviceKind, Wire
 from schemas.robot import Dialect
-from services.arm.model.description import Arm, load_arm, require_motors
+from services.arm.model.description import ArmDescription, load_arm, require_motors
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
@@ -54,7 +54,7 @@ def run(node: Node, deployment: Deployment) -> None:
         file.keep(core.ledger_record())
 
 
-def open_device(deployment: Deployment, arm: Arm, wake: Callable[[], None]) -> Link:
+def open_device(deployment: Deployment, arm: ArmDescription, wake: Callable[[], None]) -> Link:
     """The link to the arm's device, in the dialect that it speaks."""
     match arm.device.dialect:
         case Dialect.GEMELO:
@@ -84,7 +84,7 @@ def open_link(deployment: Deployment, device: str, wake: Callable[[], None], bau
             return SerialLink(serial_device(deployment), deployment.serial.baud or baud, wake)
 
 
-def baud_of(deployment: Deployment, arm: Arm) -> int:
+def baud_of(deployment: Deployment, arm: ArmDescription) -> int:
     """Of the serial line: the deployment's, else robot.toml's."""
     return deployment.serial.baud or arm.device.serial_baud
 

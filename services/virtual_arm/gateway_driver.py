@@ -36,7 +36,7 @@ from schemas.motion import (
 )
 from schemas.system import LogLevel
 from schemas.topics import Topic
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.stepper_gateway.control.clients import MotionCaller
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.device.command_arguments import KINDS
@@ -101,7 +101,7 @@ class GatewayDriver(ABC):
     def run(self, seconds: float, until: Callable[[], bool] | None = None) -> bool:
         """Lets `seconds` [s] pass; returns True as soon as `until` holds, or at the end if there is none."""
 
-    def start_core(self, arm: Arm, session_id: int, parameters: GatewayParameters | None = None) -> None:
+    def start_core(self, arm: ArmDescription, session_id: int, parameters: GatewayParameters | None = None) -> None:
         """The gateway's process starts, perhaps again, with the ledger that it kept last; its link is not up yet."""
         self.core = GatewayCore(arm, session_id, parameters, self.kept[-1] if self.kept else None)
 

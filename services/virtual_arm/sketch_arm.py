@@ -12,7 +12,7 @@ import msgspec
 from firmware.platform.host.sketch import HostSketch
 from schemas.device import DeviceCommandKind
 from schemas.robot import Dialect
-from services.arm.model.description import Arm, heard_by_the_board
+from services.arm.model.description import ArmDescription, heard_by_the_board
 from services.arm.motors.relative_moves import ramp_of
 from services.stepper_gateway.links.foreign.ra_device import RaDevice
 from services.stepper_gateway.links.link import Kind
@@ -23,7 +23,7 @@ PERIOD = 0.02  # [s] of the gateway's loop
 STEP = 0.005  # [s] of virtual time
 
 
-def ra_arm(message_time: float = 2.0) -> Arm:
+def ra_arm(message_time: float = 2.0) -> ArmDescription:
     """rm1 behind a sketch that takes `message_time` [s] for a message."""
     arm = rm1()
     device = msgspec.structs.replace(arm.device, dialect=Dialect.RA, message_time=message_time)
@@ -35,7 +35,7 @@ class SketchArm(GatewayDriver):
 
     def __init__(
         self,
-        arm: Arm | None = None,
+        arm: ArmDescription | None = None,
         *,
         delay: float = 0.005,
         jitter: float = 0.0,

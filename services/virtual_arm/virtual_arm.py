@@ -17,7 +17,7 @@ from schemas.device_config import DeviceConfig
 from schemas.message import Message, Vector
 from schemas.robot import Motor
 from services.arm.device.device_config import device_config, reference_steps
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.arm.model.gripper import gripper_unit
 from services.runtime.deployment import project_root
 from services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Kind, Moment
@@ -34,7 +34,7 @@ SPARED = ("status", "event", "hb", "config", "config/ack")
 
 
 @cache
-def rm1() -> Arm:
+def rm1() -> ArmDescription:
     """The arm of `urdf/rm1`."""
     return load_arm(project_root() / "urdf/rm1")
 
@@ -71,7 +71,7 @@ class VirtualArm(GatewayDriver):
         start: Vector | None = None,
         referenced: bool = True,
         parameters: GatewayParameters | None = None,
-        arm: Arm | None = None,
+        arm: ArmDescription | None = None,
         config: DeviceConfig | None = None,
         *,
         motors: Sequence[Motor] = (),

@@ -28,7 +28,7 @@ from schemas.topics import (
     camera_image,
     camera_info,
 )
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.gripper import jaw_objects, jaws_apart
 from services.visualizer.core import Visualizer
 
@@ -41,7 +41,7 @@ class Feed(NamedTuple):
     is_series: bool = False
 
 
-def feeds(core: Visualizer, arm: Arm, cameras: Sequence[str]) -> list[Feed]:
+def feeds(core: Visualizer, arm: ArmDescription, cameras: Sequence[str]) -> list[Feed]:
     """Everything that the view of `arm` and of its cameras shows."""
 
     def on_gripper(state: GripperState) -> None:

@@ -1,4 +1,4 @@
-"""A robot's folder as one `Arm`, held against readers that others wrote, and its refusals."""
+"""A robot's folder as one `ArmDescription`, held against readers that others wrote, and its refusals."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import pinocchio as pin
 import pytest
 
 from services.arm.errors import DescriptionError
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from tests.arm.editing import edit
 
 
-def test_rm1_is_what_the_seed_says(rm1: Arm):
+def test_rm1_is_what_the_seed_says(rm1: ArmDescription):
     assert rm1.name == "rm1"
     assert rm1.joint_names == ("brazo_joint", "antebrazo_joint", "efector_joint")
     assert [joint.wire_name for joint in rm1.joints] == ["q1", "q2", "q3"]
@@ -27,7 +27,7 @@ def test_rm1_is_what_the_seed_says(rm1: Arm):
     assert rm1.device.name == "rm1"
 
 
-def test_the_light_reader_agrees_with_pinocchio(rm1: Arm):
+def test_the_light_reader_agrees_with_pinocchio(rm1: ArmDescription):
     model = pin.buildModelFromUrdf(str(rm1.urdf_path))
     assert list(model.names)[1:] == list(rm1.joint_names)
     assert model.lowerPositionLimit.tolist() == [j.lower for j in rm1.joints]
@@ -36,7 +36,7 @@ def test_the_light_reader_agrees_with_pinocchio(rm1: Arm):
     assert masses == [1.395, 0.465, 0.338, 0.065] == [inertia.mass for inertia in model.inertias]
 
 
-def test_the_light_reader_agrees_with_yourdfpy(rm1: Arm):
+def test_the_light_reader_agrees_with_yourdfpy(rm1: ArmDescription):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         import yourdfpy
@@ -125,6 +125,6 @@ def test_a_continuous_joint_has_no_limits(copy: Path):
     assert (joint.lower, joint.upper, joint.unit) == (-math.inf, math.inf, "rad")
 
 
-def test_a_joint_that_is_not_there_is_named_with_the_nearest(rm1: Arm):
+def test_a_joint_that_is_not_there_is_named_with_the_nearest(rm1: ArmDescription):
     with pytest.raises(DescriptionError, match='no joint "brazo"; did you mean "brazo_joint"'):
         rm1.joint("brazo")

@@ -14,7 +14,7 @@ from services.arm.cell.camera_model import believed_info, exact_info, looking, s
 from services.arm.cell.cell_file import Cell, grasp_width, load_cell
 from services.arm.errors import DescriptionError
 from services.arm.frames.transforms import from_message, rotate
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from tests.arm.editing import edit
 
 
@@ -61,7 +61,7 @@ FAULTS = [  # the change, how the line begins that must be named, the sentence
 
 @pytest.mark.parametrize(("old", "new", "at", "sentence"), FAULTS, ids=[new[:30] for _, new, _, _ in FAULTS])
 def test_a_fault_names_the_line_the_thing_and_the_remedy(
-    file: Path, rm1: Arm, old: str, new: str, at: str, sentence: str
+    file: Path, rm1: ArmDescription, old: str, new: str, at: str, sentence: str
 ) -> None:
     edit(file, old, new)
     text = file.read_text()
@@ -71,24 +71,24 @@ def test_a_fault_names_the_line_the_thing_and_the_remedy(
     assert str(file) in str(raised.value)
 
 
-def test_what_is_not_toml_is_said_with_its_line(file: Path, rm1: Arm) -> None:
+def test_what_is_not_toml_is_said_with_its_line(file: Path, rm1: ArmDescription) -> None:
     edit(file, "[[camera]]", "[[camera")
     with pytest.raises(DescriptionError, match=r"not TOML.*line 9"):
         load_cell(file, rm1)
 
 
-def test_a_name_that_is_not_there_gets_the_nearest_one(file: Path, rm1: Arm) -> None:
+def test_a_name_that_is_not_there_gets_the_nearest_one(file: Path, rm1: ArmDescription) -> None:
     cell = load_cell(file, rm1)
     with pytest.raises(DescriptionError, match=r'no \[\[thing\]\] "red_blok"; did you mean "red_block"\?'):
         cell.thing("red_blok")
 
 
-def test_a_cell_file_that_is_not_there_is_said(tmp_path: Path, rm1: Arm) -> None:
+def test_a_cell_file_that_is_not_there_is_said(tmp_path: Path, rm1: ArmDescription) -> None:
     with pytest.raises(DescriptionError, match="there is no such file"):
         load_cell(tmp_path / "cell.toml", rm1)
 
 
-def test_a_camera_looks_where_it_is_told_with_the_parents_z_up(file: Path, rm1: Arm) -> None:
+def test_a_camera_looks_where_it_is_told_with_the_parents_z_up(file: Path, rm1: ArmDescription) -> None:
     turn = looking((0.5, 0.0, 0.5), (0.0, 0.0, 0.0), 0.0)
     assert rotate(turn, (0.0, 0.0, 1.0)) == pytest.approx((-math.sqrt(0.5), 0.0, -math.sqrt(0.5)))
     assert rotate(turn, (1.0, 0.0, 0.0)) == pytest.approx((0.0, 1.0, 0.0))
@@ -99,7 +99,9 @@ def test_a_camera_looks_where_it_is_told_with_the_parents_z_up(file: Path, rm1: 
     assert rotate(rolled, (1.0, 0.0, 0.0)) == pytest.approx(rotate(down, (0.0, 1.0, 0.0)))
 
 
-def test_a_real_camera_is_assumed_until_it_is_measured_and_a_virtual_one_is_exact(file: Path, rm1: Arm) -> None:
+def test_a_real_camera_is_assumed_until_it_is_measured_and_a_virtual_one_is_exact(
+    file: Path, rm1: ArmDescription
+) -> None:
     virtual = load_cell(file, rm1)
     info = believed_info(virtual, virtual.camera("overhead"), rm1.base_frame)
     assert (info.is_calibrated, info.is_mounted, info.parent) == (True, True, "base_link")
@@ -113,7 +115,9 @@ def test_a_real_camera_is_assumed_until_it_is_measured_and_a_virtual_one_is_exac
     assert (info.is_calibrated, info.is_mounted) == (False, False)
 
 
-def test_what_was_measured_comes_back_and_wins_also_over_a_virtual_cameras_truth(file: Path, rm1: Arm) -> None:
+def test_what_was_measured_comes_back_and_wins_also_over_a_virtual_cameras_truth(
+    file: Path, rm1: ArmDescription
+) -> None:
     lens = Calibration(
         size=(1280, 960), intrinsics=(1100.0, 0.0, 640.0, 0.0, 1101.0, 470.0, 0.0, 0.0, 1.0),
         distortion=(0.1, -0.2, 0.0, 0.0, 1e-3), held_out=0.11, focal_sigma=0.36, date="2026-11-23",
@@ -155,13 +159,15 @@ def test_half_the_size_is_the_same_rays() -> None:
         ),
     ],
 )
-def test_a_spoilt_camera_file_is_said_with_the_remedy(file: Path, rm1: Arm, text: str, sentence: str) -> None:
+def test_a_spoilt_camera_file_is_said_with_the_remedy(
+    file: Path, rm1: ArmDescription, text: str, sentence: str
+) -> None:
     file.with_name("camera.toml").write_text(text)
     with pytest.raises(DescriptionError, match=sentence):
         load_cell(file, rm1)
 
 
-def test_an_empty_cell_is_one(tmp_path: Path, rm1: Arm) -> None:
+def test_an_empty_cell_is_one(tmp_path: Path, rm1: ArmDescription) -> None:
     (tmp_path / "cell.toml").write_text("")
     cell = load_cell(tmp_path / "cell.toml", rm1)
     assert cell == Cell(tmp_path / "cell.toml")

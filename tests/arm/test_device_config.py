@@ -19,7 +19,7 @@ from schemas.robot import Sensor
 from services.arm.device.device_config import HEADROOM, device_config, reference_steps
 from services.arm.device.device_parts import sensor_config
 from services.arm.errors import DescriptionError
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 
 TABLES = """
 [[input]]
@@ -77,7 +77,7 @@ def folder(rm1_folder: Path, tmp_path: Path) -> Path:
     return folder
 
 
-def edited(folder: Path, old: str, new: str) -> Arm:
+def edited(folder: Path, old: str, new: str) -> ArmDescription:
     file = folder / "robot.toml"
     assert old in file.read_text()
     file.write_text(file.read_text().replace(old, new, 1))
@@ -107,7 +107,7 @@ def test_everything_of_robot_toml_reaches_the_device(folder: Path) -> None:
     assert (sensor.scale_q16, sensor.offset_milli) == (1_123_942, -500)
 
 
-def test_a_limit_of_the_device_holds_every_knot_that_the_gateway_may_send(rm1: Arm) -> None:
+def test_a_limit_of_the_device_holds_every_knot_that_the_gateway_may_send(rm1: ArmDescription) -> None:
     for joint, told in zip(rm1.joints, device_config(rm1).joints, strict=True):
         assert (told.lower_q8, told.upper_q8) == (joint.steps.to_q8(joint.lower), joint.steps.to_q8(joint.upper))
         for limit, value in ((joint.velocity, told.max_velocity_q8), (joint.acceleration, told.max_acceleration_q8)):
@@ -115,7 +115,7 @@ def test_a_limit_of_the_device_holds_every_knot_that_the_gateway_may_send(rm1: A
             assert -1e-6 <= value - wanted < 1.0
 
 
-def test_text_mode_counts_as_exactly_as_knots_do(rm1: Arm) -> None:
+def test_text_mode_counts_as_exactly_as_knots_do(rm1: ArmDescription) -> None:
     for joint, told in zip(rm1.joints, device_config(rm1).joints, strict=True):
         for position in (joint.lower, joint.upper, 0.1234567):
             units = round(position * 10**7)
@@ -177,13 +177,13 @@ def test_a_joint_without_limits_is_as_free_as_the_wire_and_must_say_how_far_it_l
     assert (first.lower_q8, first.upper_q8) == (-(2**30), 2**30)
 
 
-def test_more_of_a_kind_than_the_device_has_is_refused(rm1: Arm) -> None:
+def test_more_of_a_kind_than_the_device_has_is_refused(rm1: ArmDescription) -> None:
     sensors = tuple(Sensor(name=f"s{i}", kind=SensorKind.ANALOG, pin=i) for i in range(9))
     with pytest.raises(DescriptionError, match=r"9 \[\[sensor\]\].*8"):
         device_config(with_(rm1, sensors=sensors))
 
 
-def test_the_reference_pose_is_whole_steps(rm1: Arm) -> None:
+def test_the_reference_pose_is_whole_steps(rm1: ArmDescription) -> None:
     moved = replace(rm1.joints[0].drive, reference_position=0.5)
     arm = with_(rm1, joints=(with_(rm1.joints[0], drive=moved), *rm1.joints[1:]))
     assert reference_steps(arm) == (1485, 0, 0)

@@ -16,7 +16,7 @@ from services.arm.errors import DescriptionError
 from services.arm.frames.transforms import from_message
 from services.arm.kinematics.chain import link_transforms
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 
 RM1 = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 KINEMATICS = Kinematics(RM1)
@@ -105,7 +105,7 @@ def test_a_shape_that_pinocchio_drops_is_an_error_and_not_free_space(rm1_folder:
         Kinematics(load_arm(folder))
 
 
-def test_the_wrong_number_of_joints_is_an_error(rm1: Arm):
+def test_the_wrong_number_of_joints_is_an_error(rm1: ArmDescription):
     with pytest.raises(ValueError, match="3 joints"):
         KINEMATICS.tool((0.0, 0.0))
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from schemas.robot import Motor, StepperJoint, Transmission
 from services.arm.errors import DescriptionError
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.motors.steps import StepScale, step_scale
 
 Q1 = StepScale(Fraction(93312, 5), math.tau)
@@ -20,18 +20,18 @@ RACK = StepScale(Fraction(400), math.tau * 0.0225)
 SCALES = st.sampled_from([Q1, StepScale(Fraction(400), math.tau), RACK, StepScale(Fraction(6400 * 380, 21), math.tau)])
 
 
-def test_a_step_of_q1_is_exactly_25_1296_of_a_degree(rm1: Arm):
+def test_a_step_of_q1_is_exactly_25_1296_of_a_degree(rm1: ArmDescription):
     scale = rm1.joint("brazo_joint").steps
     assert scale.steps_per_turn == Fraction(93312, 5)
     assert scale.degrees_per_step == Fraction(25, 1296)
     assert 1800 / scale.degrees_per_step == 93312
 
 
-def test_a_step_of_q2_is_exactly_nine_tenths_of_a_degree(rm1: Arm):
+def test_a_step_of_q2_is_exactly_nine_tenths_of_a_degree(rm1: ArmDescription):
     assert rm1.joint("antebrazo_joint").steps.degrees_per_step == Fraction(9, 10)
 
 
-def test_a_step_of_the_rack_is_a_third_of_a_millimetre(rm1: Arm):
+def test_a_step_of_the_rack_is_a_third_of_a_millimetre(rm1: ArmDescription):
     assert rm1.joint("efector_joint").steps.resolution == pytest.approx(0.3534e-3, abs=5e-8)
 
 
@@ -55,7 +55,7 @@ def test_small_moves_add_up_because_targets_are_absolute():
     assert sum(b - a for a, b in pairwise(steps)) == round(float(Q1.steps_per_turn))
 
 
-def test_metres_of_a_rack_are_not_radians(rm1: Arm):
+def test_metres_of_a_rack_are_not_radians(rm1: ArmDescription):
     joint = rm1.joint("efector_joint")
     assert joint.unit == "m"
     assert joint.steps.to_steps(0.040) == pytest.approx(0.040 / (math.tau * 0.0225) * 400)

@@ -10,7 +10,7 @@ from schemas.deployment import DeviceKind
 from services.arm.checks.check import Severity, check
 from services.arm.device.device_config import device_config
 from services.arm.errors import DescriptionError
-from services.arm.model.description import Arm, load_arm, require_motors
+from services.arm.model.description import ArmDescription, load_arm, require_motors
 from services.arm.motors.tick import ROOM, fastest_steps
 from tests.arm.bare_arm import write_bare_arm
 from tests.arm.editing import edit
@@ -82,7 +82,7 @@ def test_half_of_the_motors_is_an_error_that_says_what_is_missing(
     assert str(caught.value) in str(finding)
 
 
-def test_a_real_device_is_refused_with_what_to_write(tmp_path: Path, rm1: Arm):
+def test_a_real_device_is_refused_with_what_to_write(tmp_path: Path, rm1: ArmDescription):
     arm = load_arm(write_bare_arm(tmp_path))
     require_motors(arm, DeviceKind.VIRTUAL)
     require_motors(rm1, DeviceKind.BOARD)

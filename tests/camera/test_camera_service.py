@@ -19,7 +19,7 @@ from schemas.joints import JointState
 from schemas.topics import JOINT_STATES, camera_image, camera_info, camera_status, camera_truth
 from services.arm.cell.camera_file import CAMERA_FILE, write_measured
 from services.arm.errors import DescriptionError
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.camera.main import run
 from services.camera.sources.source import encoded
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
@@ -81,7 +81,7 @@ def running(deployment: Deployment) -> Iterator[tuple[Node, Node]]:
             assert not thread.is_alive()
 
 
-def test_images_lens_and_truth_of_the_virtual_camera_are_heard(deployment: Deployment, rm1: Arm) -> None:
+def test_images_lens_and_truth_of_the_virtual_camera_are_heard(deployment: Deployment, rm1: ArmDescription) -> None:
     images: list[CameraImage] = []
     infos: list[CameraInfo] = []
     truths: list[Detections] = []

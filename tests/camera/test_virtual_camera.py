@@ -19,34 +19,34 @@ from services.arm.cell.camera_model import exact_info
 from services.arm.cell.cell_file import Cell, grasp_width, load_cell
 from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_rpy, inverse
 from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.camera.virtual.virtual_camera import VirtualCamera, base_from_camera, outline, projected, true_detections
 from services.camera.virtual.world import CameraWorld
 
 
 @pytest.fixture(params=["rm1", "parol6"])
-def arm(request: pytest.FixtureRequest, rm1_folder: Path) -> Arm:
+def arm(request: pytest.FixtureRequest, rm1_folder: Path) -> ArmDescription:
     return load_arm(rm1_folder.parent / request.param)
 
 
 @pytest.fixture
-def cell(arm: Arm) -> Cell:
+def cell(arm: ArmDescription) -> Cell:
     return load_cell(arm.folder / "cell.toml", arm)
 
 
 @pytest.fixture
-def world(arm: Arm, cell: Cell) -> CameraWorld:
+def world(arm: ArmDescription, cell: Cell) -> CameraWorld:
     return CameraWorld(arm, cell)
 
 
-def stand(world: CameraWorld, arm: Arm, name: str, stamp: int = 1) -> dict[str, Rigid]:
+def stand(world: CameraWorld, arm: ArmDescription, name: str, stamp: int = 1) -> dict[str, Rigid]:
     """The arm in a named state; the true pose of every link."""
     values = arm.named_states[name]
     world.on_joint_state(JointState(stamp=stamp, name=arm.joint_names, position=values))
     return link_transforms(arm.model, dict(zip(arm.joint_names, values, strict=True)))
 
 
-def image_of(cell: Cell, world: CameraWorld, arm: Arm) -> tuple[np.ndarray, CameraInfo]:
+def image_of(cell: Cell, world: CameraWorld, arm: ArmDescription) -> tuple[np.ndarray, CameraInfo]:
     record = cell.camera("overhead")
     assert isinstance(record.source, VirtualSource)
     info = exact_info(record, arm.base_frame)
@@ -63,7 +63,7 @@ def tags_in(image: np.ndarray) -> dict[int, np.ndarray]:
 
 
 def test_the_tags_of_the_sample_cell_are_found_where_the_truth_has_them(
-    arm: Arm, cell: Cell, world: CameraWorld
+    arm: ArmDescription, cell: Cell, world: CameraWorld
 ) -> None:
     stand(world, arm, "left")
     image, info = image_of(cell, world, arm)
@@ -78,7 +78,7 @@ def test_the_tags_of_the_sample_cell_are_found_where_the_truth_has_them(
 
 
 def test_the_jaws_carry_a_thing_and_let_it_fall_upright_onto_the_table(
-    arm: Arm, cell: Cell, world: CameraWorld
+    arm: ArmDescription, cell: Cell, world: CameraWorld
 ) -> None:
     links = stand(world, arm, "ready")
     tool = links[arm.tool_frame]
@@ -105,7 +105,7 @@ def test_the_jaws_carry_a_thing_and_let_it_fall_upright_onto_the_table(
 
 @pytest.mark.parametrize("offset", [(0.02, 0.0, 0.008), (0.0, 0.03, 0.008), (0.0, 0.0, 0.05)])
 def test_jaws_that_close_beside_a_thing_do_not_hold_it(
-    arm: Arm, cell: Cell, world: CameraWorld, offset: tuple[float, float, float]
+    arm: ArmDescription, cell: Cell, world: CameraWorld, offset: tuple[float, float, float]
 ) -> None:
     tool = stand(world, arm, "ready")[arm.tool_frame]
     there = compose(tool, (offset, IDENTITY[1]))
@@ -118,7 +118,9 @@ def test_jaws_that_close_beside_a_thing_do_not_hold_it(
 
 
 @pytest.mark.parametrize(("turn", "side"), [(0.2, 0.026), (1.4, 0.034), (-1.7, 0.034), (3.0, 0.026)])
-def test_jaws_are_as_far_apart_as_the_side_that_is_between_them(arm: Arm, cell: Cell, turn: float, side: float) -> None:
+def test_jaws_are_as_far_apart_as_the_side_that_is_between_them(
+    arm: ArmDescription, cell: Cell, turn: float, side: float
+) -> None:
     """They close along the tool's y, on the longer side too."""
     block = replace(next(each for each in cell.things if each.name == "red_block"), box=(0.034, 0.026, 0.03))
     world = CameraWorld(arm, Cell(cell.path, things=(block,), table=cell.table))
@@ -136,7 +138,7 @@ def test_jaws_are_as_far_apart_as_the_side_that_is_between_them(arm: Arm, cell: 
     assert world.snapshot().things["red_block"] == fallen
 
 
-def test_closed_jaws_that_come_upon_a_thing_do_not_hold_it(arm: Arm, cell: Cell, world: CameraWorld) -> None:
+def test_closed_jaws_that_come_upon_a_thing_do_not_hold_it(arm: ArmDescription, cell: Cell, world: CameraWorld) -> None:
     tool = stand(world, arm, "ready")[arm.tool_frame]
     world.on_gripper_state(GripperState(known=True, position=0.0))
     there = compose(tool, ((0.0, 0.0, 0.008), IDENTITY[1]))
@@ -147,7 +149,7 @@ def test_closed_jaws_that_come_upon_a_thing_do_not_hold_it(arm: Arm, cell: Cell,
 
 
 def test_obstacles_of_the_scene_are_seen_but_never_what_is_believed_of_a_thing(
-    arm: Arm, cell: Cell, world: CameraWorld
+    arm: ArmDescription, cell: Cell, world: CameraWorld
 ) -> None:
     stand(world, arm, "left")
     before, info = image_of(cell, world, arm)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 from schemas.device import DeviceState
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.chaos.invariants import jerks, jumps, misses, missing_records, moved, segments
 
 SLOT = 20_000  # [us] between two states
 BASE = 7  # boot id
 
 
-def states(arm: Arm, counts: list[int], boot: int = BASE, start: int = 0) -> list[DeviceState]:
+def states(arm: ArmDescription, counts: list[int], boot: int = BASE, start: int = 0) -> list[DeviceState]:
     """The first joint's counter in states 20 ms apart; the others stand at 0."""
     rest = (0,) * (len(arm.joints) - 1)
     return [
@@ -21,20 +21,20 @@ def states(arm: Arm, counts: list[int], boot: int = BASE, start: int = 0) -> lis
     ]
 
 
-def ramp(arm: Arm, share: float, count: int = 12) -> list[int]:
+def ramp(arm: ArmDescription, share: float, count: int = 12) -> list[int]:
     """Counters of the first joint as it accelerates from rest at `share` of its limit."""
     joint = arm.joints[0]
     pull = share * joint.acceleration * joint.steps.per_unit
     return [round(pull * (i * SLOT * 1e-6) ** 2 / 2.0) for i in range(count)]
 
 
-def test_an_arm_within_its_limits_neither_jumps_nor_jerks(rm1: Arm) -> None:
+def test_an_arm_within_its_limits_neither_jumps_nor_jerks(rm1: ArmDescription) -> None:
     seen = states(rm1, ramp(rm1, 1.0, 5))
     assert jumps(rm1, seen) == []
     assert jerks(rm1, seen) == []
 
 
-def test_a_step_beyond_the_velocity_limit_is_a_jump(rm1: Arm) -> None:
+def test_a_step_beyond_the_velocity_limit_is_a_jump(rm1: ArmDescription) -> None:
     joint = rm1.joints[0]
     most = joint.velocity * joint.steps.per_unit * 0.021
     assert jumps(rm1, states(rm1, [0, int(most)])) == []
@@ -42,19 +42,19 @@ def test_a_step_beyond_the_velocity_limit_is_a_jump(rm1: Arm) -> None:
     assert found.startswith(f"{joint.name} went +")
 
 
-def test_twice_the_acceleration_is_a_jerk(rm1: Arm) -> None:
+def test_twice_the_acceleration_is_a_jerk(rm1: ArmDescription) -> None:
     assert jerks(rm1, states(rm1, ramp(rm1, 1.2))) == []
     assert jerks(rm1, states(rm1, ramp(rm1, 6.0)))
 
 
-def test_a_stop_from_one_slot_to_the_next_is_a_jerk(rm1: Arm) -> None:
+def test_a_stop_from_one_slot_to_the_next_is_a_jerk(rm1: ArmDescription) -> None:
     joint = rm1.joints[0]
     fast = round(0.8 * joint.velocity * joint.steps.per_unit * 0.02)
     (found,) = jerks(rm1, states(rm1, [0, fast, 2 * fast, 3 * fast, 3 * fast, 3 * fast]))
     assert "at once" in found
 
 
-def test_a_boot_a_reference_and_a_late_machine_begin_a_new_segment(rm1: Arm) -> None:
+def test_a_boot_a_reference_and_a_late_machine_begin_a_new_segment(rm1: ArmDescription) -> None:
     before, after = states(rm1, [100, 100]), states(rm1, [0, 0], boot=BASE + 1)
     assert [len(piece) for piece in segments(before + after, [])] == [2, 2]
     long = states(rm1, [0] * 10)
@@ -62,12 +62,12 @@ def test_a_boot_a_reference_and_a_late_machine_begin_a_new_segment(rm1: Arm) -> 
     assert len(segments(long, [long[5].stamp])) > 1
 
 
-def test_a_state_that_is_said_twice_counts_once(rm1: Arm) -> None:
+def test_a_state_that_is_said_twice_counts_once(rm1: ArmDescription) -> None:
     first, second = states(rm1, [0, 5])
     assert segments([first, first, second], []) == [[first, second]]
 
 
-def test_what_moved_by_itself_and_what_was_falsely_reached_is_named(rm1: Arm) -> None:
+def test_what_moved_by_itself_and_what_was_falsely_reached_is_named(rm1: ArmDescription) -> None:
     rest = tuple(0.0 for _ in rm1.joints)
     away = (0.01, *rest[1:])
     assert moved(rm1, rest, rest) == []

@@ -37,7 +37,7 @@ from schemas.topics import (
     PLAN,
     STEP_ERRORS,
 )
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.cli.session import CommandSession
 from services.planner.core import Planner
 from services.runtime.actions import accept, refuse
@@ -51,7 +51,7 @@ MOVE_TIME = 0.4  # [s] that every goal takes here
 class PretendGateway:
     """Accepts goals, and ends each after a while as it was told to."""
 
-    def __init__(self, node: Node, arm: Arm) -> None:
+    def __init__(self, node: Node, arm: ArmDescription) -> None:
         self.ends_as = GoalStatusCode.SUCCEEDED
         self.reason = ""
         self.refusal = ""
@@ -109,7 +109,7 @@ class PretendGateway:
 
 
 @pytest.fixture(scope="session")
-def arm() -> Arm:
+def arm() -> ArmDescription:
     return load_arm(Path(__file__).parents[2] / "urdf/rm1")
 
 
@@ -124,7 +124,7 @@ def deployment(tmp_path: Path) -> Deployment:
 
 
 @pytest.fixture
-def gateway(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[PretendGateway]:
+def gateway(arm: ArmDescription, network: MemoryNetwork, deployment: Deployment) -> Iterator[PretendGateway]:
     with Node("stepper_gateway", deployment, robot="rm1", bus=MemoryBus(network)) as node:
         made = PretendGateway(node, arm)
         with spinning(node, made.step):
@@ -132,7 +132,7 @@ def gateway(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterato
 
 
 @pytest.fixture
-def planner(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[None]:
+def planner(arm: ArmDescription, network: MemoryNetwork, deployment: Deployment) -> Iterator[None]:
     core = Planner(arm)
     home = JointState(name=arm.joint_names, position=(0.0,) * len(arm.joints))
     core.plan(PlanRequest(), home)  # the first one loads libraries, which may take longer than a caller waits
@@ -147,13 +147,13 @@ def planner(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterato
 
 
 @pytest.fixture
-def session(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[CommandSession]:
+def session(arm: ArmDescription, network: MemoryNetwork, deployment: Deployment) -> Iterator[CommandSession]:
     with Node("cli-1", deployment, robot="rm1", bus=MemoryBus(network)) as node:
         yield CommandSession(deployment, arm, node)
 
 
 @pytest.fixture
-def connected(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[gemelo.Arm]:
+def connected(arm: ArmDescription, network: MemoryNetwork, deployment: Deployment) -> Iterator[gemelo.Arm]:
     """The arm as the commands have it."""
     node = Node("cli-2", deployment, robot="rm1", bus=MemoryBus(network), log_level="warning")
     with gemelo.Arm(ArmSession(deployment, arm, node)) as made:

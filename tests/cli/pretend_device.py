@@ -37,7 +37,7 @@ from schemas.topics import (
     DEVICE_STOP,
     SENSORS,
 )
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.runtime.node import Node
 
 TO_HOME = 0.15  # [s] for every joint
@@ -46,7 +46,7 @@ TO_HOME = 0.15  # [s] for every joint
 class PretendDevice:
     """Does at once what it is asked; homes one joint after another, or comes to `homing_fault` at the second."""
 
-    def __init__(self, node: Node, arm: Arm) -> None:
+    def __init__(self, node: Node, arm: ArmDescription) -> None:
         self.arm, self._node = arm, node
         self.asked: list[DeviceCommand | StopKind] = []
         self.pressed: list[InjectRequest] = []

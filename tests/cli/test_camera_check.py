@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gemelo import Pose, Seen
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.cli import camera_check
 from services.cli.errors import ExitCode
 from services.cli.main import run
@@ -31,7 +31,7 @@ class Scene:
 class Pointer:
     """An arm that goes where it is told, and remembers."""
 
-    def __init__(self, description: Arm, seen: tuple[Seen, ...]) -> None:
+    def __init__(self, description: ArmDescription, seen: tuple[Seen, ...]) -> None:
         self.description, self.seen = description, seen
         self.joint_names = description.joint_names
         self.joints = dict.fromkeys(self.joint_names, 0.1)

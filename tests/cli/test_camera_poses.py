@@ -17,7 +17,7 @@ from schemas.cell import TagRecord
 from services.arm.cell.camera_file import CAMERA_FILE, MOUNT_BOARD
 from services.arm.cell.camera_model import believed_info
 from services.arm.cell.cell_file import load_cell
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.bench.vision.mount_images import (
     OFF,
     Setup,
@@ -44,7 +44,7 @@ class Shown:
     """An arm that stands where it was sent, and its camera."""
 
     sight: Sight
-    description: Arm
+    description: ArmDescription
     start: tuple[float, ...]
     went: list[tuple[float, ...]] = field(default_factory=list)
     hidden: set[int] = field(default_factory=set)  # of its motions: after these nothing is seen
@@ -130,11 +130,11 @@ def show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
     return start
 
 
-def parol6() -> Arm:
+def parol6() -> ArmDescription:
     return load_arm(ROOT / "urdf/parol6")
 
 
-def rm1() -> Arm:
+def rm1() -> ArmDescription:
     return load_arm(ROOT / "urdf/rm1")
 
 

@@ -20,7 +20,7 @@ from services.arm.cell.camera_file import CAMERA_FILE
 from services.arm.cell.camera_model import believed_info, exact_info
 from services.arm.cell.cell_file import load_cell
 from services.arm.frames.transforms import from_rpy
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.vision import images
 from services.bench.vision.images import Surface, render
 from services.camera.virtual.virtual_camera import VirtualCamera
@@ -109,7 +109,7 @@ def test_a_bar_that_cannot_be_is_refused(cell: Path, tmp_path: Path, capsys: pyt
     assert "the bar of 100 mm was measured as 10 mm" in capsys.readouterr().err
 
 
-def shots(info_path: Path, arm: Arm, tilt: float, count: int) -> Iterator[GreyImage]:
+def shots(info_path: Path, arm: ArmDescription, tilt: float, count: int) -> Iterator[GreyImage]:
     """Images of the chess board at random places before the cell's camera."""
     record = load_cell(info_path, arm).camera("overhead")
     model = model_of(exact_info(record, arm.base_frame))
@@ -124,7 +124,7 @@ def shots(info_path: Path, arm: Arm, tilt: float, count: int) -> Iterator[GreyIm
 
 def test_tilted_shots_give_the_lens_and_flat_ones_are_refused(
     cell: Path,
-    rm1: Arm,
+    rm1: ArmDescription,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -149,7 +149,7 @@ def test_tilted_shots_give_the_lens_and_flat_ones_are_refused(
 
 
 def test_a_camera_that_streams_is_calibrated_by_shots_that_stand_still_and_differ_until_it_is_enough(
-    cell: Path, rm1: Arm, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    cell: Path, rm1: ArmDescription, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(images, "SAMPLES", 3)
     taken: list[GreyImage] = []
@@ -186,7 +186,7 @@ class Hand:
 
 
 def touched(
-    cell: Path, arm: Arm, board: TagBoard, off: float, monkeypatch: pytest.MonkeyPatch, *options: str
+    cell: Path, arm: ArmDescription, board: TagBoard, off: float, monkeypatch: pytest.MonkeyPatch, *options: str
 ) -> ExitCode:
     """`gemelo camera mount` where a person touches nine points of the board, `off` [m] beside them."""
     known = load_cell(cell, arm)
@@ -219,7 +219,7 @@ def touched(
     return run(["camera", "mount", "overhead", *options])
 
 
-def off_by(cell: Path, arm: Arm) -> float:
+def off_by(cell: Path, arm: ArmDescription) -> float:
     """[m] of points over the table, seen by the camera as it is believed to stand."""
     record = load_cell(cell, arm).camera("overhead")
     found = believed_info(load_cell(cell, arm), record, arm.base_frame)
@@ -233,7 +233,7 @@ def off_by(cell: Path, arm: Arm) -> float:
 @pytest.mark.parametrize(("off", "code"), [(0.0003, ExitCode.OK), (0.02, ExitCode.FAILED)])
 def test_touched_tags_tell_where_the_camera_stands_and_bad_ones_write_nothing(
     cell: Path,
-    rm1: Arm,
+    rm1: ArmDescription,
     off: float,
     code: ExitCode,
     monkeypatch: pytest.MonkeyPatch,
@@ -254,7 +254,7 @@ def test_touched_tags_tell_where_the_camera_stands_and_bad_ones_write_nothing(
 
 @pytest.mark.parametrize("bar", ["108mm", "100mm"])
 def test_a_board_that_was_printed_too_large_is_measured_by_its_bar(
-    cell: Path, rm1: Arm, bar: str, monkeypatch: pytest.MonkeyPatch
+    cell: Path, rm1: ArmDescription, bar: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     printed = tag_board("108mm")
     cell.write_text(CELL + tags_of(printed))

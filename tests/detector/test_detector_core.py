@@ -17,7 +17,7 @@ from services.arm.cell.camera_model import believed_info, exact_info
 from services.arm.cell.cell_file import Cell, load_cell
 from services.arm.cell.colours import RGB, nearest_colour
 from services.arm.frames.transforms import from_rpy
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.camera.virtual.virtual_camera import VirtualCamera, true_detections
 from services.camera.virtual.world import CameraWorld
 from services.detector.core import Detector
@@ -27,19 +27,19 @@ ON_PLANE, OF_BOX = 0.1e-3, 0.5e-3  # [m]
 
 
 @pytest.fixture(params=["rm1", "parol6"])
-def arm(request: pytest.FixtureRequest, rm1_folder: Path) -> Arm:
+def arm(request: pytest.FixtureRequest, rm1_folder: Path) -> ArmDescription:
     return load_arm(rm1_folder.parent / request.param)
 
 
 @pytest.fixture
-def rm1(rm1_folder: Path) -> Arm:
+def rm1(rm1_folder: Path) -> ArmDescription:
     return load_arm(rm1_folder)
 
 
 class Table:
     """A cell with its world, its camera and its detector."""
 
-    def __init__(self, arm: Arm, cell: Cell | None = None, believed: Cell | None = None) -> None:
+    def __init__(self, arm: ArmDescription, cell: Cell | None = None, believed: Cell | None = None) -> None:
         """`believed`: what the detector is told, where that is not the truth."""
         self.cell = cell or load_cell(arm.folder / "cell.toml", arm)
         self.world = CameraWorld(arm, self.cell)
@@ -78,7 +78,7 @@ def changed(cell: Cell, **fields: object) -> Cell:
     return Cell(**{name: getattr(cell, name) for name in Cell.__dataclass_fields__} | fields)
 
 
-def test_every_thing_of_the_sample_cells_is_found_where_it_is(arm: Arm) -> None:
+def test_every_thing_of_the_sample_cells_is_found_where_it_is(arm: ArmDescription) -> None:
     table = Table(arm)
     found, truth = table.look(), table.truth()
     assert {thing.name for thing in table.cell.things} <= set(names(found))
@@ -90,7 +90,7 @@ def test_every_thing_of_the_sample_cells_is_found_where_it_is(arm: Arm) -> None:
             assert item.is_located
 
 
-def test_a_tag_that_does_not_lie_is_measured_in_space(rm1: Arm) -> None:
+def test_a_tag_that_does_not_lie_is_measured_in_space(rm1: ArmDescription) -> None:
     """At one place the virtual camera's coarse samples are the error, so it is asked at many."""
     table, random, errors = Table(rm1), np.random.default_rng(1), []
     table.world.on_joint_state(JointState(stamp=1, name=rm1.joint_names, position=rm1.named_states["folded"]))
@@ -105,7 +105,7 @@ def test_a_tag_that_does_not_lie_is_measured_in_space(rm1: Arm) -> None:
     assert np.median(errors) < 0.6e-3
 
 
-def test_where_the_camera_stands_is_not_known_only_tags_are_found_and_in_its_own_frame(rm1: Arm) -> None:
+def test_where_the_camera_stands_is_not_known_only_tags_are_found_and_in_its_own_frame(rm1: ArmDescription) -> None:
     table = Table(rm1)
     found = table.look(where=None)
     assert {"cup", "tag 100"} <= set(names(found))
@@ -115,7 +115,7 @@ def test_where_the_camera_stands_is_not_known_only_tags_are_found_and_in_its_own
     assert np.linalg.norm(away) < 4.0 * cup.sigma < 4e-3
 
 
-def test_a_camera_that_was_moved_is_noticed_by_the_fixed_tags(rm1: Arm) -> None:
+def test_a_camera_that_was_moved_is_noticed_by_the_fixed_tags(rm1: ArmDescription) -> None:
     cell = load_cell(rm1.folder / "cell.toml", rm1)
     camera = cell.camera("overhead")
     moved = replace(
@@ -128,13 +128,13 @@ def test_a_camera_that_was_moved_is_noticed_by_the_fixed_tags(rm1: Arm) -> None:
     assert "moved" in found.doubt
 
 
-def test_a_wrong_tag_size_is_noticed_by_the_fixed_tags(rm1: Arm) -> None:
+def test_a_wrong_tag_size_is_noticed_by_the_fixed_tags(rm1: ArmDescription) -> None:
     cell = load_cell(rm1.folder / "cell.toml", rm1)
     wrong = tuple(replace(tag, size=0.05) for tag in cell.tags)
     assert "mm away from its place" in Table(rm1, cell, believed=changed(cell, tags=wrong)).look().doubt
 
 
-def test_two_tags_of_one_number_are_both_told(rm1: Arm) -> None:
+def test_two_tags_of_one_number_are_both_told(rm1: ArmDescription) -> None:
     table = Table(rm1)
     image = table.image().copy()
     corners = np.array(table.truth()["cup"].corners)
@@ -145,12 +145,12 @@ def test_two_tags_of_one_number_are_both_told(rm1: Arm) -> None:
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02])
-def test_in_the_dark_nothing_is_found(rm1: Arm, share: float) -> None:
+def test_in_the_dark_nothing_is_found(rm1: ArmDescription, share: float) -> None:
     table = Table(rm1)
     assert table.look((table.image() * share).astype(np.uint8)).items == ()
 
 
-def test_glare_on_a_tag_hides_it_and_moves_nothing_else(rm1: Arm) -> None:
+def test_glare_on_a_tag_hides_it_and_moves_nothing_else(rm1: ArmDescription) -> None:
     table = Table(rm1)
     image = table.image().copy()
     middle = np.array(table.truth()["cup"].corners).mean(axis=0)
@@ -160,7 +160,7 @@ def test_glare_on_a_tag_hides_it_and_moves_nothing_else(rm1: Arm) -> None:
     assert {"red_block", "blue_block", "tray"} <= set(names(found))
 
 
-def test_a_block_that_is_half_hidden_is_not_told_to_be_elsewhere(rm1: Arm) -> None:
+def test_a_block_that_is_half_hidden_is_not_told_to_be_elsewhere(rm1: ArmDescription) -> None:
     table = Table(rm1)
     image = table.image().copy()
     corners = np.array(table.truth()["red_block"].corners)
@@ -170,7 +170,7 @@ def test_a_block_that_is_half_hidden_is_not_told_to_be_elsewhere(rm1: Arm) -> No
         assert item.name != "red_block" or off(item, table.truth()["red_block"]) < 2e-3
 
 
-def test_a_block_behind_a_post_is_told_to_be_unclear_with_its_place_in_the_image_and_why(rm1: Arm) -> None:
+def test_a_block_behind_a_post_is_told_to_be_unclear_with_its_place_in_the_image_and_why(rm1: ArmDescription) -> None:
     """Half of it is seen: too little to measure, and too much to say that nothing is there."""
     table = Table(rm1)
     corners = np.array(table.truth()["red_block"].corners)
@@ -189,7 +189,7 @@ def test_a_block_behind_a_post_is_told_to_be_unclear_with_its_place_in_the_image
 
 
 @pytest.mark.parametrize("colour", list(Colour))
-def test_one_colour_is_not_taken_for_another(rm1: Arm, colour: Colour) -> None:
+def test_one_colour_is_not_taken_for_another(rm1: ArmDescription, colour: Colour) -> None:
     cell = load_cell(rm1.folder / "cell.toml", rm1)
     things = tuple(
         ColourThing(name=each.value, colour=each, box=(0.03, 0.03, 0.03), position=(0.3, -0.12, 0.015))
@@ -201,7 +201,7 @@ def test_one_colour_is_not_taken_for_another(rm1: Arm, colour: Colour) -> None:
     assert nearest_colour(RGB[colour]) is colour
 
 
-def test_a_box_is_found_by_standing_out_from_the_table_and_is_no_tagged_or_coloured_one(rm1: Arm) -> None:
+def test_a_box_is_found_by_standing_out_from_the_table_and_is_no_tagged_or_coloured_one(rm1: ArmDescription) -> None:
     cell = load_cell(rm1.folder / "cell.toml", rm1)
     wood = BoxThing(name="wood", box=(0.05, 0.03, 0.025), position=(0.36, 0.14, 0.0125), yaw=0.7)
     table = Table(rm1, changed(cell, things=(*cell.things, wood)))
@@ -212,7 +212,7 @@ def test_a_box_is_found_by_standing_out_from_the_table_and_is_no_tagged_or_colou
 
 
 @pytest.mark.parametrize("box", [(0.03, 0.026, 0.03), (0.026, 0.03, 0.03), (0.04, 0.02, 0.03), (0.03, 0.03, 0.03)])
-def test_a_block_is_found_however_it_is_turned(rm1: Arm, box: tuple[float, float, float]) -> None:
+def test_a_block_is_found_however_it_is_turned(rm1: ArmDescription, box: tuple[float, float, float]) -> None:
     """Of nearly equal sides too: which is which must not be guessed from the region alone."""
     random = np.random.default_rng(5)
     cell = load_cell(rm1.folder / "cell.toml", rm1)
@@ -228,20 +228,20 @@ def test_a_block_is_found_however_it_is_turned(rm1: Arm, box: tuple[float, float
         assert off(found["red_block"], table.truth()["red_block"]) < OF_BOX
 
 
-def test_an_image_of_another_size_is_refused_with_both_sizes(rm1: Arm) -> None:
+def test_an_image_of_another_size_is_refused_with_both_sizes(rm1: ArmDescription) -> None:
     table = Table(rm1)
     with pytest.raises(ValueError, match="its image is 320 x 240, not 640 x 480 pixels"):
         table.look(cv2.resize(table.image(), (320, 240)))
 
 
-def test_a_camera_without_a_lens_is_refused(rm1: Arm) -> None:
+def test_a_camera_without_a_lens_is_refused(rm1: ArmDescription) -> None:
     table = Table(rm1)
     table.info = CameraInfo(name="overhead", width=640, height=480)
     with pytest.raises(ValueError, match="9"):
         table.look()
 
 
-def test_a_thing_that_is_not_on_the_table_is_not_found(rm1: Arm) -> None:
+def test_a_thing_that_is_not_on_the_table_is_not_found(rm1: ArmDescription) -> None:
     cell = load_cell(rm1.folder / "cell.toml", rm1)
     empty = changed(cell, things=tuple(replace(thing, position=None) for thing in cell.things))
     found = Table(rm1, empty, believed=cell).look()

@@ -22,7 +22,7 @@ from services.arm.cell.camera_model import believed_info
 from services.arm.cell.cell_file import Cell, load_cell
 from services.arm.frames.transforms import compose, from_message, from_rpy, inverse, to_message
 from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.camera.sources.source import encoded
 from services.camera.virtual.virtual_camera import VirtualCamera
 from services.camera.virtual.world import CameraWorld
@@ -36,12 +36,12 @@ from tests.runtime.test_clock_offset import Skewed
 
 
 @pytest.fixture
-def arm(rm1_folder: Path) -> Arm:
+def arm(rm1_folder: Path) -> ArmDescription:
     return load_arm(rm1_folder)
 
 
 @pytest.fixture
-def cell(arm: Arm) -> Cell:
+def cell(arm: ArmDescription) -> Cell:
     return load_cell(arm.folder / "cell.toml", arm)
 
 
@@ -67,7 +67,7 @@ def running(deployment: Deployment, network: MemoryNetwork | None = None) -> Ite
             thread.join(10.0)
 
 
-def picture(arm: Arm, cell: Cell) -> tuple[bytes, CameraInfo]:
+def picture(arm: ArmDescription, cell: Cell) -> tuple[bytes, CameraInfo]:
     """The sample cell as its camera sees it, with the arm aside."""
     record, world = cell.camera("overhead"), CameraWorld(arm, cell)
     world.on_joint_state(JointState(stamp=1, name=arm.joint_names, position=arm.named_states["folded"]))
@@ -78,7 +78,7 @@ def picture(arm: Arm, cell: Cell) -> tuple[bytes, CameraInfo]:
 
 
 def test_an_image_becomes_the_things_in_it_and_none_becomes_a_sentence(
-    arm: Arm, cell: Cell, deployment: Deployment
+    arm: ArmDescription, cell: Cell, deployment: Deployment
 ) -> None:
     data, info = picture(arm, cell)
     with running(deployment) as camera:
@@ -117,7 +117,7 @@ def test_without_a_cell_it_stands_aside(tmp_path: Path) -> None:
         assert hear(camera, lambda: any("detector" in path.name for path in ready.rglob("*")))
 
 
-def test_a_camera_on_a_link_is_where_the_link_was_when_it_took_the_image(arm: Arm) -> None:
+def test_a_camera_on_a_link_is_where_the_link_was_when_it_took_the_image(arm: ArmDescription) -> None:
     local = ((0.02, 0.0, 0.03), from_rpy(0.1, 0.2, 0.3))
     info = CameraInfo(
         name="hand", parent=arm.tool_frame, parent_from_camera=to_message(local), is_mounted=True, width=4, height=4
@@ -151,7 +151,7 @@ def test_grey_and_coloured_rows_are_read() -> None:
 
 @pytest.mark.parametrize("ahead", [0.0, 5.0, -5.0])
 def test_an_image_and_the_state_of_its_moment_meet_whatever_the_clocks_of_their_hosts_say(
-    arm: Arm, cell: Cell, tmp_path: Path, ahead: float
+    arm: ArmDescription, cell: Cell, tmp_path: Path, ahead: float
 ) -> None:
     """The camera rides on the tool, so where a thing is depends on the joint state of the image's own moment."""
     text = cell.path.read_text().replace('name = "overhead"', f'name = "hand"\nparent = "{arm.tool_frame}"', 1)

@@ -21,7 +21,7 @@ from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig
 from schemas.robot import Motor, PullOut
 from services.arm.device.device_config import device_config, reference_steps
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 
 SECONDS = 600
 REAL_SECONDS = int(os.environ.get("GEMELO_SIX_JOINTS_SECONDS", "10"))
@@ -35,11 +35,11 @@ RESTS_WITHIN = 2  # [steps] asin(0.02 / 0.45) of a cycle of 128
 
 
 @pytest.fixture(scope="module")
-def parol6(rm1_folder: Path) -> Arm:
+def parol6(rm1_folder: Path) -> ArmDescription:
     return load_arm(rm1_folder.parent / "parol6")
 
 
-def motors(arm: Arm) -> list[Motor]:
+def motors(arm: ArmDescription) -> list[Motor]:
     return [msgspec.structs.replace(joint.drive.motor, pull_out=CURVE) for joint in arm.joints]
 
 
@@ -69,7 +69,7 @@ def _width(config: DeviceConfig, j: int, here: int, rate: float) -> float:
     return min(fastest, 0.45 * up) if up >= down else -min(fastest, 0.45 * down)
 
 
-def test_ten_minutes_of_six_joints_make_every_step_at_the_shafts_too(parol6: Arm):
+def test_ten_minutes_of_six_joints_make_every_step_at_the_shafts_too(parol6: ArmDescription):
     config, middle = device_config(parol6), reference_steps(parol6)
     bench = Bench(config, motors=motors(parol6), steps=middle)
     bench.run(config.enable_lead_ms + 100)
@@ -122,7 +122,7 @@ def six(tmp_path: Path) -> Iterator[Bed]:
         yield bed
 
 
-def test_six_joints_in_real_time_through_mosquitto_make_every_step(six: Bed, parol6: Arm):
+def test_six_joints_in_real_time_through_mosquitto_make_every_step(six: Bed, parol6: ArmDescription):
     config, middle = device_config(parol6), reference_steps(parol6)
     six.start_device()
     boot, process = six.status["boot_id"], six.process

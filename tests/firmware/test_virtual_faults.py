@@ -14,7 +14,7 @@ from bed_firmware import Bed, wait_for
 from schemas.device import DeviceCommandKind, DeviceMode, InjectKind
 from schemas.device_config import DeviceConfig, config_text
 from services.arm.device.device_config import device_config
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 OK = 0
 
@@ -24,7 +24,7 @@ def mode_of(bed: Bed) -> DeviceMode:
     return DeviceMode(bed.answer("state")[16])
 
 
-def slower(arm: Arm) -> DeviceConfig:
+def slower(arm: ArmDescription) -> DeviceConfig:
     """rm1's configuration with another heartbeat."""
     return msgspec.structs.replace(device_config(arm), hold_timeout_ms=400)
 
@@ -134,7 +134,7 @@ def test_a_clock_that_drifts_is_fast_by_as_much(bed: Bed):
     assert 0.002 < device / ours - 1.0 < 0.018  # 1 %, to 32 ms of luck
 
 
-def test_a_configuration_is_taken_disarmed_and_kept_over_a_restart(bed: Bed, rm1: Arm):
+def test_a_configuration_is_taken_disarmed_and_kept_over_a_restart(bed: Bed, rm1: ArmDescription):
     bed.start_device()
     assert bed.status["config_crc32"] == zlib.crc32(config_text(device_config(rm1)))
     text = config_text(slower(rm1))

@@ -19,7 +19,7 @@ from firmware.bindings.device import CoreDevice
 from schemas.device import DeviceCommandKind, DeviceMode, InjectKind
 from schemas.device_config import DeviceConfig, config_text
 from services.arm.device.device_config import device_config
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 
 ACK, CMD_ACK, SYNC_R, STATE = 2, 4, 7, 8
@@ -35,11 +35,11 @@ def kinds(data: bytes) -> set[int]:
     return {frame[2] for frame in PacketDecoder().feed(data)}
 
 
-def other(arm: Arm) -> DeviceConfig:
+def other(arm: ArmDescription) -> DeviceConfig:
     return msgspec.structs.replace(device_config(arm), hold_timeout_ms=400)
 
 
-def test_an_answer_goes_where_the_question_came_from_and_states_where_the_heartbeat_was(rm1: Arm):
+def test_an_answer_goes_where_the_question_came_from_and_states_where_the_heartbeat_was(rm1: ArmDescription):
     device = CoreDevice(device_config(rm1), boot_id=BOOT)
     device.attach_line()
     device.receive_serial(packet(heartbeat(1)))
@@ -61,7 +61,7 @@ def test_an_answer_goes_where_the_question_came_from_and_states_where_the_heartb
     assert STATE not in kinds(device.take_serial())
 
 
-def test_a_move_over_the_line_arrives_to_the_step(rm1: Arm):
+def test_a_move_over_the_line_arrives_to_the_step(rm1: ArmDescription):
     device = CoreDevice(device_config(rm1), boot_id=BOOT)
     device.attach_line()
     device.advance(300_000)
@@ -79,7 +79,7 @@ def test_a_move_over_the_line_arrives_to_the_step(rm1: Arm):
     assert device.mode == DeviceMode.IDLE
 
 
-def test_a_line_of_text_moves_the_joints_and_is_acknowledged(rm1: Arm):
+def test_a_line_of_text_moves_the_joints_and_is_acknowledged(rm1: ArmDescription):
     device = CoreDevice(device_config(rm1), boot_id=BOOT)
     device.attach_line()
     device.advance(300_000)
@@ -92,7 +92,7 @@ def test_a_line_of_text_moves_the_joints_and_is_acknowledged(rm1: Arm):
     assert device.steps[0] == pytest.approx(joint.steps.to_steps(0.05), abs=1)
 
 
-def test_a_configuration_over_the_line_is_taken_by_a_device_that_has_none(rm1: Arm):
+def test_a_configuration_over_the_line_is_taken_by_a_device_that_has_none(rm1: ArmDescription):
     device = CoreDevice(None, boot_id=BOOT)
     device.attach_line()
     device.advance(50_000)
@@ -185,7 +185,9 @@ def test_credentials_that_cannot_be_are_refused_without_saying_them_again(
     assert not (bed.folder / "run/virtual_esp32_flash.json").exists()
 
 
-def test_a_factory_reset_forgets_all_and_a_configuration_brings_it_back(bed: Bed, line: SerialPort, rm1: Arm):
+def test_a_factory_reset_forgets_all_and_a_configuration_brings_it_back(
+    bed: Bed, line: SerialPort, rm1: ArmDescription
+):
     text = config_text(other(rm1))
     line.send_json(JsonFrame.PROVISION, {"factory_reset": True})
     assert line.json(JsonFrame.PROVISION_ACK)["accepted"] is True

@@ -12,7 +12,7 @@ from firmware.bindings.injection import InjectRefused
 from schemas.device import DeviceCommandKind, DeviceMode, InjectKind
 from schemas.device_config import DeviceConfig, HomingConfig, InputConfig, InputRole, JointConfig
 from services.arm.device.device_config import device_config
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 OK, NOT_READY, NOT_ARMED, ESTOP_PRESSED = 0, 12, 17, 18
 CYCLE = 8  # [steps] by which a motor of rm1 slips
@@ -26,7 +26,7 @@ HOME, ARM, DISARM, RESET, OUTPUT = (
 LEAD = 300  # [ms] and a little more from energised drivers to motion
 
 
-def rm1_bench(arm: Arm, shaft: tuple[int, ...] = (0, 0, 0), referenced: bool = True) -> Bench:
+def rm1_bench(arm: ArmDescription, shaft: tuple[int, ...] = (0, 0, 0), referenced: bool = True) -> Bench:
     """rm1's device with its motors, energised for long enough."""
     motors = [joint.drive.motor for joint in arm.joints]
     bench = Bench(device_config(arm), motors=motors, shaft=shaft, referenced=referenced)
@@ -51,7 +51,7 @@ def six_joints() -> DeviceConfig:
 
 
 @pytest.mark.parametrize("shaft", [(0, 0, 0), (5000, -120, 300), (-8000, 150, 20)])
-def test_rm1_finds_its_place_from_anywhere(rm1: Arm, shaft: tuple[int, ...]):
+def test_rm1_finds_its_place_from_anywhere(rm1: ArmDescription, shaft: tuple[int, ...]):
     bench = rm1_bench(rm1, shaft=shaft, referenced=False)
     assert bench.device.mode == DeviceMode.UNREFERENCED
     assert bench.order(HOME) == OK
@@ -78,7 +78,7 @@ def test_six_joints_find_their_places_two_by_two(seed: int):
 
 
 @pytest.mark.parametrize("slip", [37, -37])
-def test_homing_proves_steps_that_were_lost(rm1: Arm, slip: int):
+def test_homing_proves_steps_that_were_lost(rm1: ArmDescription, slip: int):
     bench = rm1_bench(rm1)
     assert bench.move((2000, 40, 60), 3.0) == OK
     bench.run(1500)
@@ -135,7 +135,7 @@ def test_a_home_switch_that_a_hand_presses_is_not_passed():
     assert bench.details("passed") == []
 
 
-def test_a_motor_that_is_asked_for_more_than_it_has_loses_cycles_and_only_the_shaft_knows(rm1: Arm):
+def test_a_motor_that_is_asked_for_more_than_it_has_loses_cycles_and_only_the_shaft_knows(rm1: ArmDescription):
     config = device_config(rm1)
     fast = [JointConfig(name=j.name, lower_q8=-(1 << 30), upper_q8=1 << 30, max_velocity_q8=256 * 24_000,
             max_acceleration_q8=256 * 4_000_000) for j in config.joints]  # fmt: skip
@@ -149,7 +149,7 @@ def test_a_motor_that_is_asked_for_more_than_it_has_loses_cycles_and_only_the_sh
     assert bench.device.max_slot_error <= 128  # the device itself did all it was told
 
 
-def test_a_joint_that_is_held_fast_loses_its_steps(rm1: Arm):
+def test_a_joint_that_is_held_fast_loses_its_steps(rm1: ArmDescription):
     bench = rm1_bench(rm1)
     bench.press(InjectKind.BLOCK, "q1")
     assert bench.move((1003, 10, 10), 2.0) == OK
@@ -161,7 +161,7 @@ def test_a_joint_that_is_held_fast_loses_its_steps(rm1: Arm):
     assert bench.device.shaft == (1003 % CYCLE, 10, 10)
 
 
-def test_the_e_stop_silences_a_moving_arm_within_a_tick_and_wants_a_person(rm1: Arm):
+def test_the_e_stop_silences_a_moving_arm_within_a_tick_and_wants_a_person(rm1: ArmDescription):
     bench = rm1_bench(rm1)
     assert bench.order(OUTPUT, 0, 1) == OK
     assert bench.device.outputs == ("avanzar",)
@@ -190,7 +190,7 @@ def test_the_e_stop_silences_a_moving_arm_within_a_tick_and_wants_a_person(rm1: 
     bench.run_until(DeviceMode.IDLE, 150.0)
 
 
-def test_a_disarmed_arm_can_be_turned_by_hand_and_must_home_again(rm1: Arm):
+def test_a_disarmed_arm_can_be_turned_by_hand_and_must_home_again(rm1: ArmDescription):
     bench = rm1_bench(rm1)
     assert bench.order(DISARM) == OK
     bench.press(InjectKind.SLIP, "q2", 25)
@@ -205,7 +205,7 @@ def test_a_disarmed_arm_can_be_turned_by_hand_and_must_home_again(rm1: Arm):
     assert abs(bench.device.steps[1] - bench.device.shaft[1]) <= 1
 
 
-def test_a_shaft_that_reaches_a_limit_switch_outside_homing_is_a_fault(rm1: Arm):
+def test_a_shaft_that_reaches_a_limit_switch_outside_homing_is_a_fault(rm1: ArmDescription):
     bench = rm1_bench(rm1)
     switch = bench.device.config.joints[0].homing
     assert switch is not None
@@ -215,7 +215,7 @@ def test_a_shaft_that_reaches_a_limit_switch_outside_homing_is_a_fault(rm1: Arm)
     assert bench.details("fault") == ["limit_q1"]
 
 
-def test_a_switch_that_never_closes_is_a_fault_of_homing_and_works_again_once_it_does(rm1: Arm):
+def test_a_switch_that_never_closes_is_a_fault_of_homing_and_works_again_once_it_does(rm1: ArmDescription):
     bench = rm1_bench(rm1, shaft=(0, 0, 400), referenced=False)
     bench.press(InjectKind.SWITCH, "limit_q3", 0.0)
     bench.run(10)
@@ -230,7 +230,7 @@ def test_a_switch_that_never_closes_is_a_fault_of_homing_and_works_again_once_it
     assert bench.details("homed") == ["q3"]
 
 
-def test_a_switch_that_stays_closed_is_a_fault_of_homing(rm1: Arm):
+def test_a_switch_that_stays_closed_is_a_fault_of_homing(rm1: ArmDescription):
     bench = rm1_bench(rm1, referenced=False)
     bench.press(InjectKind.SWITCH, "limit_q3")
     bench.run(10)
@@ -240,7 +240,7 @@ def test_a_switch_that_stays_closed_is_a_fault_of_homing(rm1: Arm):
     assert bench.details("fault")[-1] == "q3: its switch is still active after backing off"
 
 
-def test_a_slot_task_that_hangs_stops_the_pulses_and_is_a_fault(rm1: Arm):
+def test_a_slot_task_that_hangs_stops_the_pulses_and_is_a_fault(rm1: ArmDescription):
     bench = rm1_bench(rm1)
     assert bench.move((4000, 0, 0), 4.0) == OK
     bench.run(2000)
@@ -253,7 +253,7 @@ def test_a_slot_task_that_hangs_stops_the_pulses_and_is_a_fault(rm1: Arm):
     assert bench.details("fault") == ["no new slot for 3 ms"]
 
 
-def test_sensors_read_what_they_are_given(rm1: Arm):
+def test_sensors_read_what_they_are_given(rm1: ArmDescription):
     bench = rm1_bench(rm1)
     assert bench.sensors["ultra"] == pytest.approx(20.0, abs=0.1)
     assert bench.sensors["bateria"] == pytest.approx(7.4, abs=0.01)
@@ -276,7 +276,7 @@ def test_sensors_read_what_they_are_given(rm1: Arm):
     ],
 )
 def test_a_press_that_cannot_be_is_refused_with_what_could_be(
-    rm1: Arm, kind: InjectKind, target: str, value: float, reason: str
+    rm1: ArmDescription, kind: InjectKind, target: str, value: float, reason: str
 ):
     bench = rm1_bench(rm1)
     with pytest.raises(InjectRefused, match=reason):

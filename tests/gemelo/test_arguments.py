@@ -28,12 +28,12 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from services.arm.model.description import Arm as Description
+from services.arm.model.description import ArmDescription
 
 HERE = gemelo.Pose((0.2, 0.1, 0.15), (1.0, 0.0, 0.0, 0.0))
 
 
-def request(arm: Description, **target: Any) -> PlanRequest:
+def request(arm: ArmDescription, **target: Any) -> PlanRequest:
     return request_of(arm, Target(**target), lambda target, source: HERE)
 
 
@@ -83,14 +83,14 @@ BAD = [
 
 @pytest.mark.parametrize(("target", "said"), BAD, ids=[said for _, said in BAD])
 def test_an_argument_that_cannot_be_meant_is_refused_with_the_remedy(
-    rm1: Description, target: dict[str, Any], said: str
+    rm1: ArmDescription, target: dict[str, Any], said: str
 ) -> None:
     with pytest.raises(gemelo.BadArgument) as refusal:
         request(rm1, **target)
     assert said in str(refusal.value)
 
 
-def test_arguments_become_the_goal_that_they_name(rm1: Description) -> None:
+def test_arguments_become_the_goal_that_they_name(rm1: ArmDescription) -> None:
     assert request(rm1, named="ready").goal == NamedGoal(name="ready")
     assert request(rm1, joints={"brazo_joint": 1}).goal == JointGoal(name=("brazo_joint",), position=(1.0,))
     assert request(rm1, joints=(0.1, 0.2, 0.05)).goal == JointGoal(name=rm1.joint_names, position=(0.1, 0.2, 0.05))
@@ -101,12 +101,12 @@ def test_arguments_become_the_goal_that_they_name(rm1: Description) -> None:
     assert request(rm1, pose=HERE).goal == PoseGoal(position=HERE.position, orientation=HERE.orientation)
 
 
-def test_the_clearance_is_the_robots_own_unless_it_is_given(rm1: Description) -> None:
+def test_the_clearance_is_the_robots_own_unless_it_is_given(rm1: ArmDescription) -> None:
     assert request(rm1, named="ready").clearance is None
     assert request(rm1, named="ready", clearance=gemelo.mm(1)).clearance == 0.001
 
 
-def test_arguments_become_the_motion_that_they_name(rm1: Description) -> None:
+def test_arguments_become_the_motion_that_they_name(rm1: ArmDescription) -> None:
     goal = {"position": (0.2, 0.1, 0.1)}
     assert request(rm1, **goal, ptp=True).motion == PointToPoint()
     assert request(rm1, **goal, line=True, tool_speed=0.03).motion == LinearMotion(speed=0.03)
@@ -129,7 +129,7 @@ def test_arguments_become_the_motion_that_they_name(rm1: Description) -> None:
     assert asked.start.position == (0.1,)
 
 
-def test_an_offset_is_from_where_the_tool_is_and_keeps_what_the_arm_can_keep(rm1: Description) -> None:
+def test_an_offset_is_from_where_the_tool_is_and_keeps_what_the_arm_can_keep(rm1: ArmDescription) -> None:
     goal = request(rm1, offset=(0.0, 0.0, -0.05)).goal
     assert isinstance(goal, PoseGoal)
     assert goal.position == pytest.approx((0.2, 0.1, 0.1))
@@ -139,7 +139,7 @@ def test_an_offset_is_from_where_the_tool_is_and_keeps_what_the_arm_can_keep(rm1
     assert in_tool.position == pytest.approx((0.2, 0.1, 0.1))  # the tool's z looks down
 
 
-JOGS: list[tuple[Callable[[Description], object], str]] = [
+JOGS: list[tuple[Callable[[ArmDescription], object], str]] = [
     (lambda arm: jog_command(arm, None, None, ""), "by one of joints= (speeds by name) and twist="),
     (lambda arm: jog_command(arm, {"brazo_joint": 0.1}, (0, 0, 0.1), ""), "by one of"),
     (lambda arm: jog_command(arm, {"brazo_joint": 30}, None, ""), "if it is in deg/s, write gemelo.deg(30)"),
@@ -152,7 +152,7 @@ JOGS: list[tuple[Callable[[Description], object], str]] = [
 
 @pytest.mark.parametrize(("ask", "said"), JOGS, ids=[said for _, said in JOGS])
 def test_a_jog_that_cannot_be_meant_is_refused(
-    rm1: Description, ask: Callable[[Description], object], said: str
+    rm1: ArmDescription, ask: Callable[[ArmDescription], object], said: str
 ) -> None:
     with pytest.raises(gemelo.BadArgument) as refusal:
         ask(rm1)
@@ -160,7 +160,7 @@ def test_a_jog_that_cannot_be_meant_is_refused(
 
 
 @given(value=st.floats(allow_nan=True, allow_infinity=True))
-def test_no_number_gets_through_that_a_message_would_not_take(rm1: Description, value: float) -> None:
+def test_no_number_gets_through_that_a_message_would_not_take(rm1: ArmDescription, value: float) -> None:
     for target in (
         {"joints": {"brazo_joint": value}},
         {"position": (value, 0.1, 0.1)},
@@ -175,12 +175,12 @@ def test_no_number_gets_through_that_a_message_would_not_take(rm1: Description, 
 
 
 @given(value=st.floats(min_value=-2.9, max_value=2.9))
-def test_what_is_within_the_limits_is_never_taken_for_another_unit(rm1: Description, value: float) -> None:
+def test_what_is_within_the_limits_is_never_taken_for_another_unit(rm1: ArmDescription, value: float) -> None:
     goal = request(rm1, joints={"brazo_joint": value}).goal
     assert goal == JointGoal(name=("brazo_joint",), position=(value,))
 
 
-def test_the_nearest_goal_of_a_refusal_is_arguments_again(rm1: Description) -> None:
+def test_the_nearest_goal_of_a_refusal_is_arguments_again(rm1: ArmDescription) -> None:
     target = Target(position=(0.6, 0.1, 0.1), speed=0.5, frame="brazo_link", along=(0.0, 0.0, 1.0))
     asked = request(rm1, **target)
     refusal = Refusal(check="reach", message="too far", nearest=(0.4, 0.1, 0.1, 0.0, 0.0, -1.0), remedy="go nearer")
@@ -196,14 +196,14 @@ def test_the_nearest_goal_of_a_refusal_is_arguments_again(rm1: Description) -> N
     assert (error.reason, error.refusal) == ("too far", refusal)
 
 
-def test_a_refusal_without_a_nearest_goal_ends_with_its_remedy(rm1: Description) -> None:
+def test_a_refusal_without_a_nearest_goal_ends_with_its_remedy(rm1: ArmDescription) -> None:
     refusal = Refusal(check="unknown link", message='rm1 has no link "x"', remedy="name another")
     error = refused(rm1, refusal, PlanRequest(), Target(), -31)
     assert error.nearest == {}
     assert str(error) == 'refused (unknown link): rm1 has no link "x"; name another'
 
 
-def test_as_target_copies(rm1: Description) -> None:
+def test_as_target_copies(rm1: ArmDescription) -> None:
     goal = gemelo.ToolGoal(position=(0.1, 0.2, 0.3))
     as_target(goal)["line"] = True
     assert "line" not in goal

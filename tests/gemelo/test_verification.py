@@ -12,17 +12,17 @@ import gemelo
 from gemelo.ledger import Requirement, read_ledger
 from gemelo.verification import far_side, is_passable, trip_of
 from schemas.ledger import StepLedger, VerifiedBy
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.runtime.deployment import project_root
 
 RM1, PAROL6 = (load_arm(project_root() / "urdf" / name) for name in ("rm1", "parol6"))
 
 
-def standing(arm: Arm) -> dict[str, float]:
+def standing(arm: ArmDescription) -> dict[str, float]:
     return dict(zip(arm.joint_names, arm.reference_position, strict=True))
 
 
-def without_switch(arm: Arm, name: str) -> Arm:
+def without_switch(arm: ArmDescription, name: str) -> ArmDescription:
     joints = tuple(
         with_(joint, drive=replace(joint.drive, homing=None)) if joint.name == name else joint for joint in arm.joints
     )

@@ -26,8 +26,7 @@ from schemas.joints import JointState, StepErrors
 from schemas.planning import FkRequest, FkResponse, PlanCode
 from schemas.scene import PlanningScene
 from schemas.topics import DEVICE_STATE, DEVICE_STATUS, DEVICE_STOP, FK, JOINT_STATES, SCENE, STEP_ERRORS
-from services.arm.model.description import Arm as Description
-from services.arm.model.description import load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.bench.bare_browser import BareBrowser, Said, bare_browser
 from services.panel.main import TEXTS, Panel
 from services.runtime import topics
@@ -42,7 +41,7 @@ ROOT = Path(__file__).parents[2]
 class Gateway:
     """Says where the arm is, and hears stops."""
 
-    def __init__(self, node: Node, planner: Node, arm: Description) -> None:
+    def __init__(self, node: Node, planner: Node, arm: ArmDescription) -> None:
         self.stops: list[DeviceStopRequest] = []
         self.joints = {joint.name: joint.clamp(0.1) for joint in arm.joints}
         self.node, self._arm = node, arm

@@ -19,8 +19,7 @@ import gemelo
 from gemelo.programs import AnyStep, Program, Repeat, RunStatus, StepPath, Wait
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceMode, DeviceState
-from services.arm.model.description import Arm as Description
-from services.arm.model.description import load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.panel.model.availability import CHECKS
 from services.panel.model.goal import GoalSolver
 from services.panel.model.problems import Problem, problem_of
@@ -218,14 +217,14 @@ def test_every_refusal_in_spanish_is_one_that_is_given():
         assert re.sub("_(axis|unknown|touch|inside|own)$", "", key) in given, key
 
 
-def wrist(folder: Path, axis: str) -> Description:
+def wrist(folder: Path, axis: str) -> ArmDescription:
     """A SCARA whose tool a fourth joint turns about `axis`."""
     joints = (("a", "base", "one", "revolute", "0 0 0"), ("b", "one", "two", "revolute", "0.2 0 0"),
               ("c", "two", "three", "prismatic", "0.2 0 0"), ("d", "three", "hand", "revolute", "0 0 0"))  # fmt: skip
     return bare(folder, joints, {name: axis if name == "d" else "0 0 1" for name, *_ in joints})
 
 
-def bare(folder: Path, joints: tuple[tuple[str, ...], ...], axes: dict[str, str]) -> Description:
+def bare(folder: Path, joints: tuple[tuple[str, ...], ...], axes: dict[str, str]) -> ArmDescription:
     """An arm of joints (name, parent, child, kind, origin) that turn or slide along their axes."""
     texts = [
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin xyz="{at}"/>'
@@ -277,7 +276,7 @@ def test_the_arrows_of_five_joints_lead_the_place_and_their_ring_the_orientation
     assert asked == [{"position"}, {"pose"}]
 
 
-def five_joints(folder: Path, axis: str) -> Description:
+def five_joints(folder: Path, axis: str) -> ArmDescription:
     """A vertical arm: it turns on its base, has three parallel joints, and rolls its tool about `axis`."""
     joints = (("a", "base", "one", "revolute", "0 0 0.1"), ("b", "one", "two", "revolute", "0 0 0.1"),
               ("c", "two", "three", "revolute", "0 0 0.2"), ("d", "three", "four", "revolute", "0 0 0.2"),

@@ -5,18 +5,18 @@ from __future__ import annotations
 import pytest
 
 from schemas.joints import JointState
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.core import Planner
 from tests.planner.judging import forget_scenes
 
 
 @pytest.fixture(scope="session")
-def planner(rm1: Arm) -> Planner:
+def planner(rm1: ArmDescription) -> Planner:
     return Planner(rm1)
 
 
 @pytest.fixture
-def home(rm1: Arm) -> JointState:
+def home(rm1: ArmDescription) -> JointState:
     return JointState(name=rm1.joint_names, position=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0))
 
 

@@ -13,7 +13,7 @@ from scipy.interpolate import BPoly
 
 from schemas.motion import JointTrajectory
 from schemas.scene import PlanningScene
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from tests.planner.mujoco_arm import MujocoArm
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ class Touch(NamedTuple):
 class Judge:
     """One arm in one scene; joint values are (n,) [rad] or [m] in the arm's order."""
 
-    def __init__(self, arm: Arm, scene: PlanningScene | None = None, is_drawn: bool = False) -> None:
+    def __init__(self, arm: ArmDescription, scene: PlanningScene | None = None, is_drawn: bool = False) -> None:
         scene = scene or PlanningScene()
         built = MujocoArm(arm, scene, is_drawn)
         self._model, self._owners = built.model, built.owners
@@ -115,7 +115,7 @@ class Judge:
         return np.where(slides, 1.0, longest)[self._places]
 
 
-def _excused(arm: Arm, scene: PlanningScene) -> set[frozenset[str]]:
+def _excused(arm: ArmDescription, scene: PlanningScene) -> set[frozenset[str]]:
     """Pairs of names that may touch; "*" is any."""
     disabled = ET.parse(arm.srdf_path).getroot().findall("disable_collisions")
     pairs = [(pair.get("link1"), pair.get("link2")) for pair in disabled]

@@ -13,7 +13,7 @@ from schemas.joints import JointState
 from schemas.planning import JogCommand, JogStatus
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.planner.collision.world import World
 from services.planner.jog.jog import PERIOD, Jog
 from services.stepper_gateway.motion.knots import Knot, Limits
@@ -29,7 +29,7 @@ BOXES = {
 
 
 @cache
-def arm_of(name: str) -> Arm:
+def arm_of(name: str) -> ArmDescription:
     return load_arm(ROOT / "urdf" / name)
 
 

@@ -22,7 +22,7 @@ from schemas.planning import (
     WaypointGoal,
 )
 from schemas.scene import PlanningScene
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.planner.collision.world import World
 from services.planner.core import Planner
 from services.planner.verification.verify import DENSITY, LOOSE_JERK
@@ -54,7 +54,7 @@ def forget_scenes() -> None:
 
 
 @cache
-def arm_of(name: str) -> Arm:
+def arm_of(name: str) -> ArmDescription:
     (folder,) = (folder / name for folder in FOLDERS if (folder / name).is_dir())
     return load_arm(folder)
 
@@ -113,7 +113,7 @@ def require_sound(planner: Planner, request: PlanRequest, response: PlanResponse
     return motion
 
 
-def require_within_limits(arm: Arm, request: PlanRequest, motion: Motion) -> None:
+def require_within_limits(arm: ArmDescription, request: PlanRequest, motion: Motion) -> None:
     for column, joint in enumerate(arm.joints):
         positions = motion.positions[:, column]
         assert joint.lower - ROUNDING <= positions.min()

@@ -17,7 +17,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, PlanningScene, SceneObject, SphereShape
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 Numbers = list[float]
@@ -28,7 +28,7 @@ SOLIDS = {"box": mujoco.mjtGeom.mjGEOM_BOX, "cylinder": mujoco.mjtGeom.mjGEOM_CY
 class MujocoArm:
     """The compiled model; `owners` and `paddings` [m] say of each geom which link or object it is part of."""
 
-    def __init__(self, arm: Arm, scene: PlanningScene, is_drawn: bool) -> None:
+    def __init__(self, arm: ArmDescription, scene: PlanningScene, is_drawn: bool) -> None:
         """`is_drawn`: the links are the meshes that are shown, in convex pieces, and not their collision shapes."""
         self._spec = mujoco.MjSpec()
         self._spec.option.ccd_iterations, self._spec.option.ccd_tolerance = 500, 1e-9

@@ -22,7 +22,7 @@ from schemas.planning import (
     ValidityRequest,
 )
 from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.clearance import CLEARANCE, usable_clearance
 from services.planner.collision.world import World
 from services.planner.core import Planner
@@ -34,7 +34,7 @@ GAP = 0.0015  # [m] between the tool at the goal and the box below it
 
 
 @pytest.fixture(scope="module")
-def world(rm1: Arm) -> World:
+def world(rm1: ArmDescription) -> World:
     """With a slab `GAP` [m] below the tool at the goal, and otherwise far from the arm."""
     planner = Planner(rm1)
     low, high = -1.0, float(planner.kinematics.tool(GOAL).position[2])
@@ -44,7 +44,7 @@ def world(rm1: Arm) -> World:
     return _slab(rm1, planner, low)
 
 
-def _slab(rm1: Arm, planner: Planner, top: float) -> World:
+def _slab(rm1: ArmDescription, planner: Planner, top: float) -> World:
     x, y, _ = planner.kinematics.tool(GOAL).position.tolist()
     shape = SceneObject(
         name="slab", shape=BoxShape(size=(0.1, 0.1, 0.01)), pose=Transform(translation=(x, y, top - 0.005))
@@ -52,19 +52,19 @@ def _slab(rm1: Arm, planner: Planner, top: float) -> World:
     return World(rm1, planner.kinematics, PlanningScene(version=1, objects=(shape,)))
 
 
-def request(rm1: Arm, **more: object) -> PlanRequest:
+def request(rm1: ArmDescription, **more: object) -> PlanRequest:
     start = JointState(name=rm1.joint_names, position=(0.9, 0.6, 0.15))
     goal = JointGoal(name=rm1.joint_names, position=GOAL)
     return PlanRequest(**{"start": start, "goal": goal, **more})  # type: ignore[arg-type]
 
 
-def in_world(arm: Arm, world: World) -> Planner:
+def in_world(arm: ArmDescription, world: World) -> Planner:
     planner = Planner(arm)
     planner.set_world(World(arm, planner.kinematics, world.scene))
     return planner
 
 
-def test_a_refused_goal_says_how_near_between_what_and_which_clearance_would_do(rm1: Arm, world: World):
+def test_a_refused_goal_says_how_near_between_what_and_which_clearance_would_do(rm1: ArmDescription, world: World):
     assert world.distance(GOAL) == pytest.approx(GAP, abs=1e-5)
     planner = in_world(rm1, world)
     response = planner.plan(request(rm1), None)
@@ -80,7 +80,7 @@ def test_a_refused_goal_says_how_near_between_what_and_which_clearance_would_do(
 
 
 @pytest.mark.parametrize("motion", [FreeMotion(), PointToPoint(), LinearMotion(), FreeMotion(planner_id="RRTConnect")])
-def test_a_smaller_clearance_lets_the_arm_nearer_and_is_kept(rm1: Arm, world: World, motion: object):
+def test_a_smaller_clearance_lets_the_arm_nearer_and_is_kept(rm1: ArmDescription, world: World, motion: object):
     planner = in_world(rm1, world)
     goal: object = JointGoal(name=rm1.joint_names, position=GOAL)
     if isinstance(motion, LinearMotion):
@@ -95,7 +95,7 @@ def test_a_smaller_clearance_lets_the_arm_nearer_and_is_kept(rm1: Arm, world: Wo
     assert planner.plan(msgspec.structs.replace(asked, clearance=None), None).code is not PlanCode.SUCCESS
 
 
-def test_the_robots_own_clearance_counts_where_the_request_says_none(rm1: Arm, world: World):
+def test_the_robots_own_clearance_counts_where_the_request_says_none(rm1: ArmDescription, world: World):
     near = replace(rm1, clearance=0.001)
     assert in_world(near, world).plan(request(rm1), None).code is PlanCode.SUCCESS
     refused = in_world(near, world).plan(request(rm1, clearance=0.004), None)
@@ -103,7 +103,7 @@ def test_the_robots_own_clearance_counts_where_the_request_says_none(rm1: Arm, w
     assert refused.refusal.limit == 0.004
 
 
-def test_ik_and_validity_keep_the_robots_clearance_and_say_how_near(rm1: Arm, world: World):
+def test_ik_and_validity_keep_the_robots_clearance_and_say_how_near(rm1: ArmDescription, world: World):
     kinematic = KinematicRequests(rm1)
     asked = ValidityRequest(name=rm1.joint_names, position=GOAL)
     refusal = kinematic.validity(asked, None, 0.0, world).refusal
@@ -123,7 +123,9 @@ def test_ik_and_validity_keep_the_robots_clearance_and_say_how_near(rm1: Arm, wo
 
 
 @pytest.mark.parametrize("asked", [0.0, 0.0004, -0.001, 0.051, 4.0])
-def test_a_clearance_that_cannot_be_kept_is_refused_with_its_value_and_range(rm1: Arm, planner: Planner, asked: float):
+def test_a_clearance_that_cannot_be_kept_is_refused_with_its_value_and_range(
+    rm1: ArmDescription, planner: Planner, asked: float
+):
     response = planner.plan(request(rm1, clearance=asked), None)
     refusal = response.refusal
     assert refusal is not None
@@ -134,18 +136,18 @@ def test_a_clearance_that_cannot_be_kept_is_refused_with_its_value_and_range(rm1
 
 
 @pytest.mark.parametrize("asked", [0.0005, 0.05])
-def test_the_ends_of_the_range_are_kept(rm1: Arm, planner: Planner, asked: float):
+def test_the_ends_of_the_range_are_kept(rm1: ArmDescription, planner: Planner, asked: float):
     response = planner.plan(request(rm1, clearance=asked), None)
     assert response.refusal is None or response.refusal.subject != "clearance"
 
 
-def test_the_clearance_of_one_plan_is_not_the_next_ones(rm1: Arm, world: World):
+def test_the_clearance_of_one_plan_is_not_the_next_ones(rm1: ArmDescription, world: World):
     planner = in_world(rm1, world)
     assert planner.plan(request(rm1, clearance=0.001), None).code is PlanCode.SUCCESS
     assert planner.plan(request(rm1), None).code is PlanCode.GOAL_IN_COLLISION
 
 
-def test_a_line_that_comes_too_near_says_the_clearance_that_would_do(rm1: Arm, world: World):
+def test_a_line_that_comes_too_near_says_the_clearance_that_would_do(rm1: ArmDescription, world: World):
     planner = in_world(rm1, world)
     lower = tuple(np.add(GOAL, (0.5, 0.0, 0.0)).tolist())
     begin = tuple(np.add(GOAL, (-0.5, 0.0, 0.0)).tolist())

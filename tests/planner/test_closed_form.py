@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.planner.kinematics.closed_form import closed_form, turns_about
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.targets import ToolTarget
@@ -30,7 +30,7 @@ CONFIGURATIONS = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in PA
 UNIT = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(np.array).filter(lambda v: np.linalg.norm(v) > 0.1)
 
 
-def with_limits(arm: Arm, name: str, lower: float, upper: float) -> Arm:
+def with_limits(arm: ArmDescription, name: str, lower: float, upper: float) -> ArmDescription:
     """The same arm, one joint of which has other limits."""
     joints = [dataclasses.replace(j, lower=lower, upper=upper) if j.name == name else j for j in arm.joints]
     return dataclasses.replace(arm, joints=tuple(joints))

@@ -17,7 +17,7 @@ from schemas.motion import JointTrajectory
 from schemas.planning import StepMargin
 from schemas.robot import PullOut
 from services.arm.device.device_config import device_config
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.request.refusals import PlanRefused
 from services.planner.timing.profile import joint_limits, straight_line
 from services.planner.verification import feasibility
@@ -36,12 +36,12 @@ from services.stepper_gateway.links.frames import Chunk, ChunkFlag, Heartbeat, e
 FAR = (1.5, -1.2, 0.1)
 
 
-def line(arm: Arm, goal: tuple[float, ...] = FAR, scaling: float = 1.0) -> JointTrajectory:
+def line(arm: ArmDescription, goal: tuple[float, ...] = FAR, scaling: float = 1.0) -> JointTrajectory:
     limits = joint_limits(arm, scaling, scaling)
     return straight_line(arm.joint_names, (0.0,) * len(arm.joints), goal, limits)
 
 
-def with_motor(arm: Arm, index: int, pull_out: PullOut | None) -> Arm:
+def with_motor(arm: ArmDescription, index: int, pull_out: PullOut | None) -> ArmDescription:
     joint = arm.joints[index]
     motor = msgspec.structs.replace(joint.drive.motor, pull_out=pull_out)
     drive = msgspec.structs.replace(joint.drive, motor=motor)
@@ -55,7 +55,7 @@ def share_of(found: tuple[StepMargin, ...], name: str) -> StepMargin:
 
 
 @pytest.fixture(scope="module")
-def ideal(rm1: Arm) -> Arm:
+def ideal(rm1: ArmDescription) -> ArmDescription:
     """rm1 with motors that never lose a step."""
     arm = rm1
     for index in range(len(rm1.joints)):
@@ -64,7 +64,7 @@ def ideal(rm1: Arm) -> Arm:
 
 
 @pytest.mark.parametrize("goal", [FAR, (-0.3, 2.0, 0.19), (0.001, 0.0, 0.0)])
-def test_the_stream_is_what_the_firmware_makes(rm1: Arm, goal: tuple[float, ...]) -> None:
+def test_the_stream_is_what_the_firmware_makes(rm1: ArmDescription, goal: tuple[float, ...]) -> None:
     trajectory = line(rm1, goal)
     foreseen = [tuple(row) for row in step_stream(rm1, trajectory).steps.tolist()]
     device = CoreDevice(device_config(rm1), steps=(0, 0, 0))
@@ -89,7 +89,7 @@ def test_the_stream_is_what_the_firmware_makes(rm1: Arm, goal: tuple[float, ...]
     assert made[first : first + last + 1] == foreseen[: last + 1]
 
 
-def send(device: CoreDevice, arm: Arm, samples, first: int, knots: int) -> None:
+def send(device: CoreDevice, arm: ArmDescription, samples, first: int, knots: int) -> None:
     rows = range(first, min(first + 10, knots + 1))
     scale = [joint.steps.per_unit * 256 for joint in arm.joints]
     positions = tuple(
@@ -111,7 +111,7 @@ def send(device: CoreDevice, arm: Arm, samples, first: int, knots: int) -> None:
 
 
 @given(st.floats(0.05, 1.0))
-def test_the_margin_is_the_share_of_the_speed_that_was_asked_for(ideal: Arm, scaling: float) -> None:
+def test_the_margin_is_the_share_of_the_speed_that_was_asked_for(ideal: ArmDescription, scaling: float) -> None:
     found = require_feasible(ideal, line(ideal, (2.5, 0.0, 0.0), scaling))
     margin = share_of(found, "brazo_joint")
     fastest = max(abs(point.velocities[0]) for point in line(ideal, (2.5, 0.0, 0.0), scaling).points)
@@ -121,7 +121,7 @@ def test_the_margin_is_the_share_of_the_speed_that_was_asked_for(ideal: Arm, sca
     assert f"of {margin.rate_limit:g} steps/s" in sentence(margin)
 
 
-def test_a_motor_too_weak_is_named_and_a_slower_move_offered(ideal: Arm) -> None:
+def test_a_motor_too_weak_is_named_and_a_slower_move_offered(ideal: ArmDescription) -> None:
     weak = with_motor(ideal, 0, PullOut(speed=(0.0, 2000.0, 4000.0), torque=(0.5, 0.3, 0.1), inertia=2e-4))
     trajectory = line(weak, (2.5, 0.0, 0.0))
     with pytest.raises(PlanRefused) as refused:
@@ -136,7 +136,7 @@ def test_a_motor_too_weak_is_named_and_a_slower_move_offered(ideal: Arm) -> None
         require_feasible(weak, slowed(trajectory, min(1.0, scale * 1.05)))
 
 
-def test_a_driver_whose_pulses_are_too_wide_is_named(ideal: Arm) -> None:
+def test_a_driver_whose_pulses_are_too_wide_is_named(ideal: ArmDescription) -> None:
     joint = ideal.joints[0]
     slow = msgspec.structs.replace(joint.driver, step_high_us=200.0, step_low_us=200.0)
     arm = dataclasses.replace(ideal, joints=(dataclasses.replace(joint, driver=slow), *ideal.joints[1:]))
@@ -145,7 +145,7 @@ def test_a_driver_whose_pulses_are_too_wide_is_named(ideal: Arm) -> None:
     assert refused.value.refusal.check == "pulse width"
 
 
-def test_a_queue_too_short_to_brake_in_is_named(ideal: Arm) -> None:
+def test_a_queue_too_short_to_brake_in_is_named(ideal: ArmDescription) -> None:
     arm = dataclasses.replace(ideal, device=msgspec.structs.replace(ideal.device, queue_capacity=20))
     trajectory = line(arm, (2.5, 0.0, 0.0))
     assert queue_share(arm, trajectory) > 1.0
@@ -155,7 +155,7 @@ def test_a_queue_too_short_to_brake_in_is_named(ideal: Arm) -> None:
     require_feasible(arm, slowed(trajectory, feasible_scale(arm, trajectory)))
 
 
-def test_slowing_down_keeps_the_way(ideal: Arm) -> None:
+def test_slowing_down_keeps_the_way(ideal: ArmDescription) -> None:
     trajectory = line(ideal)
     half = slowed(trajectory, 0.5)
     times = np.linspace(0.0, trajectory.points[-1].time_from_start, 200)
@@ -164,14 +164,14 @@ def test_slowing_down_keeps_the_way(ideal: Arm) -> None:
     assert np.abs(fast.velocities - 2.0 * slow.velocities).max() < 1e-9
 
 
-def test_what_the_planner_makes_is_feasible_as_it_is(rm1: Arm) -> None:
+def test_what_the_planner_makes_is_feasible_as_it_is(rm1: ArmDescription) -> None:
     found = margins(rm1, step_stream(rm1, line(rm1)))
     assert max(margin.share for margin in found) <= 1.001, [sentence(margin) for margin in found]
 
 
 @pytest.mark.parametrize("most", [7, 60, 10_000])
 def test_the_margins_are_the_same_however_many_knots_are_looked_at_at_once(
-    rm1: Arm, monkeypatch: pytest.MonkeyPatch, most: int
+    rm1: ArmDescription, monkeypatch: pytest.MonkeyPatch, most: int
 ) -> None:
     trajectory = line(rm1)
     whole = margins(rm1, step_stream(rm1, trajectory))
@@ -179,7 +179,7 @@ def test_the_margins_are_the_same_however_many_knots_are_looked_at_at_once(
     assert require_feasible(rm1, trajectory) == whole
 
 
-def test_a_plan_of_hours_is_looked_at_in_little_memory(rm1: Arm) -> None:
+def test_a_plan_of_hours_is_looked_at_in_little_memory(rm1: ArmDescription) -> None:
     tracemalloc.start()
     try:
         found = require_feasible(rm1, line(rm1, scaling=3e-4))
@@ -190,7 +190,7 @@ def test_a_plan_of_hours_is_looked_at_in_little_memory(rm1: Arm) -> None:
     assert peak < 200e6  # [bytes]
 
 
-def test_compiled_and_in_python_the_peaks_are_the_same_to_the_bit(rm1: Arm):
+def test_compiled_and_in_python_the_peaks_are_the_same_to_the_bit(rm1: ArmDescription):
     for goal in (FAR, (-0.7, 0.3, 1.0), (0.0, 0.0, 0.0)):
         stream = step_stream(rm1, line(rm1, goal))
         assert np.array_equal(feasibility.peak_rates_in_python(stream), stream.peaks)
@@ -201,7 +201,7 @@ def test_compiled_and_in_python_the_peaks_are_the_same_to_the_bit(rm1: Arm):
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_compiled_and_in_python_a_motor_needs_the_same_torque_to_the_bit(ideal: Arm, seed: int):
+def test_compiled_and_in_python_a_motor_needs_the_same_torque_to_the_bit(ideal: ArmDescription, seed: int):
     random = np.random.default_rng(seed)
     speed = (0.0, *np.cumsum(random.uniform(1.0, 2000.0, 4)).tolist())
     torque = tuple(sorted(random.uniform(0.0, 0.5, 5).tolist(), reverse=True))
@@ -212,7 +212,7 @@ def test_compiled_and_in_python_a_motor_needs_the_same_torque_to_the_bit(ideal: 
     assert feasibility.demands(arm, states, part) == feasibility.demands_in_python(arm, states, part)
 
 
-def test_compiled_and_in_python_braking_takes_as_long(rm1: Arm):
+def test_compiled_and_in_python_braking_takes_as_long(rm1: ArmDescription):
     velocities, accelerations = states_of(line(rm1)).velocities, np.array([2.0, 3.0, 0.1])
     compiled = feasibility.longest_braking(velocities, accelerations)
     assert compiled == feasibility.longest_braking_in_python(velocities, accelerations) > 0.0

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.planning import NamedGoal, PlanRequest
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.pipeline.trajectory_builder import TrajectoryBuilder, TrajectoryTouches, lies_on
 from services.planner.request.deadline import Stopwatch, endless
 from services.planner.timing.profile import joint_limits, straight_line
@@ -36,19 +36,19 @@ class TouchesInTheMiddle:
         return None if len(positions) == 2 else positions[len(positions) // 2]
 
 
-def builder(arm: Arm, checker: TouchesInTheMiddle) -> TrajectoryBuilder:
+def builder(arm: ArmDescription, checker: TouchesInTheMiddle) -> TrajectoryBuilder:
     request = PlanRequest(goal=NamedGoal(name="home"))
     return TrajectoryBuilder(arm, checker, request, joint_limits(arm), 0.004, Stopwatch(endless))
 
 
-def test_a_straight_line_is_asked_about_once(rm1: Arm):
+def test_a_straight_line_is_asked_about_once(rm1: ArmDescription):
     checker = TouchesInTheMiddle()
     found = builder(rm1, checker).line((0.0, 0.0, 0.0), GOAL)
     assert found.trajectory.points[-1].positions == GOAL
     assert checker.asked == [2]
 
 
-def test_a_trajectory_beside_the_line_that_is_free_is_asked_about_as_a_whole(rm1: Arm):
+def test_a_trajectory_beside_the_line_that_is_free_is_asked_about_as_a_whole(rm1: ArmDescription):
     trajectory = straight_line(rm1.joint_names, (0.0, 0.0, 0.0), GOAL, joint_limits(rm1))
     other = np.array(((0.0, 0.0, 0.0), (1.0, -0.5, 0.1 + 1e-6)))
     checker = TouchesInTheMiddle()

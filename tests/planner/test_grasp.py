@@ -36,7 +36,7 @@ from schemas.scene import (
 from schemas.topics import GRIPPER_STATE, JOINT_STATES, SCENE, STATE_VALIDITY
 from services.arm.frames.transforms import Rigid, compose, from_message, from_rpy, to_message
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.arm.model.gripper import JAWS, jaw_objects, jaws_apart
 from services.planner.collision.scene_shapes import shape_of
 from services.planner.collision.world import World
@@ -192,7 +192,7 @@ def test_the_jaws_are_taken_to_be_open_where_that_is_not_known_and_on_their_way(
     assert jaw_objects(replace(arm, gripper=None), 0.05) == ()
 
 
-def stand(asker: Node, arm: Arm, opening: float) -> None:
+def stand(asker: Node, arm: ArmDescription, opening: float) -> None:
     """The arm in its state "ready", its jaws so far apart; said often enough to be heard."""
     states, jaws = asker.publisher(JOINT_STATES), asker.publisher(GRIPPER_STATE)
     for _ in range(3):

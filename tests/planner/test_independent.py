@@ -25,7 +25,7 @@ from schemas.scene import (
 )
 from services.arm.interpolation import TrajectorySampler
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.planner.collision.world import World
 from services.planner.core import Planner
 from tests.planner.independent import Judge, resampled
@@ -186,6 +186,6 @@ def test_its_quintics_are_those_that_the_gateway_plays():
         assert motion.accelerations[index] == pytest.approx(acceleration, abs=1e-6)
 
 
-def configurations(arm: Arm, count: int) -> np.ndarray:
+def configurations(arm: ArmDescription, count: int) -> np.ndarray:
     lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
     return np.random.default_rng(5).uniform(lower, upper, (count, len(lower)))

@@ -11,7 +11,7 @@ import pytest
 from schemas.joints import JointState
 from schemas.planning import JogCommand, NamedGoal, PlanCode, PlanRequest, PlanResponse
 from schemas.topics import JOG, JOG_STATUS, JOINT_STATES, JOINT_TARGETS, PLAN
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner
 
@@ -22,7 +22,7 @@ PATIENCE = 20.0  # [s]
 class Follower:
     """A node that does at once what the targets say."""
 
-    def __init__(self, node: Node, arm: Arm) -> None:
+    def __init__(self, node: Node, arm: ArmDescription) -> None:
         self.node, self.arm = node, arm
         self.states = node.publisher(JOINT_STATES)
         self.targets = node.latest(JOINT_TARGETS)
@@ -42,7 +42,7 @@ class Follower:
 
 
 @pytest.fixture
-def follower(tmp_path: Path, rm1: Arm) -> Iterator[Follower]:
+def follower(tmp_path: Path, rm1: ArmDescription) -> Iterator[Follower]:
     with beside_a_planner(tmp_path, "follower", ends_within=10.0) as node:
         yield Follower(node, rm1)
 

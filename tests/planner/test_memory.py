@@ -8,14 +8,14 @@ from random import Random
 
 from schemas.joints import JointState
 from schemas.planning import JointGoal, PlanCode, PlanRequest
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.core import Planner
 
 WARM_UP, PLANS = 40, 60
 MOST = 20.0  # [B] a plan: less than one array of the smallest size
 
 
-def test_a_plan_leaves_nothing_behind(rm1: Arm):
+def test_a_plan_leaves_nothing_behind(rm1: ArmDescription):
     planner, random = Planner(rm1), Random(1)
 
     def place() -> tuple[float, ...]:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.collision_matrix import collision_matrix
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.arm.model.srdf_edit import with_pairs
 from services.arm.model.urdf_edit import with_collisions
 from services.cli.robot_folder import plan_of
@@ -203,7 +203,7 @@ def test_a_fitted_arm_loads_and_its_neighbours_do_not_touch_once_its_matrix_is_m
     assert touching_states(kinematics.arm) == []
 
 
-def _require_only_collisions_changed(text: str, arm: Arm) -> None:
+def _require_only_collisions_changed(text: str, arm: ArmDescription) -> None:
     after = arm.urdf_path.read_text()
     assert after != text
     bare = {link.name: () for link in arm.model.links if link.visuals}
@@ -264,7 +264,7 @@ def test_scale_and_origin_of_the_visual_count(copied: Path):
     assert fit.mesh.vertices.max(axis=0) == pytest.approx([0.025, 0.05, 0.51])
 
 
-def _first_with_mesh(arm: Arm) -> str:
+def _first_with_mesh(arm: ArmDescription) -> str:
     return next(link.name for link in arm.model.links if link.visuals)
 
 
@@ -362,7 +362,7 @@ def test_edges_of_the_text_stay_as_they_are():
             with_collisions(text, {link: []})
 
 
-def _tubes(copied: Path) -> Arm:
+def _tubes(copied: Path) -> ArmDescription:
     """The arm with a mesh that takes convex hulls."""
     bend = trimesh.creation.cylinder(0.03, 0.2, sections=32)
     cut = bend.slice_plane((0.0, 0.0, 0.0), (0.0, 0.6, 0.8), cap=True)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.parallel_axes import parallel_axes
 from services.planner.kinematics.targets import ToolTarget
@@ -50,7 +50,7 @@ VARIANTS = {
 }
 
 
-def arm_of(folder: Path, urdf: str) -> Arm:
+def arm_of(folder: Path, urdf: str) -> ArmDescription:
     shutil.copytree(RM1, folder)
     (folder / "robot.urdf").write_text(urdf)
     if "tip_link" in urdf:
@@ -60,11 +60,11 @@ def arm_of(folder: Path, urdf: str) -> Arm:
 
 
 @pytest.fixture(params=VARIANTS, ids=lambda name: name.replace(" ", "-"))
-def arm(request: pytest.FixtureRequest, tmp_path: Path) -> Arm:
+def arm(request: pytest.FixtureRequest, tmp_path: Path) -> ArmDescription:
     return arm_of(tmp_path / "arm", VARIANTS[request.param]((RM1 / "robot.urdf").read_text()))
 
 
-def test_every_configuration_is_found_again_and_every_answer_is_right(arm: Arm):
+def test_every_configuration_is_found_again_and_every_answer_is_right(arm: ArmDescription):
     kinematics = Kinematics(arm)
     assert parallel_axes(arm, kinematics) is not None
     inverse, random = InverseKinematics(arm, kinematics), np.random.default_rng(3)

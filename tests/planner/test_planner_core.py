@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from schemas.joints import JointState
 from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.planner.core import Planner
 from services.planner.request.refusals import PlanRefused
 from services.planner.request.start_state import resolve_start
@@ -38,7 +38,7 @@ def test_the_readmes_goal_is_reached(planner: Planner, home: JointState):
     assert response.trajectory.joint_names == planner.arm.joint_names
 
 
-def test_every_named_state_is_reached_from_every_other(planner: Planner, rm1: Arm):
+def test_every_named_state_is_reached_from_every_other(planner: Planner, rm1: ArmDescription):
     for start in rm1.named_states.values():
         for name, goal in rm1.named_states.items():
             response = planner.plan(PlanRequest(goal=NamedGoal(name=name)), standing(start))
@@ -46,7 +46,7 @@ def test_every_named_state_is_reached_from_every_other(planner: Planner, rm1: Ar
             assert response.trajectory.points[-1].positions == goal
 
 
-def test_a_joint_goal_leaves_the_other_joints_alone(planner: Planner, rm1: Arm):
+def test_a_joint_goal_leaves_the_other_joints_alone(planner: Planner, rm1: ArmDescription):
     start = rm1.named_states["ready"]
     response = planner.plan(PlanRequest(goal=JointGoal(name=("brazo_joint",), position=(0.5,))), standing(start))
     assert response.trajectory.points[-1].positions == (0.5, *start[1:])
@@ -89,7 +89,7 @@ def test_a_goal_where_the_arm_is_is_a_plan_that_stands(planner: Planner, home: J
     assert response.duration == 0.1
 
 
-def test_a_whole_start_is_the_same_in_whatever_order_its_joints_are_named(rm1: Arm):
+def test_a_whole_start_is_the_same_in_whatever_order_its_joints_are_named(rm1: ArmDescription):
     ready = rm1.named_states["ready"]
     shuffled = JointState(name=rm1.joint_names[::-1], position=ready[::-1])
     for given_start, present in ((standing(ready), None), (shuffled, None), (None, standing(ready))):
@@ -98,7 +98,7 @@ def test_a_whole_start_is_the_same_in_whatever_order_its_joints_are_named(rm1: A
         resolve_start(rm1, None, standing(ready), 1.0)
 
 
-def test_a_start_rounded_to_whole_steps_beyond_a_limit_is_still_a_start(planner: Planner, rm1: Arm):
+def test_a_start_rounded_to_whole_steps_beyond_a_limit_is_still_a_start(planner: Planner, rm1: ArmDescription):
     scale = rm1.joint("antebrazo_joint").steps
     rounded = scale.to_position(round(scale.to_steps(2.95)))
     assert rounded > 2.95
@@ -107,7 +107,7 @@ def test_a_start_rounded_to_whole_steps_beyond_a_limit_is_still_a_start(planner:
     assert response.trajectory.points[0].positions == (0.0, 2.95, 0.2)
 
 
-def test_from_limit_to_limit_of_every_joint_and_back(planner: Planner, rm1: Arm):
+def test_from_limit_to_limit_of_every_joint_and_back(planner: Planner, rm1: ArmDescription):
     """Standing exactly at a limit is standing within it, and a goal may be there too."""
     for first, last in (("lower", "upper"), ("upper", "lower")):
         for joint in (rm1.joint("brazo_joint"), rm1.joint("efector_joint")):

@@ -10,7 +10,7 @@ import pytest
 from schemas.joints import JointState
 from schemas.planning import FkRequest, IkRequest, NamedGoal, PlanCode, PlanRequest, PoseGoal
 from schemas.topics import FK, IK, JOINT_STATES, PLAN, PLANNED_PATH
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner
 
@@ -21,7 +21,7 @@ def asker(tmp_path: Path) -> Iterator[Node]:
         yield node
 
 
-def tell(asker: Node, arm: Arm) -> None:
+def tell(asker: Node, arm: ArmDescription) -> None:
     """A second of joint states at rest in the home pose."""
     states = asker.publisher(JOINT_STATES)
     for _ in range(10):
@@ -29,7 +29,7 @@ def tell(asker: Node, arm: Arm) -> None:
         asker.wait(0.03)
 
 
-def test_it_plans_from_the_newest_joint_state_and_shows_the_way(asker: Node, rm1: Arm, tmp_path: Path):
+def test_it_plans_from_the_newest_joint_state_and_shows_the_way(asker: Node, rm1: ArmDescription, tmp_path: Path):
     path = asker.latest(PLANNED_PATH)
     asker.call(PLAN, PlanRequest(), timeout=30.0)  # once its process has started, nothing is stale by waiting for it
     tell(asker, rm1)
@@ -48,7 +48,7 @@ def test_without_joint_states_it_is_not_ready_and_says_why(asker: Node, tmp_path
     assert not (tmp_path / "planner.ready").exists()
 
 
-def test_it_answers_ik_and_fk_from_the_newest_joint_state(asker: Node, rm1: Arm):
+def test_it_answers_ik_and_fk_from_the_newest_joint_state(asker: Node, rm1: ArmDescription):
     tell(asker, rm1)
     found = asker.call(IK, IkRequest(goal=PoseGoal(position=(0.25, 0.15, 0.10)), solutions=4), timeout=30.0)
     assert found.code is PlanCode.SUCCESS

@@ -25,7 +25,7 @@ from schemas.planning import (
     Refusal,
 )
 from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.planner.collision.world import World
 from services.planner.core import Planner
 
@@ -150,7 +150,7 @@ def test_a_goal_in_self_collision_names_the_pair_and_how_far_it_can_go(planner: 
     assert again.code is PlanCode.SUCCESS
 
 
-def test_a_way_through_itself_names_the_pair(planner: Planner, rm1: Arm):
+def test_a_way_through_itself_names_the_pair(planner: Planner, rm1: ArmDescription):
     """From above the upper arm to beside the base: the straight way sinks into the arm before it is out."""
     start, goal = (0.0, 2.92, 0.2), (0.0, 2.66, 0.0)
     response = planner.plan(
@@ -163,13 +163,13 @@ def test_a_way_through_itself_names_the_pair(planner: Planner, rm1: Arm):
     assert "go via another configuration" in refusal.remedy
 
 
-def test_a_start_in_collision_is_not_planned_from(planner: Planner, rm1: Arm):
+def test_a_start_in_collision_is_not_planned_from(planner: Planner, rm1: ArmDescription):
     start = JointState(name=rm1.joint_names, position=(0.0, 2.9, 0.0))
     refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="home")), start), PlanCode.START_STATE_IN_COLLISION)
     assert "base_link with efector_link" in refusal.message
 
 
-def test_an_arm_that_touches_what_it_carries_is_told_what_to_do(rm1: Arm, home: JointState):
+def test_an_arm_that_touches_what_it_carries_is_told_what_to_do(rm1: ArmDescription, home: JointState):
     planner = Planner(rm1)
     held = SceneObject(name="held", shape=BoxShape(size=(0.4, 0.4, 0.4)), frame=rm1.tool_frame, attached=True)
     planner.set_world(World(rm1, planner.kinematics, PlanningScene(version=1, objects=(held,))))
@@ -197,13 +197,13 @@ def test_a_joint_state_without_a_joint_is_said(planner: Planner):
     assert "antebrazo_joint, efector_joint" in refusal.message
 
 
-def test_a_moving_start_is_refused_with_the_joint(planner: Planner, rm1: Arm):
+def test_a_moving_start_is_refused_with_the_joint(planner: Planner, rm1: ArmDescription):
     state = JointState(name=rm1.joint_names, position=(0.0, 0.0, 0.0), velocity=(0.0, 0.5, 0.0))
     refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="ready")), state), PlanCode.INVALID_ROBOT_STATE)
     assert (refusal.check, refusal.subject, refusal.value) == ("moving start", "antebrazo_joint", 0.5)
 
 
-def test_a_start_outside_the_limits_is_refused(planner: Planner, rm1: Arm):
+def test_a_start_outside_the_limits_is_refused(planner: Planner, rm1: ArmDescription):
     state = JointState(name=rm1.joint_names, position=(3.0, 0.0, 0.0))
     refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="ready")), state), PlanCode.INVALID_ROBOT_STATE)
     assert (refusal.subject, refusal.value, refusal.limit) == ("brazo_joint", 3.0, 2.95)

@@ -8,7 +8,7 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import JointGoal, PlanCode, PlanRequest, PointToPoint, PoseGoal
 from schemas.scene import AllowedPair, BoxShape, PlanningScene, SceneObject, SphereShape
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.world import World
 from services.planner.core import Planner
 
@@ -17,7 +17,7 @@ REQUEST = PlanRequest(goal=GOAL, motion=PointToPoint())
 
 
 @pytest.fixture
-def planner(rm1: Arm) -> Planner:
+def planner(rm1: ArmDescription) -> Planner:
     return Planner(rm1)
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from schemas.planning import PlanCode, PoseGoal, Refusal
 from services.arm.kinematics.kinematics import FramePose, Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.planner.kinematics.goals import Goals, Start
 from services.planner.request.deadline import NEVER
 from services.planner.request.refusals import PlanRefused
@@ -28,7 +28,7 @@ class Bench:
     """One arm, and what it says to goals."""
 
     def __init__(self, name: str) -> None:
-        self.arm: Arm = load_arm(ROOT / name)
+        self.arm: ArmDescription = load_arm(ROOT / name)
         self.kinematics = Kinematics(self.arm)
         self.goals = Goals(self.arm, self.kinematics)
         self.ready: Start = self.arm.named_states["ready"]

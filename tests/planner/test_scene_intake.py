@@ -14,7 +14,7 @@ from schemas.scene import AllowedPair, MeshShape, PlanningScene, SceneObject
 from services.arm.kinematics import self_collisions
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.kinematics.self_collisions import driver_of, shape_reach
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.bench.planner.scene_intake import drawn_scene
 from services.planner.collision import arm_geometry
 from services.planner.collision.world import World
@@ -33,7 +33,7 @@ def with_load(scene: PlanningScene, link: str) -> PlanningScene:
 
 
 @pytest.fixture(scope="module", params=["rm1", "parol6", "seven"])
-def arm(request: pytest.FixtureRequest, rm1_folder: Path) -> Arm:
+def arm(request: pytest.FixtureRequest, rm1_folder: Path) -> ArmDescription:
     return load_arm(SEVEN if request.param == "seven" else rm1_folder.parent / request.param)
 
 
@@ -48,7 +48,9 @@ class Counted:
         return self._function(*arguments, **more)  # type: ignore[operator]
 
 
-def test_a_scene_costs_no_walk_along_the_chain_for_what_stands_still(arm: Arm, monkeypatch: pytest.MonkeyPatch):
+def test_a_scene_costs_no_walk_along_the_chain_for_what_stands_still(
+    arm: ArmDescription, monkeypatch: pytest.MonkeyPatch
+):
     reach, load = Counted(arm_geometry.shape_reach), Counted(arm_geometry.load_collision_geometry)
     monkeypatch.setattr(arm_geometry, "shape_reach", reach)
     monkeypatch.setattr(self_collisions, "shape_reach", reach)
@@ -63,7 +65,7 @@ def test_a_scene_costs_no_walk_along_the_chain_for_what_stands_still(arm: Arm, m
     assert (reach.calls, load.calls) == (for_the_arm, 1)
 
 
-def test_one_object_more_is_one_object_computed(arm: Arm, monkeypatch: pytest.MonkeyPatch):
+def test_one_object_more_is_one_object_computed(arm: ArmDescription, monkeypatch: pytest.MonkeyPatch):
     scene = drawn_scene(1, OBJECTS + 1)
     fewer = PlanningScene(version=1, objects=scene.objects[:OBJECTS])
     kinematics = Kinematics(arm)
@@ -74,7 +76,7 @@ def test_one_object_more_is_one_object_computed(arm: Arm, monkeypatch: pytest.Mo
     assert made.calls == 1
 
 
-def test_the_reach_of_pairs_is_what_the_chain_between_them_gives(arm: Arm):
+def test_the_reach_of_pairs_is_what_the_chain_between_them_gives(arm: ArmDescription):
     kinematics = Kinematics(arm)
     world = World(arm, kinematics, with_load(drawn_scene(2, 12), arm.tool_frame))
     geometry, model = world.geometry, kinematics.model
@@ -90,7 +92,7 @@ def test_the_reach_of_pairs_is_what_the_chain_between_them_gives(arm: Arm):
     assert world.reach == pytest.approx(self_collisions.reach_of(arm, model, geometry.model), abs=1e-12)
 
 
-def test_distances_are_pinocchios_however_the_world_was_come_by(arm: Arm):
+def test_distances_are_pinocchios_however_the_world_was_come_by(arm: ArmDescription):
     """Of every pair of shapes, after objects have come, moved and gone."""
     kinematics = Kinematics(arm)
     for seed in range(3):
@@ -112,7 +114,7 @@ def test_distances_are_pinocchios_however_the_world_was_come_by(arm: Arm):
         assert world.distance(configuration) == pytest.approx(min(expected), abs=5e-6)
 
 
-def test_what_is_allowed_to_touch_is_not_checked_and_nothing_else_is_left_out(arm: Arm):
+def test_what_is_allowed_to_touch_is_not_checked_and_nothing_else_is_left_out(arm: ArmDescription):
     scene = with_load(drawn_scene(2, 12), arm.tool_frame)
     world = World(arm, Kinematics(arm), scene)
     links = [link.name for link in arm.model.links if link.collisions]
@@ -126,7 +128,7 @@ def test_what_is_allowed_to_touch_is_not_checked_and_nothing_else_is_left_out(ar
     assert {frozenset((link, other)) for link in moving for other in others} <= pairs
 
 
-def test_a_mesh_file_that_has_changed_is_read_again(arm: Arm, tmp_path: Path):
+def test_a_mesh_file_that_has_changed_is_read_again(arm: ArmDescription, tmp_path: Path):
     item = SceneObject(name="block", shape=MeshShape(path="block.stl"), pose=Transform(translation=(3.0, 0.0, 0.0)))
     scene, kinematics = PlanningScene(version=1, objects=(item,)), Kinematics(arm)
     (tmp_path / "block.stl").write_bytes(stl_box(0.1))

@@ -28,7 +28,7 @@ from schemas.scene import (
 )
 from schemas.topics import CONTACTS, JOINT_STATES, PLAN, SCENE, SCENE_EDIT
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.scene.scene_file import load_scene, save_scene
 from services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner
@@ -48,7 +48,7 @@ def edit(asker: Node, edit: SceneEdit) -> SceneResponse:
     return asker.call(SCENE_EDIT, SceneRequest(edit=edit), timeout=WAIT)
 
 
-def stand(asker: Node, arm: Arm) -> None:
+def stand(asker: Node, arm: ArmDescription) -> None:
     """A fresh joint state at rest in the home pose."""
     states = asker.publisher(JOINT_STATES)
     for _ in range(3):
@@ -56,7 +56,7 @@ def stand(asker: Node, arm: Arm) -> None:
         time.sleep(0.03)
 
 
-def plan(asker: Node, arm: Arm) -> PlanResponse:
+def plan(asker: Node, arm: ArmDescription) -> PlanResponse:
     """With joint states all the while: the planner's worker may have to start first."""
     stop = threading.Event()
 
@@ -73,13 +73,13 @@ def plan(asker: Node, arm: Arm) -> PlanResponse:
         thread.join(WAIT)
 
 
-def block(arm: Arm) -> SceneObject:
+def block(arm: ArmDescription) -> SceneObject:
     """In the way of the goal."""
     at = Kinematics(arm).tool((0.6, 0.0, 0.0)).position.tolist()
     return SceneObject(name="block", shape=BoxShape(size=(0.04, 0.04, 0.04)), pose=Transform(translation=tuple(at)))
 
 
-def test_an_edit_is_answered_latched_and_heeded_by_the_next_plan(asker: Node, rm1: Arm) -> None:
+def test_an_edit_is_answered_latched_and_heeded_by_the_next_plan(asker: Node, rm1: ArmDescription) -> None:
     assert edit(asker, SceneAdd(object=block(rm1))) == SceneResponse(accepted=True, version=1)
     scene = asker.latest(SCENE)
     asker.wait(0.2)
@@ -93,7 +93,7 @@ def test_an_edit_is_answered_latched_and_heeded_by_the_next_plan(asker: Node, rm
     assert plan(asker, rm1).code is PlanCode.SUCCESS
 
 
-def test_what_touches_is_shown_until_a_plan_succeeds(asker: Node, rm1: Arm) -> None:
+def test_what_touches_is_shown_until_a_plan_succeeds(asker: Node, rm1: ArmDescription) -> None:
     contacts = asker.latest(CONTACTS)
     edit(asker, SceneAdd(object=block(rm1)))
     refused = plan(asker, rm1)
@@ -110,7 +110,7 @@ def test_what_touches_is_shown_until_a_plan_succeeds(asker: Node, rm1: Arm) -> N
     assert contacts.message.contacts == ()
 
 
-def test_what_is_put_onto_the_arm_is_shown_to_touch_it_until_it_is_taken_away(asker: Node, rm1: Arm) -> None:
+def test_what_is_put_onto_the_arm_is_shown_to_touch_it_until_it_is_taken_away(asker: Node, rm1: ArmDescription) -> None:
     contacts, states = asker.latest(CONTACTS), asker.publisher(JOINT_STATES)
     standing = JointState(name=rm1.joint_names, position=(0.6, 0.0, 0.0))
     edit(asker, SceneClear())  # answered: the planner is there and hears where the arm stands
@@ -133,7 +133,7 @@ def test_a_bad_edit_is_refused_by_name_and_changes_nothing(asker: Node) -> None:
     assert response.version == 0
 
 
-def test_attaching_needs_to_know_where_the_arm_is(asker: Node, rm1: Arm) -> None:
+def test_attaching_needs_to_know_where_the_arm_is(asker: Node, rm1: ArmDescription) -> None:
     edit(asker, SceneAdd(object=SceneObject(name="cup", shape=SphereShape(radius=0.01))))
     attach = SceneAttach(name="cup", link=rm1.tool_frame)
     assert "it is not known where the arm is" in edit(asker, attach).reason
@@ -141,7 +141,7 @@ def test_attaching_needs_to_know_where_the_arm_is(asker: Node, rm1: Arm) -> None
     assert edit(asker, attach).accepted
 
 
-def test_a_restart_has_the_scene_as_it_was(tmp_path: Path, rm1: Arm) -> None:
+def test_a_restart_has_the_scene_as_it_was(tmp_path: Path, rm1: ArmDescription) -> None:
     with beside_a_planner(tmp_path, ends_within=LONG_WAIT) as asker:
         edit(asker, SceneAdd(object=block(rm1)))
         before = asker.latest(SCENE)
@@ -156,7 +156,7 @@ def test_a_restart_has_the_scene_as_it_was(tmp_path: Path, rm1: Arm) -> None:
         assert edit(asker, SceneClear()).version == 2
 
 
-def test_a_damaged_file_is_kept_aside_and_the_planner_serves(tmp_path: Path, rm1: Arm) -> None:
+def test_a_damaged_file_is_kept_aside_and_the_planner_serves(tmp_path: Path, rm1: ArmDescription) -> None:
     (tmp_path / "scene.json").write_text('{"objects": [')
     with beside_a_planner(tmp_path, ends_within=LONG_WAIT) as asker:
         assert plan(asker, rm1).code is PlanCode.SUCCESS
@@ -164,7 +164,7 @@ def test_a_damaged_file_is_kept_aside_and_the_planner_serves(tmp_path: Path, rm1
         assert edit(asker, SceneAdd(object=block(rm1))).version == 1
 
 
-def test_what_does_not_fit_the_arm_is_left_out_and_the_rest_stays(tmp_path: Path, rm1: Arm) -> None:
+def test_what_does_not_fit_the_arm_is_left_out_and_the_rest_stays(tmp_path: Path, rm1: ArmDescription) -> None:
     lost = SceneObject(name="lost", shape=SphereShape(radius=0.1), frame="no_link", attached=True)
     save_scene(tmp_path / "scene.json", PlanningScene(version=5, objects=(block(rm1), lost)))
     with beside_a_planner(tmp_path, ends_within=LONG_WAIT) as asker:

@@ -11,7 +11,7 @@ import pytest
 
 from schemas.planning import PoseGoal
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.planner.kinematics.goals import Goals
 from services.planner.kinematics.targets import AxisPointing, ToolTarget
 from services.planner.kinematics.task_space import TaskSpace, task_space
@@ -21,11 +21,11 @@ from services.planner.request.refusals import PlanRefused
 ROOT = Path(__file__).parents[2] / "urdf"
 
 
-def of(arm: Arm) -> TaskSpace:
+def of(arm: ArmDescription) -> TaskSpace:
     return task_space(arm, Kinematics(arm))
 
 
-def without(joints: list[str], folder: Path) -> Arm:
+def without(joints: list[str], folder: Path) -> ArmDescription:
     """parol6, some of whose joints are fixed."""
     source = ROOT / "parol6"
     for file in ("robot.urdf", "robot.srdf", "robot.toml"):

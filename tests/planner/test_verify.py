@@ -10,7 +10,7 @@ import pytest
 
 from schemas.motion import JointTrajectory
 from services.arm.interpolation import TrajectorySampler
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.clearance import first_collision
 from services.planner.core import Planner
 from services.planner.timing.profile import States, joint_limits, straight_line
@@ -21,7 +21,7 @@ START, GOAL = (0.0, 0.0, 0.0), (1.0, -0.5, 0.1)
 
 
 @pytest.fixture
-def trajectory(rm1: Arm) -> JointTrajectory:
+def trajectory(rm1: ArmDescription) -> JointTrajectory:
     return straight_line(rm1.joint_names, START, GOAL, joint_limits(rm1))
 
 
@@ -35,7 +35,9 @@ def test_it_samples_what_the_gateway_will_play(trajectory: JointTrajectory):
 
 
 @pytest.mark.parametrize("what", ["velocity", "acceleration"])
-def test_a_limit_that_is_exceeded_is_named_with_joint_and_time(rm1: Arm, trajectory: JointTrajectory, what: str):
+def test_a_limit_that_is_exceeded_is_named_with_joint_and_time(
+    rm1: ArmDescription, trajectory: JointTrajectory, what: str
+):
     tight = msgspec.structs.replace  # the arm's own limits are what a faster trajectory would break
     faster = tight(trajectory, points=tuple(_sped_up(point) for point in trajectory.points))
     with pytest.raises(BadTrajectory, match=r'velocity of "efector_joint" is .* at .* s, .* beyond its limit'):
@@ -54,7 +56,7 @@ def _sped_up(point):
     )
 
 
-def test_a_position_beyond_its_limit_is_named(rm1: Arm):
+def test_a_position_beyond_its_limit_is_named(rm1: ArmDescription):
     beyond = straight_line(rm1.joint_names, START, (0.0, 3.0, 0.0), joint_limits(rm1))
     with pytest.raises(BadTrajectory, match=r'position of "antebrazo_joint" is 3 at'):
         require_within_limits(rm1, sample(beyond), joint_limits(rm1))
@@ -96,7 +98,7 @@ def test_however_a_trajectory_swings_it_is_seen_to_reach_as_far(seed: int):
 
 @pytest.mark.parametrize("what", ["positions", "velocities", "accelerations", "times"])
 def test_what_is_not_a_number_is_not_within_limits_however_much_comes_behind_it(
-    rm1: Arm, trajectory: JointTrajectory, what: str
+    rm1: ArmDescription, trajectory: JointTrajectory, what: str
 ):
     states = verify.states_of(trajectory)
     odd = getattr(states, what).copy()
@@ -107,7 +109,9 @@ def test_what_is_not_a_number_is_not_within_limits_however_much_comes_behind_it(
 
 
 @pytest.mark.parametrize("what", ["position", "velocity", "acceleration", "jerk"])
-def test_of_a_quick_look_each_limit_is_told_in_the_same_words(rm1: Arm, trajectory: JointTrajectory, what: str):
+def test_of_a_quick_look_each_limit_is_told_in_the_same_words(
+    rm1: ArmDescription, trajectory: JointTrajectory, what: str
+):
     states, limits = verify.states_of(trajectory), joint_limits(rm1)
     verify.require_limits(rm1, states, verify.look(states), limits, True)
     if what == "position":
@@ -143,7 +147,7 @@ def test_wrong_ends_are_refused(trajectory: JointTrajectory):
 
 
 @pytest.mark.parametrize("step", [0.0, -0.01])
-def test_a_time_that_stands_or_goes_back_is_refused(rm1: Arm, trajectory: JointTrajectory, step: float):
+def test_a_time_that_stands_or_goes_back_is_refused(rm1: ArmDescription, trajectory: JointTrajectory, step: float):
     """Between two points at the same time a joint could be anywhere, and nothing measured there is a number."""
     points = list(trajectory.points)
     points[3] = msgspec.structs.replace(points[3], time_from_start=points[2].time_from_start + step)

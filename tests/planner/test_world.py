@@ -21,7 +21,7 @@ from schemas.scene import (
     SphereShape,
 )
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.planner.collision.scene_shapes import SceneError
 from services.planner.collision.world import World
 
@@ -29,7 +29,7 @@ LINK_PAIR_MARGIN = 0.05  # [m]
 ROUNDING = 2e-6  # [m] coal's GJK stops at 1e-6, from where it stopped last
 
 
-def configurations(arm: Arm, count: int) -> np.ndarray:
+def configurations(arm: ArmDescription, count: int) -> np.ndarray:
     random = np.random.default_rng(4)
     lower = [max(joint.lower, -3.0) for joint in arm.joints]
     upper = [min(joint.upper, 3.0) for joint in arm.joints]

@@ -13,7 +13,7 @@ from schemas.joints import JointState
 from schemas.planning import NamedGoal, PlanCode, PlanRequest
 from services.arm.checks.check import Severity, check
 from services.arm.device.device_config import device_config
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.planner.core import Planner
@@ -26,7 +26,7 @@ class Imported:
 
     export: Export
     said: str
-    arm: Arm
+    arm: ArmDescription
 
 
 @pytest.fixture(scope="module", params=EXPORTS, ids=lambda build: build.__name__)

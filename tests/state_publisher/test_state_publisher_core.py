@@ -10,17 +10,17 @@ import pytest
 from schemas.joints import JointState
 from services.arm.frames.frame_buffer import FrameBuffer
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.state_publisher.core import StatePublisher
 
 STAMP = 1_700_000_000_123_456_789
 
 
-def state(arm: Arm, *position: float, stamp: int = STAMP) -> JointState:
+def state(arm: ArmDescription, *position: float, stamp: int = STAMP) -> JointState:
     return JointState(stamp=stamp, name=arm.joint_names, position=position)
 
 
-def test_frames_carry_the_states_own_stamp(rm1: Arm):
+def test_frames_carry_the_states_own_stamp(rm1: ArmDescription):
     found = StatePublisher(rm1).on_joint_state(state(rm1, 0.1, 0.2, 0.03))
     assert found.frames is not None
     assert [(f.stamp, f.parent, f.child) for f in found.frames.transforms] == [
@@ -30,7 +30,7 @@ def test_frames_carry_the_states_own_stamp(rm1: Arm):
     ]
 
 
-def test_the_frames_put_the_tool_where_pinocchio_has_it(rm1: Arm):
+def test_the_frames_put_the_tool_where_pinocchio_has_it(rm1: ArmDescription):
     publisher, kinematics, generator = StatePublisher(rm1), Kinematics(rm1), np.random.default_rng(3)
     for _ in range(100):
         q = generator.uniform([j.lower for j in rm1.joints], [j.upper for j in rm1.joints])
@@ -43,13 +43,13 @@ def test_the_frames_put_the_tool_where_pinocchio_has_it(rm1: Arm):
         )
 
 
-def test_the_order_of_names_is_theirs(rm1: Arm):
+def test_the_order_of_names_is_theirs(rm1: ArmDescription):
     publisher = StatePublisher(rm1)
     turned = JointState(stamp=STAMP, name=tuple(reversed(rm1.joint_names)), position=(0.03, 0.2, 0.1))
     assert publisher.on_joint_state(turned).frames == publisher.on_joint_state(state(rm1, 0.1, 0.2, 0.03)).frames
 
 
-def test_an_unknown_joint_is_dropped_counted_and_said_once(rm1: Arm):
+def test_an_unknown_joint_is_dropped_counted_and_said_once(rm1: ArmDescription):
     publisher = StatePublisher(rm1)
     strange = JointState(stamp=STAMP, name=("braso_joint", *rm1.joint_names), position=(9.0, 0.1, 0.2, 0.03))
     first, second = publisher.on_joint_state(strange), publisher.on_joint_state(strange)
@@ -59,7 +59,7 @@ def test_an_unknown_joint_is_dropped_counted_and_said_once(rm1: Arm):
     assert first.frames == publisher.on_joint_state(state(rm1, 0.1, 0.2, 0.03)).frames
 
 
-def test_a_state_whose_sizes_differ_is_dropped_and_said_once(rm1: Arm):
+def test_a_state_whose_sizes_differ_is_dropped_and_said_once(rm1: ArmDescription):
     publisher = StatePublisher(rm1)
     bad = JointState(stamp=STAMP, name=rm1.joint_names, position=(0.0,))
     assert "3 names with 1 positions" in publisher.on_joint_state(bad).warnings[0]
@@ -67,17 +67,17 @@ def test_a_state_whose_sizes_differ_is_dropped_and_said_once(rm1: Arm):
     assert publisher.dropped["sizes"] == 2
 
 
-def test_a_part_of_the_joints_gives_their_frames_only(rm1: Arm):
+def test_a_part_of_the_joints_gives_their_frames_only(rm1: ArmDescription):
     frames = StatePublisher(rm1).on_joint_state(JointState(name=("brazo_joint",), position=(1.0,))).frames
     assert frames is not None
     assert [f.child for f in frames.transforms] == ["brazo_link"]
 
 
-def test_an_empty_state_gives_nothing(rm1: Arm):
+def test_an_empty_state_gives_nothing(rm1: ArmDescription):
     assert StatePublisher(rm1).on_joint_state(JointState()).frames is None
 
 
-def test_rm1_has_no_fixed_links(rm1: Arm):
+def test_rm1_has_no_fixed_links(rm1: ArmDescription):
     assert StatePublisher(rm1).static_frames(STAMP).transforms == ()
 
 

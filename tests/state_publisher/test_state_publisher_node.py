@@ -11,7 +11,7 @@ import pytest
 from schemas.deployment import Deployment, PathsSection
 from schemas.joints import JointState
 from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
 from services.runtime.process.shutdown import ShutdownRequest
@@ -40,7 +40,7 @@ def listener(tmp_path: Path) -> Iterator[Node]:
         assert not thread.is_alive()
 
 
-def test_a_late_joiner_gets_the_description_and_static_frames(listener: Node, rm1: Arm):
+def test_a_late_joiner_gets_the_description_and_static_frames(listener: Node, rm1: ArmDescription):
     description, static = listener.latest(DESCRIPTION), listener.latest(STATIC_FRAMES)
     listener.wait(0.2)
     assert description.message is not None
@@ -49,7 +49,7 @@ def test_a_late_joiner_gets_the_description_and_static_frames(listener: Node, rm
     assert static.message is not None
 
 
-def test_frames_come_with_the_states_stamp_and_readiness_with_them(listener: Node, rm1: Arm, tmp_path: Path):
+def test_frames_come_with_the_states_stamp_and_readiness_with_them(listener: Node, rm1: ArmDescription, tmp_path: Path):
     frames, states = listener.latest(FRAMES), listener.publisher(JOINT_STATES)
     assert not (tmp_path / "state_publisher.ready").exists()
     for stamp in range(1, 11):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from schemas.message import Vector
 from schemas.motion import JointTrajectory, TrajectoryPoint
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.stepper_gateway.motion.knots import Knot, Limits
 from services.stepper_gateway.motion.paths import profile
 from services.virtual_arm.virtual_arm import VirtualArm, rm1
@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def move(
-    start: Vector, end: Vector, period: float = 0.05, slower: float = 1.0, arm: Arm | None = None
+    start: Vector, end: Vector, period: float = 0.05, slower: float = 1.0, arm: ArmDescription | None = None
 ) -> JointTrajectory:
     """A jerk-limited move from rest to rest in points of `period` seconds, as the planner makes them."""
     arm = arm or rm1()

@@ -17,7 +17,7 @@ from schemas.device import DeviceCommandKind, InjectKind, InjectRequest, OutputC
 from schemas.gripper import GripperCommandGoal, GripperState
 from schemas.robot import ServoGripper
 from schemas.topics import GRIPPER_STATE
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.arm.model.gripper import opening_of, pulse_of
 from services.virtual_arm.virtual_arm import VirtualArm, rm1
 
@@ -32,7 +32,7 @@ def servo() -> ServoGripper:
     return gripper
 
 
-def unmeasured() -> Arm:
+def unmeasured() -> ArmDescription:
     """rm1 whose servo has no wire of its potentiometer."""
     return replace(rm1(), gripper=msgspec.structs.replace(servo(), sensor=""))
 

@@ -18,7 +18,7 @@ from schemas.actions import GoalStatusCode
 from schemas.deployment import Deployment, SerialSection
 from schemas.device import DeviceCommandKind
 from schemas.robot import Dialect
-from services.arm.model.description import Arm, heard_by_the_board, load_arm
+from services.arm.model.description import ArmDescription, heard_by_the_board, load_arm
 from services.stepper_gateway.links.foreign.text_exchange import RETRIES, TextExchange
 from services.stepper_gateway.links.foreign.text_link import TextLink
 from services.stepper_gateway.links.foreign.text_messages import AnswerReader, LineAnswer, line_of, read_answer
@@ -32,7 +32,7 @@ from tests.stepper_gateway.wired import WiredGateway
 END = (0.1, -0.2, 0.01)
 
 
-def text_arm() -> Arm:
+def text_arm() -> ArmDescription:
     arm = rm1()
     return heard_by_the_board(replace(arm, device=msgspec.structs.replace(arm.device, dialect=Dialect.TEXT)))
 

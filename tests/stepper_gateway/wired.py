@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from schemas.device import InjectRequest, InjectResponse
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.mqtt.access import BrokerAccess
 from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.links.mqtt import MqttLink
@@ -27,7 +27,7 @@ class WiredGateway(GatewayDriver):
     """Core and link with a small loop of their own, without the bus."""
 
     def __init__(
-        self, port: int = 0, link: Callable[[Callable[[], None]], Link] | None = None, arm: Arm | None = None
+        self, port: int = 0, link: Callable[[Callable[[], None]], Link] | None = None, arm: ArmDescription | None = None
     ) -> None:
         super().__init__()
         self.arm = arm or rm1()

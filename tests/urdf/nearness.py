@@ -7,10 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 import pinocchio as pin
 
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 
-def nearest_distances(arm: Arm, configurations: Iterable[np.ndarray]) -> dict[frozenset[str], float]:
+def nearest_distances(arm: ArmDescription, configurations: Iterable[np.ndarray]) -> dict[frozenset[str], float]:
     """[m] of every pair of links with collision shapes; negative where they have touched."""
     model = pin.buildModelFromUrdf(str(arm.urdf_path))
     geometry = pin.buildGeomFromUrdf(model, str(arm.urdf_path), pin.GeometryType.COLLISION)

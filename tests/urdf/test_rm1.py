@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import ShapeKind
@@ -23,13 +23,13 @@ SEED = {
 }  # [m]; the sign of the last z is explained in the URDF
 
 
-def test_the_origins_are_the_seeds(rm1: Arm):
+def test_the_origins_are_the_seeds(rm1: ArmDescription):
     for name, xyz in SEED.items():
         assert rm1.model.joint(name).origin.xyz == xyz
     assert rm1.model.joint("brazo_joint").origin.xyz == (0.0, 0.0, 0.0)
 
 
-def test_forearm_and_effector_have_the_seeds_size(rm1: Arm):
+def test_forearm_and_effector_have_the_seeds_size(rm1: ArmDescription):
     sizes = {
         link.get("name"): box.get("size")
         for link in ET.parse(rm1.urdf_path).getroot().findall("link")
@@ -39,7 +39,7 @@ def test_forearm_and_effector_have_the_seeds_size(rm1: Arm):
     assert sizes["efector_link"] == "0.024 0.042 0.191"
 
 
-def test_the_motors_are_wired_as_the_seeds(rm1: Arm):
+def test_the_motors_are_wired_as_the_seeds(rm1: ArmDescription):
     """Wire name, driver, STEP, DIR, inverted, and the pulse width that q1's driver gets [us]."""
     wired = [
         (j.wire_name, j.driver.name, j.drive.motor.step_pin, j.drive.motor.dir_pin, j.drive.motor.inverted)
@@ -51,14 +51,14 @@ def test_the_motors_are_wired_as_the_seeds(rm1: Arm):
     assert rm1.joint("brazo_joint").driver.step_high_us == 5.0
 
 
-def test_the_limits_are_the_seeds(rm1: Arm):
+def test_the_limits_are_the_seeds(rm1: ArmDescription):
     limits = [(joint.lower, joint.upper) for joint in rm1.joints]
     assert limits == [(-2.95, 2.95), (-2.95, 2.95), (0.0, 0.2)]
     assert [rm1.model.joint(joint.name).limit.velocity for joint in rm1.joints[:2]] == [1.57, 1.57]
     assert rm1.model.joint("efector_joint").origin.rpy == pytest.approx((3.1416, 0.0, 0.0), abs=1e-5)
 
 
-def test_every_named_state_is_within_limits_and_free(rm1: Arm):
+def test_every_named_state_is_within_limits_and_free(rm1: ArmDescription):
     kinematics = Kinematics(rm1)
     assert {"home", "ready"} <= set(rm1.named_states)
     for configuration in rm1.named_states.values():
@@ -66,7 +66,7 @@ def test_every_named_state_is_within_limits_and_free(rm1: Arm):
         assert kinematics.self_collisions(configuration, margin=0.004) == []
 
 
-def test_base_and_forearm_never_come_near_and_the_checked_pairs_sometimes_touch(rm1: Arm):
+def test_base_and_forearm_never_come_near_and_the_checked_pairs_sometimes_touch(rm1: ArmDescription):
     """What the SRDF says, by sampling: "Never" is never, and what is checked is worth checking."""
     nearest = nearest_distances(rm1, configurations(rm1, 5000))
     assert nearest[frozenset(("base_link", "antebrazo_link"))] > 0.06
@@ -74,12 +74,12 @@ def test_base_and_forearm_never_come_near_and_the_checked_pairs_sometimes_touch(
     assert nearest[frozenset(("brazo_link", "efector_link"))] < 0.0
 
 
-def configurations(arm: Arm, count: int) -> np.ndarray:
+def configurations(arm: ArmDescription, count: int) -> np.ndarray:
     generator = np.random.default_rng(7)
     return generator.uniform([j.lower for j in arm.joints], [j.upper for j in arm.joints], (count, len(arm.joints)))
 
 
-def test_the_meshes_load(rm1: Arm):
+def test_the_meshes_load(rm1: ArmDescription):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         import yourdfpy
@@ -89,7 +89,7 @@ def test_the_meshes_load(rm1: Arm):
     assert (high - low).tolist() == pytest.approx((0.508, 0.18, 0.259), abs=0.01)
 
 
-def test_what_is_drawn_lies_within_the_collision_shapes_but_for_screws_and_corners(rm1: Arm):
+def test_what_is_drawn_lies_within_the_collision_shapes_but_for_screws_and_corners(rm1: ArmDescription):
     """A motor that can be seen and not be touched would go through what the planner keeps clear of."""
     solids = {
         ShapeKind.BOX: lambda size: Box(tuple(0.5 * edge for edge in size)),

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.bench.vision.mounting import MountingTrial, closed_form, level_trial, looking, six_joint_trial, tool_error
 from services.runtime.deployment import project_root
 from services.vision.boards import Sighting, TagBoard
@@ -24,7 +24,7 @@ HAND_EYE = (cv2.CALIB_HAND_EYE_PARK, cv2.CALIB_HAND_EYE_TSAI, cv2.CALIB_HAND_EYE
 
 
 @pytest.fixture(scope="module")
-def rm1() -> Arm:
+def rm1() -> ArmDescription:
     return load_arm(project_root() / "urdf/rm1")
 
 
@@ -54,14 +54,14 @@ def test_an_arm_that_is_itself_off_costs_no_more_than_it_is_off() -> None:
     assert 0.0002 < fit.held_out < 0.003
 
 
-def test_hand_eye_methods_fail_on_an_arm_that_cannot_tilt(rm1: Arm) -> None:
+def test_hand_eye_methods_fail_on_an_arm_that_cannot_tilt(rm1: ArmDescription) -> None:
     trial = level_trial(rm1, MODEL, ONE, 15, np.random.default_rng(0))
     for method in HAND_EYE:
         found = closed_form(trial, MODEL, Carrier.BOARD, method)
         assert found is None or tool_error(found, trial.parent_from_camera, Carrier.BOARD) > 30.0
 
 
-def test_what_an_arm_that_cannot_tilt_leaves_open_is_refused_by_name(rm1: Arm) -> None:
+def test_what_an_arm_that_cannot_tilt_leaves_open_is_refused_by_name(rm1: ArmDescription) -> None:
     trial = level_trial(rm1, MODEL, ONE, 15, np.random.default_rng(0))
     fit = fit_mount(trial.views, MODEL, Carrier.BOARD)
     assert not fit.is_accepted
@@ -71,14 +71,14 @@ def test_what_an_arm_that_cannot_tilt_leaves_open_is_refused_by_name(rm1: Arm) -
     )
 
 
-def test_with_the_height_given_it_is_determined(rm1: Arm) -> None:
+def test_with_the_height_given_it_is_determined(rm1: ArmDescription) -> None:
     trial = level_trial(rm1, MODEL, ONE, 15, np.random.default_rng(1))
     fit = fit_mount(trial.views, MODEL, Carrier.BOARD, height=-0.04)
     assert fit.is_accepted
     assert tool_error(fit.parent_from_camera, trial.parent_from_camera, Carrier.BOARD) < 1.0
 
 
-def test_poses_that_never_turn_are_refused(rm1: Arm) -> None:
+def test_poses_that_never_turn_are_refused(rm1: ArmDescription) -> None:
     trial = six_joint_trial(MODEL, Carrier.BOARD, NINE, 8, np.random.default_rng(1), tilt=0.0)
     level = [dataclasses.replace(view, base_from_link=_unturned(view.base_from_link)) for view in trial.views]
     again = _seen_again(trial, [view.base_from_link for view in level])

@@ -16,7 +16,7 @@ from firmware.platform.host.flash import Flash, NetworkCredentials
 from firmware.platform.host.memory import BootState, PositionStore, StoredPosition
 from schemas.device_config import config_text
 from services.arm.device.device_config import device_config, reference_steps
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.gripper import gripper_unit
 
 
@@ -51,7 +51,7 @@ class Board:
     It leaves the factory with the configuration that robot.toml asks for, and the arm in its reference pose.
     """
 
-    def __init__(self, arm: Arm, folder: Path, name: str) -> None:
+    def __init__(self, arm: ArmDescription, folder: Path, name: str) -> None:
         self._factory = config_text(device_config(arm))
         self._reference = reference_steps(arm)
         self._gripper = arm.gripper

@@ -10,7 +10,7 @@ from paho.mqtt import client as paho
 
 from firmware.platform.host.link import Item, MqttMessage, ShutdownRequested
 from firmware.platform.host.sketch import HostSketch
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.motors.relative_moves import ramp_of
 from services.mqtt.access import BrokerAccess
 from services.mqtt.client import MqttClient
@@ -26,7 +26,9 @@ BEAT = 1.0  # [s] of the readiness file
 class VirtualSketch:
     """One sketch on one broker; its shafts start at zero, wherever the arm is believed to be."""
 
-    def __init__(self, arm: Arm, broker: BrokerAccess, inbox: queue.SimpleQueue[Item], readiness: Readiness) -> None:
+    def __init__(
+        self, arm: ArmDescription, broker: BrokerAccess, inbox: queue.SimpleQueue[Item], readiness: Readiness
+    ) -> None:
         self.sketch = HostSketch([ramp_of(joint.drive) for joint in arm.joints])
         self._inbox, self._readiness = inbox, readiness
         self._broker = broker

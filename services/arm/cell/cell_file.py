@@ -27,7 +27,7 @@ from schemas.cell import (
 from schemas.deployment import Deployment
 from services.arm.cell.camera_file import CAMERA_FILE, load_measured
 from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.arm.model.robot_file import Keys, line_of, read_robot_data, read_text, where_of
 
 TAG_COUNTS = {
@@ -101,7 +101,7 @@ def deployed_cell(deployment: Deployment) -> Cell:
     return load_cell(Path(deployment.cell), load_arm(Path(deployment.robot)))
 
 
-def load_cell(path: Path, arm: Arm) -> Cell:
+def load_cell(path: Path, arm: ArmDescription) -> Cell:
     """The cell around `arm`; raises `DescriptionError` for what is wrong in cell.toml or in camera.toml beside it."""
     text = read_text(path)
     data = read_robot_data(path, text, CellFile)
@@ -116,7 +116,7 @@ def load_cell(path: Path, arm: Arm) -> Cell:
     return Cell(path, file.camera, file.tag, file.thing, file.place, file.table, measured)
 
 
-def _faults(cell: Cell, arm: Arm) -> Iterator[tuple[Keys, str]]:
+def _faults(cell: Cell, arm: ArmDescription) -> Iterator[tuple[Keys, str]]:
     """Where each fault stands, and its sentence."""
     for what, named in (("camera", cell.cameras), ("thing", cell.things), ("place", cell.places)):
         yield from _repeated(what, [each.name for each in named])
@@ -135,7 +135,7 @@ def _repeated(what: str, names: list[str]) -> Iterator[tuple[Keys, str]]:
             yield (what, number, "name"), f'there are two [[{what}]] "{name}": give each a name of its own'
 
 
-def _camera_faults(keys: Keys, camera: CameraRecord, cell: Cell, arm: Arm) -> Iterator[tuple[Keys, str]]:
+def _camera_faults(keys: Keys, camera: CameraRecord, cell: Cell, arm: ArmDescription) -> Iterator[tuple[Keys, str]]:
     yield from _parent_faults(keys, f'camera "{camera.name}"', camera.parent, arm)
     length = sum((a - b) ** 2 for a, b in zip(camera.position, camera.look_at, strict=True)) ** 0.5
     if length < NEAREST_LOOK:
@@ -152,13 +152,13 @@ def _source_faults(keys: Keys, name: str, source: Source, cell: Cell) -> Iterato
         yield (*keys, "distortion"), f'camera "{name}": {said}'
 
 
-def _parent_faults(keys: Keys, what: str, parent: str, arm: Arm) -> Iterator[tuple[Keys, str]]:
+def _parent_faults(keys: Keys, what: str, parent: str, arm: ArmDescription) -> Iterator[tuple[Keys, str]]:
     if parent and parent not in arm.model.link_names:
         known = suggestion(parent, arm.model.link_names)
         yield (*keys, "parent"), f'{what}: {arm.name} has no link "{parent}"{known}'
 
 
-def _thing_faults(keys: Keys, thing: Thing, cell: Cell, arm: Arm) -> Iterator[tuple[Keys, str]]:
+def _thing_faults(keys: Keys, thing: Thing, cell: Cell, arm: ArmDescription) -> Iterator[tuple[Keys, str]]:
     if arm.gripper is not None:
         width, most = grasp_width(thing), arm.gripper.open
         if width >= most:

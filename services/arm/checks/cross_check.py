@@ -7,12 +7,12 @@ from pathlib import Path
 
 from services.arm.checks.findings import Finding, error, warning
 from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 TOLERANCE = 1e-9  # [m]
 
 
-def check_with_yourdfpy(arm: Arm) -> list[Finding]:
+def check_with_yourdfpy(arm: ArmDescription) -> list[Finding]:
     """Findings of yourdfpy on the arm's URDF; a warning where it is not installed."""
     file = arm.urdf_path.name
     try:

@@ -12,7 +12,7 @@ from schemas.robot import Homing, HomingDirection, PinLevel, ServoGripper
 from services.arm.device.device_parts import input_config, output_config, sensor_config
 from services.arm.device.device_values import device_name, int32, nearest, pin_or_unused
 from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.description import Arm, Joint
+from services.arm.model.description import ArmDescription, Joint
 from services.arm.model.gripper import pulse_speed
 from services.arm.motors.steps import Q8, StepScale
 
@@ -24,7 +24,7 @@ MAX_COUNTS = {"joint": 8, "input": 16, "output": 8, "sensor": 8}  # of one devic
 DEFAULT_TRAVEL_FACTOR = 1.1  # how far a joint looks for its switch, where robot.toml does not say
 
 
-def device_config(arm: Arm) -> DeviceConfig:
+def device_config(arm: ArmDescription) -> DeviceConfig:
     """The device configuration of an arm; raises `DescriptionError` with the thing, its value and the remedy."""
     _require_counts(arm)
     device = arm.device
@@ -45,13 +45,13 @@ def device_config(arm: Arm) -> DeviceConfig:
     )
 
 
-def reference_steps(arm: Arm) -> tuple[int, ...]:
+def reference_steps(arm: ArmDescription) -> tuple[int, ...]:
     """Whole steps of the pose that robot.toml declares as the reference."""
     positions = zip(arm.joints, arm.reference_position, strict=True)
     return tuple(math.floor(joint.steps.to_steps(position) + 0.5) for joint, position in positions)
 
 
-def _joint(joint: Joint, arm: Arm) -> JointConfig:
+def _joint(joint: Joint, arm: ArmDescription) -> JointConfig:
     where, motor = f'joint "{joint.name}"', joint.drive.motor
     _require_tick(joint, arm.device.tick_hz)
     scale = joint.steps.per_unit * Q8 * HEADROOM
@@ -70,7 +70,7 @@ def _joint(joint: Joint, arm: Arm) -> JointConfig:
     )
 
 
-def _servo(arm: Arm) -> ServoConfig | UnsetType:
+def _servo(arm: ArmDescription) -> ServoConfig | UnsetType:
     gripper = arm.gripper
     if not isinstance(gripper, ServoGripper):
         return UNSET
@@ -84,7 +84,7 @@ def _servo(arm: Arm) -> ServoConfig | UnsetType:
     )
 
 
-def _homing(homing: Homing, joint: Joint, arm: Arm) -> HomingConfig:
+def _homing(homing: Homing, joint: Joint, arm: ArmDescription) -> HomingConfig:
     where = f'joint "{joint.name}": homing'
     names = [switch.name for switch in arm.inputs]
     if homing.switch not in names:
@@ -121,7 +121,7 @@ def _sensor_hz(rate: int) -> int:
     return rate
 
 
-def _require_counts(arm: Arm) -> None:
+def _require_counts(arm: ArmDescription) -> None:
     parts = {"joint": arm.joints, "input": arm.inputs, "output": arm.outputs, "sensor": arm.sensors}
     for kind, things in parts.items():
         if len(things) > MAX_COUNTS[kind]:

@@ -8,10 +8,10 @@ from schemas.device_config import UNUSED, InputConfig, InputRole, OutputConfig, 
 from schemas.robot import DigitalOutput, Input, PinLevel, Sensor
 from services.arm.device.device_values import device_name, int32, nearest, pin_or_unused
 from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 
-def input_config(switch: Input, arm: Arm) -> InputConfig:
+def input_config(switch: Input, arm: ArmDescription) -> InputConfig:
     """A switch; raises `DescriptionError` for a joint that is not there."""
     where = f'input "{switch.name}"'
     return InputConfig(
@@ -24,7 +24,7 @@ def input_config(switch: Input, arm: Arm) -> InputConfig:
     )
 
 
-def _joint_index(switch: Input, arm: Arm, where: str) -> int:
+def _joint_index(switch: Input, arm: ArmDescription, where: str) -> int:
     if switch.role is InputRole.ESTOP:
         if switch.joint:
             raise DescriptionError(f'{where}: an e-stop belongs to all joints, not to "{switch.joint}": remove `joint`')

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.kinematics.link_distances import LinkDistances
 from services.arm.kinematics.self_collisions import LinkPair
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.urdf import JointKind
 
 Array = NDArray[np.float64]
@@ -56,7 +56,10 @@ def _tell_nobody(_: str) -> None:
 
 
 def collision_matrix(
-    arm: Arm, samples: int = SAMPLES, tell: Callable[[str], None] = _tell_nobody, always_within: float | None = None
+    arm: ArmDescription,
+    samples: int = SAMPLES,
+    tell: Callable[[str], None] = _tell_nobody,
+    always_within: float | None = None,
 ) -> list[LinkPairData]:
     """Every pair of links that have collision shapes; the same arm gives the same matrix. `tell` hears of progress.
 
@@ -79,7 +82,12 @@ def collision_matrix(
 
 
 def _pair_data(
-    arm: Arm, links: LinkDistances, number: int, configurations: Array, random: np.random.Generator, within: float
+    arm: ArmDescription,
+    links: LinkDistances,
+    number: int,
+    configurations: Array,
+    random: np.random.Generator,
+    within: float,
 ) -> LinkPairData:
     pair, never_below = links.pairs[number], arm.clearance + SPARE
     is_settled = are_adjacent(arm, *pair) or are_rigid_links(arm, *pair)
@@ -119,7 +127,9 @@ def _farthest(links: LinkDistances, number: int, configurations: Array, enough: 
     return best
 
 
-def _nearest_from(arm: Arm, links: LinkDistances, pair: LinkPair, start: Array, random: np.random.Generator) -> float:
+def _nearest_from(
+    arm: ArmDescription, links: LinkDistances, pair: LinkPair, start: Array, random: np.random.Generator
+) -> float:
     """[m] by a random search in a shrinking neighbourhood."""
     lower, upper = _limits(arm)
     best, configuration = links.distance(pair, start), start
@@ -134,31 +144,31 @@ def _nearest_from(arm: Arm, links: LinkDistances, pair: LinkPair, start: Array, 
     return best
 
 
-def _configurations(arm: Arm, samples: int, random: np.random.Generator) -> Array:
+def _configurations(arm: ArmDescription, samples: int, random: np.random.Generator) -> Array:
     """(m, n) the named ones and random ones within the limits."""
     lower, upper = _limits(arm)
     named = [np.array(state) for state in arm.named_states.values()]
     return np.vstack([*named, random.uniform(lower, upper, (samples, len(lower)))])
 
 
-def _limits(arm: Arm) -> tuple[Array, Array]:
+def _limits(arm: ArmDescription) -> tuple[Array, Array]:
     """(n,) each; a whole turn where there is none."""
     lower = np.array([joint.lower if math.isfinite(joint.lower) else -math.pi for joint in arm.joints])
     upper = np.array([joint.upper if math.isfinite(joint.upper) else math.pi for joint in arm.joints])
     return lower, upper
 
 
-def are_adjacent(arm: Arm, first: str, second: str) -> bool:
+def are_adjacent(arm: ArmDescription, first: str, second: str) -> bool:
     """True if one joint is between two links; links without a shape in between do not count."""
     return second in _neighbours(arm, first) or first in _neighbours(arm, second)
 
 
-def are_rigid_links(arm: Arm, first: str, second: str) -> bool:
+def are_rigid_links(arm: ArmDescription, first: str, second: str) -> bool:
     """True if there are only fixed joints between two links."""
     return _rigid_root(arm, first) == _rigid_root(arm, second)
 
 
-def _rigid_root(arm: Arm, link: str) -> str:
+def _rigid_root(arm: ArmDescription, link: str) -> str:
     """The link next to the moving joint, or the root, that carries `link` by fixed joints."""
     above = {joint.child: joint for joint in arm.model.joints}
     while link in above and above[link].kind is JointKind.FIXED:
@@ -166,7 +176,7 @@ def _rigid_root(arm: Arm, link: str) -> str:
     return link
 
 
-def _neighbours(arm: Arm, link: str) -> Iterator[str]:
+def _neighbours(arm: ArmDescription, link: str) -> Iterator[str]:
     """The nearest links with a shape on the way out from `link`."""
     shaped = {each.name for each in arm.model.links if each.collisions}
     for joint in arm.model.joints:

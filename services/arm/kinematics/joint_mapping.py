@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from services.arm.errors import DescriptionError
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.urdf import UrdfJoint
 
 Vector = NDArray[np.float64]
@@ -32,7 +32,7 @@ class _Entry:
 class JointMapping:
     """Fills pinocchio's vectors from the arm's joints, and folds its Jacobian's columns back."""
 
-    def __init__(self, arm: Arm, model: pin.Model) -> None:
+    def __init__(self, arm: ArmDescription, model: pin.Model) -> None:
         self._entries = [_entry(arm, model, index) for index in range(1, model.njoints)]
         self._size = len(arm.joints)
         self._is_same = self._entries == [_Entry(i, 1.0, 0.0, i, i, False) for i in range(self._size)]
@@ -65,13 +65,13 @@ class JointMapping:
         return folded
 
 
-def _entry(arm: Arm, model: pin.Model, index: int) -> _Entry:
+def _entry(arm: ArmDescription, model: pin.Model, index: int) -> _Entry:
     name, joint = model.names[index], model.joints[index]
     source, multiplier, offset = _driver_of(arm, arm.model.joint(name))
     return _Entry(source, multiplier, offset, joint.idx_q, joint.idx_v, joint.nq == 2)
 
 
-def _driver_of(arm: Arm, joint: UrdfJoint) -> tuple[int, float, float]:
+def _driver_of(arm: ArmDescription, joint: UrdfJoint) -> tuple[int, float, float]:
     """The arm's joint that moves this one, with multiplier and offset through chains of mimics."""
     multiplier, offset, seen = 1.0, 0.0, {joint.name}
     while joint.mimic is not None:

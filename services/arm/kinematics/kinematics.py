@@ -13,7 +13,7 @@ from schemas.frames import Transform
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.joint_mapping import JointMapping
 from services.arm.kinematics.self_collisions import SelfCollisionChecker
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 Positions = Sequence[float] | Array
@@ -34,7 +34,7 @@ def frame_of_link(model: pin.Model, link: str) -> int:
 class Kinematics:
     """The arm's geometry; joint values are (n,) [rad] or [m] in the arm's order, poses in its base frame."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: ArmDescription) -> None:
         self.arm = arm
         self._model = pin.buildModelFromUrdf(str(arm.urdf_path))
         self._data = self._model.createData()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from services.arm.kinematics.joint_mapping import JointMapping
 from services.arm.kinematics.self_collisions import LinkPair, load_collision_geometry
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ class LinkDistances:
     """Of every pair of links that have shapes; `bounds` (m, pairs, 2) [m] are what each is apart at least and at most
     in the configurations (m, n) [rad] or [m]."""
 
-    def __init__(self, arm: Arm, model: pin.Model, mapping: JointMapping, configurations: Array) -> None:
+    def __init__(self, arm: ArmDescription, model: pin.Model, mapping: JointMapping, configurations: Array) -> None:
         self._model, self._mapping, self._data = model, mapping, model.createData()
         self._geometry = load_collision_geometry(arm, model)
         self._pairs = self._paired()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.convex_meshes import convex_or_same
 from services.arm.kinematics.joint_mapping import JointMapping
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 LinkPair = tuple[str, str]
@@ -22,7 +22,9 @@ LinkPair = tuple[str, str]
 class SelfCollisionChecker:
     """Distances between the links that may not touch; joint values are (n,) [rad] or [m] in the arm's order."""
 
-    def __init__(self, arm: Arm, model: pin.Model, configuration: JointMapping, with_rigid: bool = False) -> None:
+    def __init__(
+        self, arm: ArmDescription, model: pin.Model, configuration: JointMapping, with_rigid: bool = False
+    ) -> None:
         """Links that no joint can move apart are checked `with_rigid` only: nothing can be done about them."""
         self.clearance = arm.clearance  # [m]
         self._model = model
@@ -74,10 +76,10 @@ class SelfCollisionChecker:
         pin.computeDistances(self._model, self._data, self._geometry, self._geometry_data, q)
 
 
-_newest: tuple[weakref.ref[Arm], pin.GeometryModel] | None = None  # of the arm that was loaded last
+_newest: tuple[weakref.ref[ArmDescription], pin.GeometryModel] | None = None  # of the arm that was loaded last
 
 
-def load_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
+def load_collision_geometry(arm: ArmDescription, model: pin.Model) -> pin.GeometryModel:
     """The collision shapes, read once for as long as the arm is the newest: large meshes take seconds.
 
     The model is the caller's own, its shapes are shared; raises `DescriptionError` where one could not be read.
@@ -88,7 +90,7 @@ def load_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
     return _newest[1].copy()
 
 
-def read_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
+def read_collision_geometry(arm: ArmDescription, model: pin.Model) -> pin.GeometryModel:
     """The collision shapes, read anew; counted, since Pinocchio drops what it does not know WITHOUT an error."""
     expected = sum(len(link.collisions) for link in arm.model.links)
     geometry = pin.buildGeomFromUrdf(
@@ -109,7 +111,7 @@ def read_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
     return geometry
 
 
-def _add_pairs(arm: Arm, model: pin.Model, geometry: pin.GeometryModel, with_rigid: bool) -> list[LinkPair]:
+def _add_pairs(arm: ArmDescription, model: pin.Model, geometry: pin.GeometryModel, with_rigid: bool) -> list[LinkPair]:
     """Adds every pair of shapes on different links that is not disabled; returns the link names in the same order."""
     links = [model.frames[shape.parentFrame].name for shape in geometry.geometryObjects]
     pairs: list[LinkPair] = []
@@ -130,7 +132,7 @@ def are_rigid(geometry: pin.GeometryModel, first: int, second: int) -> bool:
     return bool(shapes[first].parentJoint == shapes[second].parentJoint)
 
 
-def reach_of(arm: Arm, model: pin.Model, geometry: pin.GeometryModel) -> Array:
+def reach_of(arm: ArmDescription, model: pin.Model, geometry: pin.GeometryModel) -> Array:
     """(n,) how far at most [m] any point of any shape moves per unit of each joint: [m/rad] or [m/m].
 
     For a turning joint that is the longest way from its axis to the end of the chain, all travel included.
@@ -143,7 +145,7 @@ def reach_of(arm: Arm, model: pin.Model, geometry: pin.GeometryModel) -> Array:
     return reach
 
 
-def driver_of(arm: Arm, model: pin.Model, index: int) -> tuple[int, float]:
+def driver_of(arm: ArmDescription, model: pin.Model, index: int) -> tuple[int, float]:
     """The arm's joint that drives pinocchio's joint `index`, and the ratio of their motions (through mimic joints)."""
     joint, scale = arm.model.joint(model.names[index]), 1.0
     while joint.mimic is not None:
@@ -152,14 +154,14 @@ def driver_of(arm: Arm, model: pin.Model, index: int) -> tuple[int, float]:
     return arm.joint_names.index(joint.name), scale
 
 
-def _joint_reach(arm: Arm, model: pin.Model, geometry: pin.GeometryModel, joint: int) -> float:
+def _joint_reach(arm: ArmDescription, model: pin.Model, geometry: pin.GeometryModel, joint: int) -> float:
     if _slides(model, joint):
         return 1.0
     moved = (shape for shape in geometry.geometryObjects if joint in model.supports[shape.parentJoint])
     return max((shape_reach(arm, model, shape, joint) for shape in moved), default=0.0)
 
 
-def shape_reach(arm: Arm, model: pin.Model, shape: pin.GeometryObject, joint: int) -> float:
+def shape_reach(arm: ArmDescription, model: pin.Model, shape: pin.GeometryObject, joint: int) -> float:
     """An upper bound [m/rad] or [m/m] of the motion of any point of a shape per unit of pinocchio's `joint`."""
     if _slides(model, joint):
         return 1.0
@@ -177,7 +179,7 @@ def _radius(shape: pin.GeometryObject) -> float:
     return float(np.linalg.norm(shape.geometry.aabb_center)) + float(shape.geometry.aabb_radius)
 
 
-def _travel(arm: Arm, model: pin.Model, joint: int) -> float:
+def _travel(arm: ArmDescription, model: pin.Model, joint: int) -> float:
     """The travel of a prismatic joint [m]; 0 for a revolute one."""
     if not _slides(model, joint):
         return 0.0

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 from services.arm.frames.transforms import Point, Rigid, compose, inverse, rotate
 from services.arm.kinematics.chain import complete, joint_transform, link_transforms, origin_of
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.urdf import JointKind, UrdfJoint
 
 
 class ToolJacobian:
     """Of one arm; joint values are (n,) [rad] or [m] in the arm's order, points [m] in its base frame."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: ArmDescription) -> None:
         self._names = arm.joint_names
         self._model = arm.model
         self._chain = _chain(arm)
@@ -51,7 +51,7 @@ class ToolJacobian:
         return [*frames, pose]
 
 
-def _chain(arm: Arm) -> list[UrdfJoint]:
+def _chain(arm: ArmDescription) -> list[UrdfJoint]:
     """The joints from the root to the tool."""
     above = {joint.child: joint for joint in arm.model.joints}
     chain, link = [], arm.tool_frame
@@ -61,7 +61,7 @@ def _chain(arm: Arm) -> list[UrdfJoint]:
     return chain[::-1]
 
 
-def _driver(arm: Arm, joint: UrdfJoint) -> tuple[int, float]:
+def _driver(arm: ArmDescription, joint: UrdfJoint) -> tuple[int, float]:
     """The motor that moves the joint, and how far for one unit of it; -1 for a fixed one."""
     factor = 1.0
     while joint.mimic is not None:

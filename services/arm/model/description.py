@@ -1,4 +1,4 @@
-"""A robot's folder as one typed `Arm`: URDF, SRDF and robot.toml, checked against each other."""
+"""A robot's folder as one typed `ArmDescription`: URDF, SRDF and robot.toml, checked against each other."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Arm:
+class ArmDescription:
     """One robot: its joints in robot.toml's order, which is their order everywhere."""
 
     name: str
@@ -124,7 +124,7 @@ class Arm:
         return frozenset((first, second)) in self.disabled_collisions
 
 
-def load_arm(folder: Path) -> Arm:
+def load_arm(folder: Path) -> ArmDescription:
     """The arm described in `folder`; raises `DescriptionError` with file, thing and value."""
     robot_path = Path(folder) / ROBOT_FILE
     text = read_text(robot_path)
@@ -143,7 +143,7 @@ def load_arm(folder: Path) -> Arm:
     drivers = {driver.name: driver for driver in robot.driver}
     joints = tuple(_joint(drive, drivers, model, robot_path) for drive in robot.joint)
     _require_joints(joints, model, robot_path)
-    arm = Arm(
+    arm = ArmDescription(
         name=robot.name,
         folder=robot_path.parent,
         urdf_path=urdf_path,
@@ -168,7 +168,7 @@ def load_arm(folder: Path) -> Arm:
     return heard_by_the_board(arm)
 
 
-def heard_by_the_board(arm: Arm) -> Arm:
+def heard_by_the_board(arm: ArmDescription) -> ArmDescription:
     """Without what the board's dialect has no words for: switches, homing, motor current; as slow as it can follow."""
     if arm.device.dialect is Dialect.GEMELO:
         return arm
@@ -185,7 +185,7 @@ def _heard_joint(joint: Joint, device: DeviceRecord) -> Joint:
     return replace(joint, velocity=min(joint.velocity, speed))
 
 
-def require_motors(arm: Arm, device: DeviceKind) -> None:
+def require_motors(arm: ArmDescription, device: DeviceKind) -> None:
     """Raises `DescriptionError` for an arm without motors at a real device, with what robot.toml lacks."""
     if device is not DeviceKind.VIRTUAL and not arm.has_motors:
         raise DescriptionError(

@@ -14,7 +14,7 @@ from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.robot_file import line_of
 
 if TYPE_CHECKING:
-    from services.arm.model.description import Arm
+    from services.arm.model.description import ArmDescription
 
 METRES = {"mm": 0.001, "m": 1.0}  # [m] of a sensor's unit
 JAW = (0.01, 0.005, 0.02)  # [m] the edges of a jaw that robot.toml does not give
@@ -94,7 +94,7 @@ def jaw_edges(gripper: Gripper) -> tuple[float, float, float]:
     return gripper.jaw or JAW
 
 
-def jaw_objects(arm: Arm, opening: float) -> tuple[SceneObject, ...]:
+def jaw_objects(arm: ArmDescription, opening: float) -> tuple[SceneObject, ...]:
     """The two jaws as boxes that the tool carries, [m] apart as far as `opening`; none where robot.toml gives no jaw.
 
     They touch what is fixed to the tool.
@@ -117,7 +117,7 @@ def jaw_objects(arm: Arm, opening: float) -> tuple[SceneObject, ...]:
     )
 
 
-def jaws_apart(arm: Arm, state: GripperState | None) -> float:
+def jaws_apart(arm: ArmDescription, state: GripperState | None) -> float:
     """[m] that the jaws take up: as far as they are apart and will be; open where that is not known."""
     if arm.gripper is None:
         return 0.0
@@ -128,7 +128,7 @@ def jaws_apart(arm: Arm, state: GripperState | None) -> float:
     return min(max(round(within / APART) * APART, arm.gripper.closed), arm.gripper.open)
 
 
-def gripper_unit(arm: Arm) -> str:
+def gripper_unit(arm: ArmDescription) -> str:
     """The unit of the sensor that reads the jaws; "mm" where none does."""
     name = arm.gripper.sensor if isinstance(arm.gripper, ServoGripper) else ""
     return next((sensor.unit for sensor in arm.sensors if sensor.name == name), "mm")

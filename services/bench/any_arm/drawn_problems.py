@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from schemas.joints import JointState
 from schemas.planning import JointGoal, PlanRequest
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.any_arm.families import FAMILIES, Setting, ToolPose, settings
 from services.bench.problems.problem_sets import ALLOWED, tool_pose
 from services.planner.collision.world import World
@@ -47,11 +47,11 @@ class DrawnProblem:
     is_pose: bool
     clearance: float | None = None  # [m] that is asked for; None: the arm's own
 
-    def joint_goal(self, arm: Arm) -> JointGoal:
+    def joint_goal(self, arm: ArmDescription) -> JointGoal:
         """The goal by its joint values."""
         return JointGoal(name=arm.joint_names, position=self.goal)
 
-    def request(self, arm: Arm, kinematics: Kinematics, allowed: float = ALLOWED) -> PlanRequest:
+    def request(self, arm: ArmDescription, kinematics: Kinematics, allowed: float = ALLOWED) -> PlanRequest:
         """What a client sends, with `allowed` [s] for it."""
         names = arm.joint_names
         return PlanRequest(
@@ -65,7 +65,7 @@ class DrawnProblem:
 class ProblemDrawer:
     """Draws problems for one arm."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics) -> None:
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics) -> None:
         self._arm, self._kinematics = arm, kinematics
         self._ik = InverseKinematics(arm, kinematics)
         lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
@@ -133,7 +133,7 @@ class ProblemDrawer:
         return bool((row >= self._lower).all() and (row <= self._upper).all())
 
 
-def problems(arm: Arm, kinematics: Kinematics, family: str, count: int = COUNT) -> list[DrawnProblem]:
+def problems(arm: ArmDescription, kinematics: Kinematics, family: str, count: int = COUNT) -> list[DrawnProblem]:
     """The first `count` problems of a family."""
     drawer = ProblemDrawer(arm, kinematics)
     return [drawer.problem(family, seed) for seed in range(count)]

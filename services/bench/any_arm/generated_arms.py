@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 
 Point = tuple[float, float, float]
 HALF = math.pi / 2.0
@@ -158,7 +158,7 @@ def seven_joints() -> ArmSketch:
 
 
 @cache
-def generated_arm(name: str) -> Arm:
+def generated_arm(name: str) -> ArmDescription:
     """`six`, `six_mesh` or `seven`; its folder lasts as long as the process."""
     folder = tempfile.TemporaryDirectory(prefix="gemelo_bench_")
     atexit.register(folder.cleanup)

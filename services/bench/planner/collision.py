@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.figures import Figure, NotMeasured, of_samples, quantile
 from services.bench.planner.references import CoalChecker
 from services.bench.scenes import CHECK_SCENE, parol6, random_configurations, rm1
@@ -53,7 +53,7 @@ def state_check_us() -> Figure:
     return of_samples(samples, None, reference, note)
 
 
-def loaded_core(arm: Arm, kernel: str | None = None) -> NativePlanner:
+def loaded_core(arm: ArmDescription, kernel: str | None = None) -> NativePlanner:
     """A motion core with the check scene, its best kernel if none is named; raises NotMeasured if not compiled."""
     try:
         from services.planner.native.native_planner import NativePlanner  # fails where it is not compiled
@@ -64,7 +64,7 @@ def loaded_core(arm: Arm, kernel: str | None = None) -> NativePlanner:
     return core
 
 
-def batch_us(arm: Arm) -> float:
+def batch_us(arm: ArmDescription) -> float:
     """Median time [us] of a configuration in a batch, with the motion core."""
     core = loaded_core(arm)
     return median_us(core.free, np.array_split(random_configurations(arm, BATCH * BATCHES), BATCHES)) / BATCH
@@ -77,12 +77,12 @@ def single_us(core: NativePlanner, rows: Array) -> float:
     return median_us(lambda some: [core.free(row) for row in some], tens) / TEN
 
 
-def coal_us(arm: Arm) -> float:
+def coal_us(arm: ArmDescription) -> float:
     """Median time [us] of one configuration with pinocchio and coal."""
     return median_us(CoalChecker(arm, CHECK_SCENE).is_free, random_configurations(arm, ONE_BY_ONE))
 
 
-def self_us(arm: Arm) -> float:
+def self_us(arm: ArmDescription) -> float:
     """Median time [us] of the distances between the links at one configuration, without a scene."""
     return median_us(Kinematics(arm).collisions.distance, random_configurations(arm, ONE_BY_ONE))
 

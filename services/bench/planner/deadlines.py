@@ -11,7 +11,7 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest
 from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.figures import Figure, FigureGoal, of_samples, quantile
 from services.bench.planner.mesh_planning import dented_ball
 from services.bench.scenes import rm1
@@ -44,7 +44,7 @@ def deadline_overrun_ms() -> Figure:
     return of_samples(late, GOAL, reference, note)
 
 
-def walled(arm: Arm, with_mesh: bool) -> Planner:
+def walled(arm: ArmDescription, with_mesh: bool) -> Planner:
     """A planner that is ready, in the scene."""
     objects = [wall("left wall", 0.6), wall("right wall", -1.6)]
     planner = Planner(arm)
@@ -63,7 +63,7 @@ def wall(name: str, angle: float) -> SceneObject:
     )
 
 
-def hopeless(arm: Arm, allowed: float, planner_id: str, seed: int) -> PlanRequest:
+def hopeless(arm: ArmDescription, allowed: float, planner_id: str, seed: int) -> PlanRequest:
     """A plan past the wall in `allowed` [s]."""
     return PlanRequest(
         start=JointState(name=arm.joint_names, position=START),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from services.arm.frames.transforms import inverse, multiply
 from services.arm.kinematics.chain import link_transforms
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
 from services.bench.scenes import parol6, random_configurations, rm1
 from services.planner.kinematics.ik import InverseKinematics
@@ -84,7 +84,7 @@ def ik_success() -> Figure:
     )
 
 
-def random_problems(arm: Arm, kinematics: Kinematics, count: int, is_full: bool) -> list[ToolProblem]:
+def random_problems(arm: ArmDescription, kinematics: Kinematics, count: int, is_full: bool) -> list[ToolProblem]:
     """Full poses, or positions alone; the same ones in every run."""
     rows = random_configurations(arm, 2 * count)
     made = []
@@ -112,7 +112,7 @@ def solving_ms(solver: InverseKinematics, problems: list[ToolProblem], tries: in
     return samples
 
 
-def solved(arm: Arm, count: int, is_full: bool = True, is_numeric: bool = False) -> int:
+def solved(arm: ArmDescription, count: int, is_full: bool = True, is_numeric: bool = False) -> int:
     """Number of solved problems among `count` random ones."""
     kinematics = Kinematics(arm)
     solver = InverseKinematics(arm, kinematics, is_numeric=is_numeric)
@@ -120,7 +120,7 @@ def solved(arm: Arm, count: int, is_full: bool = True, is_numeric: bool = False)
     return sum(is_solved(arm, problem, solve(solver, problem)) for problem in problems)
 
 
-def is_solved(arm: Arm, problem: ToolProblem, answer: Array | None) -> bool:
+def is_solved(arm: ArmDescription, problem: ToolProblem, answer: Array | None) -> bool:
     """True if `answer` (n,) [rad] or [m] is within limits and meets the target, by kinematics other than the
     solver's."""
     if answer is None or not all(j.is_within(v) for j, v in zip(arm.joints, answer.tolist(), strict=True)):
@@ -133,6 +133,8 @@ def is_solved(arm: Arm, problem: ToolProblem, answer: Array | None) -> bool:
     return problem.target.rotation is None or 2.0 * math.hypot(*turn[:3]) <= TURNED_ENOUGH
 
 
-def tool_of(arm: Arm, positions: Array) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+def tool_of(
+    arm: ArmDescription, positions: Array
+) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
     """Position [m] and quaternion (x, y, z, w) of the tool in the base frame, by plain transforms."""
     return link_transforms(arm.model, dict(zip(arm.joint_names, positions.tolist(), strict=True)))[arm.tool_frame]

@@ -21,7 +21,7 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import JointGoal, PlanRequest, PlanResponse
 from schemas.scene import MeshShape, PlanningScene, SceneObject
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.figures import Figure, of_samples
 from services.bench.planner.trials import spread
 from services.bench.problems.problem_sets import ALLOWED
@@ -111,7 +111,7 @@ def timed_plan(planner: Planner, request: PlanRequest) -> tuple[float, PlanRespo
     return (time.perf_counter() - began) * 1e3, response
 
 
-def random_requests(arm: Arm, world: World) -> list[PlanRequest]:
+def random_requests(arm: ArmDescription, world: World) -> list[PlanRequest]:
     """Requests from one free configuration to another; the same ones in every run."""
     generator, free = random.Random(SEED), list[tuple[float, ...]]()
     while len(free) < 2 * (PROBLEMS + WARMING):

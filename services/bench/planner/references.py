@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from schemas.frames import Transform
 from schemas.scene import BoxShape, CylinderShape, PlanningScene, Shape
 from services.arm.kinematics.joint_mapping import JointMapping
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.figures import NotMeasured
 from services.bench.problems.problem_sets import ALLOWED
 
@@ -35,7 +35,7 @@ GROUP = "bench"
 class CoalChecker:
     """pinocchio and coal on the collision shapes of links and scene: one configuration a call."""
 
-    arm: Arm
+    arm: ArmDescription
     scene: PlanningScene
 
     def __post_init__(self) -> None:
@@ -86,7 +86,7 @@ class ReferenceResult(NamedTuple):
 class Reference(Protocol):
     """A planner for one arm in one scene."""
 
-    def __init__(self, arm: Arm, scene: PlanningScene) -> None: ...
+    def __init__(self, arm: ArmDescription, scene: PlanningScene) -> None: ...
     def shortened_path(self, start: JointValues, goal: JointValues, seed: int) -> ReferenceResult | None:
         """A shortened path; None if none is found within `ALLOWED`."""
 
@@ -94,7 +94,7 @@ class Reference(Protocol):
 class PlainOmpl:
     """OMPL's RRTConnect and PathSimplifier with default parameters and `CoalChecker` as its state validity checker."""
 
-    def __init__(self, arm: Arm, scene: PlanningScene) -> None:
+    def __init__(self, arm: ArmDescription, scene: PlanningScene) -> None:
         from ompl import base, geometric, util  # slow to load
 
         util.noOutputHandler()
@@ -141,7 +141,7 @@ class PlainOmpl:
 class Roboplan:
     """roboplan's compiled RRT-Connect and path shortcutting; raises `NotMeasured` if it is not installed."""
 
-    def __init__(self, arm: Arm, scene: PlanningScene) -> None:
+    def __init__(self, arm: ArmDescription, scene: PlanningScene) -> None:
         try:
             from roboplan import core, rrt  # not there on every machine
         except ImportError as error:

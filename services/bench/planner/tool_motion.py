@@ -11,7 +11,7 @@ from schemas.joints import JointState
 from schemas.planning import JogCommand, LinearMotion, PlanCode, PlanRequest, PoseGoal
 from schemas.scene import PlanningScene
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.figures import Figure, FigureGoal, of_samples, quantile
 from services.bench.planner.path_quality import least_time
 from services.bench.scenes import CHECK_SCENE, parol6, rm1
@@ -55,7 +55,7 @@ def lin_ms() -> Figure:
     return of_samples(samples, reference=reference, note=note)
 
 
-def lines(arm: Arm) -> tuple[list[float], list[float]]:
+def lines(arm: ArmDescription) -> tuple[list[float], list[float]]:
     """Times [ms] of the plans and the planned fractions of their lines, 0 for a refused one."""
     planner = Planner(arm)
     took: list[float] = []
@@ -69,7 +69,7 @@ def lines(arm: Arm) -> tuple[list[float], list[float]]:
     return took, fractions
 
 
-def line_requests(arm: Arm, planner: Planner) -> list[PlanRequest]:
+def line_requests(arm: ArmDescription, planner: Planner) -> list[PlanRequest]:
     """Lines of random starts and directions; the same ones in every run."""
     random = np.random.default_rng(SEED)
     lower = np.array([joint.lower for joint in arm.joints])
@@ -100,7 +100,7 @@ class PlainLines:
     result is not verified, and its jerk is not limited. For one arm without a scene.
     """
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: ArmDescription) -> None:
         self._kinematics = Kinematics(arm)
         self._world = World(arm, self._kinematics)
         self._solver = InverseKinematics(arm, self._kinematics)
@@ -150,7 +150,7 @@ def jog_tick_us() -> Figure:
     return of_samples(jog_ticks(parol6(), CHECK_SCENE), JOG_GOAL, reference, note)
 
 
-def jog_ticks(arm: Arm, scene: PlanningScene) -> list[float]:
+def jog_ticks(arm: ArmDescription, scene: PlanningScene) -> list[float]:
     """CPU time [us] of every step; the arm follows at once."""
     kinematics = Kinematics(arm)
     jog = Jog(arm, kinematics, World(arm, kinematics, scene))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.problems.problem_sets import path_length
 from services.planner.collision.checker import CollisionChecker
 from services.planner.collision.clearance import CLEARANCE
@@ -52,7 +52,7 @@ class Spheres:
         return None if self._core.path_free(positions) else np.asarray(positions[0])
 
 
-def shortest(arm: Arm, checker: CollisionChecker, start: Array, goals: Array) -> tuple[Array, str] | None:
+def shortest(arm: ArmDescription, checker: CollisionChecker, start: Array, goals: Array) -> tuple[Array, str] | None:
     """A polyline (m, n) [rad] or [m] from `start` (n,) to one of `goals` (k, n), and what found it; None if none is
     found."""
     core = checker.native(CLEARANCE)
@@ -103,7 +103,7 @@ def _by_core(core: NativePlanner, start: Array, goals: Array) -> list[tuple[Arra
 
 
 def _by_ompl(
-    arm: Arm, validity: ValidityChecker, runs: Sequence[tuple[str, int]], start: Array, goals: Array
+    arm: ArmDescription, validity: ValidityChecker, runs: Sequence[tuple[str, int]], start: Array, goals: Array
 ) -> list[tuple[Array, str]]:
     found = []
     for name, seed in runs:
@@ -133,7 +133,7 @@ NOWHERE = -1  # number of a configuration that is not free
 class JointGrid:
     """A grid of configurations within the joint limits, and which of them can be reached from which."""
 
-    def __init__(self, arm: Arm, reach: Array, validity: ValidityChecker) -> None:
+    def __init__(self, arm: ArmDescription, reach: Array, validity: ValidityChecker) -> None:
         """`reach` (n,) is the largest movement [m] of any point of the arm per unit of each joint."""
         self._axes = [
             np.linspace(joint.lower, joint.upper, 2 + int((joint.upper - joint.lower) * most / STEP))

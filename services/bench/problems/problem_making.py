@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.problems.known_paths import JointGrid, shortest
 from services.bench.problems.problem_sets import (
     COUNT,
@@ -50,7 +50,7 @@ FEW_JOINTS = 3  # up to so many a grid over all configurations is feasible
 class Maker:
     """Makes the problems of one arm in one scene."""
 
-    def __init__(self, arm: Arm, scene: str) -> None:
+    def __init__(self, arm: ArmDescription, scene: str) -> None:
         self.arm, self.scene = arm, scene
         self.kinematics = Kinematics(arm)
         self._around = CollisionChecker(World(arm, self.kinematics, SCENES[scene]))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from schemas.joints import JointState
 from schemas.planning import FreeMotion, JointGoal, PlanRequest, PoseGoal
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,11 @@ def _text(each: ProblemSet) -> str:
 
 
 def request_of(
-    problem: PlanningProblem, arm: Arm, kinematics: Kinematics, planner_id: str = "", allowed: float = ALLOWED
+    problem: PlanningProblem,
+    arm: ArmDescription,
+    kinematics: Kinematics,
+    planner_id: str = "",
+    allowed: float = ALLOWED,
 ) -> PlanRequest:
     """The request that a client sends for `problem`, with `allowed` [s] for it."""
     names = arm.joint_names
@@ -82,7 +86,7 @@ def request_of(
     )
 
 
-def tool_pose(arm: Arm, kinematics: Kinematics, positions: tuple[float, ...]) -> PoseGoal:
+def tool_pose(arm: ArmDescription, kinematics: Kinematics, positions: tuple[float, ...]) -> PoseGoal:
     """The tool's position [m] in the base frame at the joint values (n,) [rad] or [m], with its orientation if the arm
     can choose it (six joints)."""
     pose = kinematics.link_poses(positions)[arm.tool_frame]

@@ -18,7 +18,7 @@ from services.arm.cell.camera_model import exact_info
 from services.arm.cell.cell_file import Cell
 from services.arm.frames.transforms import from_rpy, to_message
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.camera.virtual.virtual_camera import VirtualCamera
 from services.camera.virtual.world import CameraWorld
 from services.vision.boards import Sighting, TagBoard
@@ -40,7 +40,7 @@ POSES = 15
 class Setup:
     """An arm, a camera and tags, of which one moves."""
 
-    arm: Arm
+    arm: ArmDescription
     carrier: Carrier
     link: str
     camera: CameraRecord
@@ -55,7 +55,7 @@ class Setup:
         return float(self.carrier_from_board[2, 3])
 
 
-def camera_on_link(arm: Arm) -> Setup:
+def camera_on_link(arm: ArmDescription) -> Setup:
     """parol6 with a camera beside its gripper, and the board on the table."""
     source = VirtualSource(distortion=(0.08, -0.16, 0.0008, -0.0005, 0.02))
     camera = CameraRecord(
@@ -67,7 +67,7 @@ def camera_on_link(arm: Arm) -> Setup:
     )
 
 
-def board_on_tool(arm: Arm) -> Setup:
+def board_on_tool(arm: ArmDescription) -> Setup:
     """parol6 with the board beyond its gripper, and a camera beside the table."""
     camera = CameraRecord(
         name="side", source=VirtualSource(), position=(0.72, 0.16, 0.5), look_at=(0.33, 0.0, 0.3), field_of_view=1.15
@@ -76,7 +76,7 @@ def board_on_tool(arm: Arm) -> Setup:
     return _setup(arm, Carrier.BOARD, "tool_link", camera, board, (0.0, 0.0, 0.07), (0.0, 0.0, 0.2), "forward")
 
 
-def tag_on_level_tool(arm: Arm) -> Setup:
+def tag_on_level_tool(arm: ArmDescription) -> Setup:
     """rm1, which cannot tilt its tool, with one tag that looks up from it, and a camera above the table."""
     camera = CameraRecord(
         name="overhead",
@@ -91,7 +91,7 @@ def tag_on_level_tool(arm: Arm) -> Setup:
 
 
 def _setup(
-    arm: Arm, carrier: Carrier, link: str, camera: CameraRecord, board: TagBoard,
+    arm: ArmDescription, carrier: Carrier, link: str, camera: CameraRecord, board: TagBoard,
     at: tuple[float, float, float], rpy: tuple[float, float, float], start: str,
 ) -> Setup:  # fmt: skip
     pose = from_transform(to_message((at, from_rpy(*rpy))))
@@ -164,12 +164,12 @@ def take(sight: Sight, height: float | None = None, count: int = POSES, seed: in
     return Taken(belief, chosen, tuple(views), tuple(unseen))
 
 
-def limits_of(arm: Arm) -> tuple[Array, Array]:
+def limits_of(arm: ArmDescription) -> tuple[Array, Array]:
     """The joints' lower and upper values (n,)."""
     return np.array([joint.lower for joint in arm.joints]), np.array([joint.upper for joint in arm.joints])
 
 
-def standing(arm: Arm) -> Callable[[Array], bool]:
+def standing(arm: ArmDescription) -> Callable[[Array], bool]:
     """Whether the arm may stand at joint values [rad] or [m], by its links alone and the height of its tool."""
     kinematics = Kinematics(arm)
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.vision.boards import Sighting, TagBoard
 from services.vision.calibration.reprojection import BoardView, Carrier
 from services.vision.camera_model import CameraModel
@@ -78,7 +78,7 @@ def _add(
 
 
 def level_trial(
-    arm: Arm, model: CameraModel, board: TagBoard, count: int, random: np.random.Generator,
+    arm: ArmDescription, model: CameraModel, board: TagBoard, count: int, random: np.random.Generator,
     noise: float = 0.3, joint_noise: float = 0.0,
 ) -> MountingTrial:  # fmt: skip
     """Poses of rm1, which cannot tilt its tool: the camera stands, the board is on the tool and looks up.

@@ -15,7 +15,7 @@ from schemas.joints import JointState
 from services.arm.cell.camera_model import exact_info
 from services.arm.cell.cell_file import Cell
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.bench.figures import Figure, of_samples, quantile
 from services.bench.scenes import rm1
 from services.bench.vision.mounting import tool_error
@@ -71,7 +71,7 @@ def mount_touch_mm() -> Figure:
     return replace(figure, goal=f"median <= {MOST:g}", met=quantile(ours, 0.5) <= MOST)
 
 
-def scene_of(arm: Arm, random: np.random.Generator) -> BoardScene:
+def scene_of(arm: ArmDescription, random: np.random.Generator) -> BoardScene:
     """The board flat within the arm's reach, and the arm aside."""
     place = np.array([random.uniform(0.24, 0.3), random.uniform(-0.08, 0.08), 0.002])
     yaw = float(random.uniform(-0.6, 0.6))
@@ -93,7 +93,7 @@ def scene_of(arm: Arm, random: np.random.Generator) -> BoardScene:
     return BoardScene(board, from_transform(info.parent_from_camera), model, tuple(seen))
 
 
-def errors(scenes: list[BoardScene], count: int, images: int, stepping: Arm | None = None) -> list[float]:
+def errors(scenes: list[BoardScene], count: int, images: int, stepping: ArmDescription | None = None) -> list[float]:
     """[mm] of `HANDS` people in each scene. `stepping`: the arm, if its tip stands beside the points at whole steps."""
     points = BOARD.points()[spread_points(list(BOARD.points()), count)]
     off = []
@@ -108,7 +108,7 @@ def errors(scenes: list[BoardScene], count: int, images: int, stepping: Arm | No
     return off
 
 
-def at_whole_steps(arm: Arm, point: Array) -> Array:
+def at_whole_steps(arm: ArmDescription, point: Array) -> Array:
     """(3,) [m] where the tool of an arm of three joints stands that is led to `point`, at the nearest whole step of
     each joint."""
     kinematics = Kinematics(arm)

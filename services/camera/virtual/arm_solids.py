@@ -11,7 +11,7 @@ import numpy as np
 from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, Shape, SphereShape
 from services.arm.errors import DescriptionError
 from services.arm.frames.transforms import IDENTITY, Rigid, from_rpy
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.stl import BadStl, read_stl
 from services.camera.virtual.solids import Array, Colour, PosedSolid, box, cylinder, sphere, triangles
 
@@ -19,7 +19,7 @@ LINKS: tuple[Colour, ...] = ((196, 198, 202), (70, 72, 78), (150, 154, 160))  # 
 MOST_TRIANGLES = 2000  # of a mesh; of a larger one its bounding box is drawn
 
 
-def arm_solids(arm: Arm) -> dict[str, tuple[PosedSolid, ...]]:
+def arm_solids(arm: ArmDescription) -> dict[str, tuple[PosedSolid, ...]]:
     """Solids in the frame of each link; meshes that are not STL are left out. Raises `DescriptionError`."""
     try:
         root = ET.parse(arm.urdf_path).getroot()

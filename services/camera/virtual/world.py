@@ -31,7 +31,7 @@ from services.arm.frames.transforms import (
     rotate,
 )
 from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.gripper import JAWS, jaw_edges, jaw_objects
 from services.camera.virtual.arm_solids import arm_solids, solid_of
 from services.camera.virtual.solids import Face, PosedSolid, box, tag
@@ -66,7 +66,9 @@ class WorldSnapshot:
 class CameraWorld:
     """Takes what the bus says of the arm and the scene; `snapshot` may be called from another thread."""
 
-    def __init__(self, arm: Arm, cell: Cell, to_own: Callable[[int], int | None] = lambda stamp: stamp) -> None:
+    def __init__(
+        self, arm: ArmDescription, cell: Cell, to_own: Callable[[int], int | None] = lambda stamp: stamp
+    ) -> None:
         """`to_own(stamp)` is a joint state's stamp by this host's clock, None while that is not known.
 
         Raises `DescriptionError` where the arm's URDF cannot be read.

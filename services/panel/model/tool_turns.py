@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from services.arm.frames.transforms import rotate
 from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 Rings = tuple[bool, bool, bool]  # about the tool's x, y and z
@@ -35,7 +35,7 @@ class ToolTurns:
     along_base: Rings = ALL_RINGS  # along the base's
 
 
-def tool_turns(arm: Arm) -> ToolTurns:
+def tool_turns(arm: ArmDescription) -> ToolTurns:
     """A ring about each of the tool's axes about which it can be turned wherever it is, while its place stays: all
     three with six joints, the last joint's own with five, the vertical one of a SCARA with a wrist.
 
@@ -69,7 +69,7 @@ def _can(jacobian: Array, twist: Array) -> bool:
     return float(np.linalg.norm(jacobian @ velocities - twist)) < MISSED
 
 
-def _jacobian(arm: Arm, configuration: Array) -> Array:
+def _jacobian(arm: ArmDescription, configuration: Array) -> Array:
     """(6, n): the tool's velocity [m/s] above its angular velocity [rad/s], by central differences."""
     columns = []
     for joint in range(len(configuration)):
@@ -81,7 +81,7 @@ def _jacobian(arm: Arm, configuration: Array) -> Array:
     return np.array(columns).T
 
 
-def _tool(arm: Arm, configuration: Array) -> Array:
+def _tool(arm: ArmDescription, configuration: Array) -> Array:
     """(3, 4) the tool's axes and its point [m] in the URDF's root."""
     positions = dict(zip(arm.joint_names, configuration.tolist(), strict=True))
     point, turn = link_transforms(arm.model, positions)[arm.tool_frame]

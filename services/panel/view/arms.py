@@ -15,7 +15,7 @@ from viser.extras import ViserUrdf
 
 from services.arm.frames.transforms import Rigid
 from services.arm.kinematics.chain import complete, joint_transform, link_transforms, origin_of
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.urdf import JointKind, UrdfJoint
 from services.panel.model.pace import UNSEEN
 
@@ -45,7 +45,7 @@ class DrawnJoint:
 class DrawnArm:
     """One arm under the scene's node `name`; `color` paints all of it, else it has the URDF's colours."""
 
-    def __init__(self, server: viser.ViserServer, arm: Arm, name: str, color: Color | None = None) -> None:
+    def __init__(self, server: viser.ViserServer, arm: ArmDescription, name: str, color: Color | None = None) -> None:
         self._model, self._name = arm.model, name
         self._root = server.scene.add_frame(name, show_axes=False)
         drawn = JointFrames(server, load_model(arm.urdf_path), root_node_name=name, mesh_color_override=color)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from schemas.motion import JointTrajectory
 from schemas.planning import PlanCode, Refusal, Timing
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.cartesian.continuation import FINEST, Continuation, FollowedPath, StopReason, is_same
 from services.planner.cartesian.path_points import Run, between, states_of_runs
 from services.planner.cartesian.tool_limits import ToolLimits
@@ -68,7 +68,7 @@ class CartesianTerms:
 class CartesianPlanner:
     """Takes one arm along paths of its tool, among what `checker` knows."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, checker: PathChecker, holds_turn: bool) -> None:
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics, checker: PathChecker, holds_turn: bool) -> None:
         self._arm, self._kinematics, self._checker = arm, kinematics, checker
         self._continuation = Continuation(arm, kinematics, holds_turn)
 

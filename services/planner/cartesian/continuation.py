@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import FramePose, Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.cartesian.tool_path import ToolPath
 from services.planner.cartesian.tool_solver import ToolSolver
 from services.planner.path.path_curve import CubicSpline
@@ -65,7 +65,7 @@ class FollowedPath:
 class Continuation:
     """Follows paths of the tool with one arm; of an arm that cannot turn its tool freely only the position is held."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, holds_turn: bool) -> None:
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics, holds_turn: bool) -> None:
         self._arm, self._kinematics = arm, kinematics
         self.solver = ToolSolver(kinematics, holds_turn)
         self._lower = np.array([joint.lower for joint in arm.joints])

@@ -19,7 +19,7 @@ from schemas.planning import (
 )
 from services.arm.frames.transforms import IDENTITY, compose
 from services.arm.kinematics.kinematics import FramePose, Kinematics
-from services.arm.model.description import Arm, Joint
+from services.arm.model.description import ArmDescription, Joint
 from services.planner.cartesian.arcs import arc_about, arc_through
 from services.planner.cartesian.cartesian_planner import CartesianPath, CartesianPlanner, CartesianTerms
 from services.planner.cartesian.tool_limits import ToolLimits, require_tool_limits
@@ -44,7 +44,7 @@ FARTHEST = 1e3  # [m] chosen: a blend beyond it is a mistake, most often in mill
 class ToolMotions:
     """Lines and arcs of one arm's tool."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, goals: Goals, checker: PathChecker) -> None:
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics, goals: Goals, checker: PathChecker) -> None:
         self._arm, self._kinematics, self._goals = arm, kinematics, goals
         self._task_space: TaskSpace = goals.task_space
         self._planner = CartesianPlanner(arm, kinematics, checker, self._task_space.is_full)

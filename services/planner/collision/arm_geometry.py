@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from schemas.scene import PlanningScene, SceneObject
 from services.arm.kinematics.kinematics import Kinematics, frame_of_link
 from services.arm.kinematics.self_collisions import driver_of, load_collision_geometry, shape_reach
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.scene_shapes import SceneError, is_read_from_a_file, shape_of
 from services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
 from services.planner.collision_geometry.shapes import CollisionShape
@@ -41,7 +41,7 @@ class PlacedObject(NamedTuple):
 class ArmGeometry:
     """The links' shapes in the URDF's order; a joint is one of pinocchio's, mimics included, but for the universe."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics) -> None:
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics) -> None:
         self.arm, self.pinocchio, self._base = arm, kinematics.model, kinematics.base
         self.model = load_collision_geometry(arm, kinematics.model)
         shapes = list(self.model.geometryObjects)
@@ -107,7 +107,7 @@ class ArmGeometry:
 _KNOWN: WeakKeyDictionary[Kinematics, ArmGeometry] = WeakKeyDictionary()
 
 
-def arm_geometry(arm: Arm, kinematics: Kinematics) -> ArmGeometry:
+def arm_geometry(arm: ArmDescription, kinematics: Kinematics) -> ArmGeometry:
     """The geometry of `arm`; built once for as long as its kinematics are in use."""
     known = _KNOWN.get(kinematics)
     if known is None or known.arm is not arm:

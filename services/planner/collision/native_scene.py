@@ -7,13 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from schemas.scene import PlanningScene, SceneObject
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.scene_shapes import allows, shape_of
 from services.planner.collision_geometry.shapes import Attachment, CollisionShape
 
 
 def native_scene(
-    arm: Arm, scene: PlanningScene, folders: Sequence[Path] = ()
+    arm: ArmDescription, scene: PlanningScene, folders: Sequence[Path] = ()
 ) -> tuple[list[CollisionShape], list[Attachment]]:
     """Obstacles and attachments with what they may touch; raises `SceneError`. What may touch is as in `World`."""
     links = [link.name for link in arm.model.links if link.collisions]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.self_collisions import LinkPair
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.native_scene import native_scene
 from services.planner.collision.world import Positions, World
 from services.planner.native import compiled
@@ -61,7 +61,7 @@ class SphereCheck(Protocol):
 class NativeCheck:
     """By the native planner: spheres around the links of one arm."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: ArmDescription) -> None:
         self._arm = arm
         self._shown: World | None = None
 
@@ -124,7 +124,7 @@ class ExactShapesOnly:
 
 
 @where_built(lambda _: ExactShapesOnly())
-def sphere_check(arm: Arm) -> SphereCheck:
+def sphere_check(arm: ArmDescription) -> SphereCheck:
     """The native planner's check where it is built, else the one that resolves nothing."""
     return NativeCheck(arm)
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from schemas.scene import Contact, PlanningScene
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.kinematics.self_collisions import LinkPair
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.continuous import ContinuousCheck
 from services.planner.collision.pair_distances import PairDistances
 from services.planner.collision.world_geometry import LowerBounds, WorldGeometry
@@ -45,7 +45,7 @@ class World:
 
     def __init__(
         self,
-        arm: Arm,
+        arm: ArmDescription,
         kinematics: Kinematics,
         scene: PlanningScene | None = None,
         folders: Sequence[Path] = (),

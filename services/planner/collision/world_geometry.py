@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from schemas.scene import AllowedPair, PlanningScene
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.kinematics.self_collisions import LinkPair
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.arm_geometry import Mask, arm_geometry
 from services.planner.collision.scene_shapes import ANY, SceneError
 
@@ -25,7 +25,9 @@ FEW = 100  # pairs: coal is done with them before numpy has said which of them m
 class WorldGeometry:
     """Built once for one state of the scene; one entry a shape, links first, and one a pair that is checked."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, scene: PlanningScene, folders: Sequence[Path]) -> None:
+    def __init__(
+        self, arm: ArmDescription, kinematics: Kinematics, scene: PlanningScene, folders: Sequence[Path]
+    ) -> None:
         self._scene = scene
         own = arm_geometry(arm, kinematics)
         self._own, self._links = own, len(own.names)

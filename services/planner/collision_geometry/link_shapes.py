@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.convex_meshes import corners_of, hull_of, triangles_of
 from services.arm.kinematics.self_collisions import load_collision_geometry
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision_geometry.coal_shapes import mesh_of
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from services.planner.collision_geometry.solids import Box, Capsule, ConvexSolid, Cylinder, Polytope, polytope_around
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Form = tuple[ShapeKind, tuple[float, ...], TriangleMesh | None]
 
 
-def link_shapes(arm: Arm) -> dict[str, tuple[CollisionShape, ...]]:
+def link_shapes(arm: ArmDescription) -> dict[str, tuple[CollisionShape, ...]]:
     """The collision shapes of every link that has any, in the link's frame; raises `DescriptionError` where one could
     not be loaded."""
     model = pin.buildModelFromUrdf(str(arm.urdf_path))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ PIECES = 16  # of the integral over the speeds between now and rest
 class Braking:
     """The limits of one arm, in periods of `dt` [s]; velocities are (n,) or (m, n) [rad/s] or [m/s]."""
 
-    def __init__(self, arm: Arm, dt: float) -> None:
+    def __init__(self, arm: ArmDescription, dt: float) -> None:
         self.dt = dt
         self.velocity: Array = np.array([joint.velocity for joint in arm.joints])
         self.acceleration: Array = ACCELERATION_SHARE * np.array([joint.acceleration for joint in arm.joints])

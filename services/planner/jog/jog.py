@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from schemas.joints import JointState, JointTargets
 from schemas.planning import JogCommand, JogLimit, JogStatus
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.world import World
 from services.planner.jog.braking import Braking
 from services.planner.jog.jog_command import BadJog, JogInterpreter, JogRefused, Wanted, standing_position
@@ -52,7 +52,7 @@ class JogOutput:
 class Jog:
     """Leads one arm; times are [s] of one monotonic clock."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, world: World) -> None:
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics, world: World) -> None:
         self._arm = arm
         self._interpreter = JogInterpreter(kinematics)
         self._braking = Braking(arm, PERIOD)

@@ -11,7 +11,7 @@ from schemas.joints import JointState
 from schemas.planning import JogCommand, JogLimit
 from services.arm.errors import suggestion
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.jog.jog_limits import no_command, singularity, speed_limit
 from services.planner.jog.twist import TwistSolver
 from services.planner.request.refusals import PlanRefused
@@ -112,7 +112,7 @@ class JogRefused(ValueError):
     """The arm cannot be jogged now; the text says why and what would do."""
 
 
-def standing_position(arm: Arm, present: JointState | None, age: float) -> tuple[float, ...]:
+def standing_position(arm: ArmDescription, present: JointState | None, age: float) -> tuple[float, ...]:
     """[rad] or [m] in the arm's order, of an arm that stands; raises `JogRefused`."""
     try:
         return resolve_start(arm, None, present, age)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.planning import JogLimit
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.world import World
 from services.planner.jog.braking import Braking
 from services.planner.jog.jog_limits import joint_limit
@@ -42,7 +42,7 @@ class VelocityLimiter:
     Braking at any tick stays on the way that was found free at the tick before, so it is always possible.
     """
 
-    def __init__(self, arm: Arm, world: World, braking: Braking) -> None:
+    def __init__(self, arm: ArmDescription, world: World, braking: Braking) -> None:
         self._joints, self._braking = arm.joints, braking
         self._obstacles = JogObstacles(world, braking)
         self._share = 1.0  # of the wanted velocity that was free the last time something was in the way

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.kinematics.descent import Descent
 from services.planner.kinematics.targets import ToolTarget
 
@@ -22,7 +22,7 @@ RANK = 1e-6  # share of the largest singular value below which a direction of th
 class Centring:
     """Moves solutions of one arm within what leaves the tool where it is to be."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, descent: Descent) -> None:
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics, descent: Descent) -> None:
         self._kinematics = kinematics
         self._descent = descent
         spans = [(joint.lower, joint.upper) for joint in arm.joints]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.kinematics.joint_ranges import FullTurns
 from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, ToolTarget, any_normal
 
@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 class ClosedForm:
     """All configurations of one arm for a full tool pose; joint values are (n,) [rad] in the arm's order."""
 
-    def __init__(self, arm: Arm, robot: Robot, order: list[int]) -> None:
+    def __init__(self, arm: ArmDescription, robot: Robot, order: list[int]) -> None:
         self._robot = robot
         self._places = np.argsort(order)  # of the arm's joints, from the base to the tool
         self.turns = FullTurns(arm)
@@ -65,7 +65,7 @@ class ClosedForm:
         return branches, np.array(answer.is_LS, dtype=bool)
 
 
-def closed_form(arm: Arm, kinematics: Kinematics) -> ClosedForm | None:
+def closed_form(arm: ArmDescription, kinematics: Kinematics) -> ClosedForm | None:
     """The arm's closed form, or None where it has none or EAIK is not there."""
     if len(arm.joints) != JOINTS or any(joint.unit != "rad" for joint in arm.joints):
         return None
@@ -106,7 +106,7 @@ def turns_about(direction: Array, axis: Array, rotation: Array, count: int) -> l
     return [np.column_stack((direction, first, np.cross(direction, first))) @ tool.T for first in firsts]
 
 
-def chain_order(arm: Arm) -> list[int]:
+def chain_order(arm: ArmDescription) -> list[int]:
     """The arm's joints as they follow one another from the base to the tool."""
     by_child = {joint.child: joint for joint in arm.model.joints}
     link, names = arm.tool_frame, []
@@ -118,7 +118,7 @@ def chain_order(arm: Arm) -> list[int]:
     return chain + [index for index in range(len(arm.joints)) if index not in chain]
 
 
-def _agrees(arm: Arm, kinematics: Kinematics, robot: Robot, order: list[int]) -> bool:
+def _agrees(arm: ArmDescription, kinematics: Kinematics, robot: Robot, order: list[int]) -> bool:
     """True if EAIK's forward kinematics is ours."""
     for values in np.random.default_rng(1).uniform(-math.pi, math.pi, (SAMPLES, JOINTS)):
         ours, theirs = kinematics.tool(values), robot.fwdkin(values[order])

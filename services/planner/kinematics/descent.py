@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, ToolTarget
 from services.planner.native import compiled
 from services.planner.native.compiled import where_built
@@ -40,14 +40,14 @@ class Attempt(NamedTuple):
 
 
 @where_built(lambda _: None)
-def _native_descent(arm: Arm) -> compiled.NativeDescent | None:
+def _native_descent(arm: ArmDescription) -> compiled.NativeDescent | None:
     return compiled.NativeDescent(arm)
 
 
 class Descent:
     """Descends for one arm; in Python alone where `is_plain`, as where the core is not built."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, is_plain: bool = False) -> None:
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics, is_plain: bool = False) -> None:
         self._kinematics = kinematics
         self._lower = np.array([joint.lower for joint in arm.joints])
         self._upper = np.array([joint.upper for joint in arm.joints])

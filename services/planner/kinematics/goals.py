@@ -11,7 +11,7 @@ from schemas.message import Vector
 from schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
 from services.arm.frames.transforms import IDENTITY, Rigid, from_message
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.clearance import DistanceChecker
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.joint_ranges import FullTurns
@@ -33,7 +33,7 @@ INVALID = PlanCode.INVALID_GOAL_CONSTRAINTS
 class Goals:
     """Joint values for every kind of goal, nearest to the start first."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, checker: DistanceChecker | None = None) -> None:
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics, checker: DistanceChecker | None = None) -> None:
         """`checker` says what touches; without one it is the arm alone."""
         self._arm = arm
         self._kinematics = kinematics

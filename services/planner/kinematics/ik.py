@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.kinematics.centring import Centring
 from services.planner.kinematics.closed_form import ClosedForm, chain_order, closed_form, completed, turns_about
 from services.planner.kinematics.descent import Attempt, Descent
@@ -40,7 +40,7 @@ SAME_REDUNDANT = 0.1  # [s] the same, where solutions lie in a continuum; chosen
 class InverseKinematics:
     """Joint values for tool targets."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, is_numeric: bool = False) -> None:
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics, is_numeric: bool = False) -> None:
         self._kinematics = kinematics
         self._descent = Descent(arm, kinematics)
         self._centring = Centring(arm, kinematics, self._descent)
@@ -159,12 +159,12 @@ class InverseKinematics:
         turns = np.rint((positions - near) / np.where(self._period > 0.0, self._period, 1.0))
         return np.where(self._idle, near, positions - turns * self._period)
 
-    def _without_effect(self, arm: Arm) -> NDArray[np.bool_]:
+    def _without_effect(self, arm: ArmDescription) -> NDArray[np.bool_]:
         """(n,) True for the joints that do not move the tool."""
         rows = [self._kinematics.jacobian(start) for start in spread(arm, LOOKS)]
         return np.asarray(np.abs(np.vstack(rows)).max(axis=0) < NO_EFFECT)
 
-    def _start_count(self, arm: Arm) -> int:
+    def _start_count(self, arm: ArmDescription) -> int:
         return MORE_STARTS if len(arm.joints) >= FULL_POSE_JOINTS and self._closed is None else STARTS
 
     def _searched(self, target: ToolTarget, near: Array, deadline: Deadline, starts: int) -> Iterator[Array]:

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import Arm, Joint
+from services.arm.model.description import ArmDescription, Joint
 from services.planner.native.compiled import motion, where_built
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ ROUNDING = 1e-9  # [rad] or [m] by which a solution may be beyond a limit before
 class FullTurns:
     """For one arm; joint values are (n,) [rad] or [m] in the arm's order."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: ArmDescription) -> None:
         self._lower = np.array([joint.lower - ROUNDING for joint in arm.joints])
         self._upper = np.array([joint.upper + ROUNDING for joint in arm.joints])
         self._speed = np.array([joint.velocity for joint in arm.joints])
@@ -106,7 +106,7 @@ def _turns(most: tuple[float, ...]) -> Array:
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)  # standard: the bases of a Halton sequence
 
 
-def spread(arm: Arm, count: int) -> list[Array]:
+def spread(arm: ArmDescription, count: int) -> list[Array]:
     """The first `count` points (n,) [rad] or [m] of Halton's sequence within one turn of every joint."""
     lower, upper = one_turn(arm)
     bases = [_PRIMES[joint % len(_PRIMES)] for joint in range(len(arm.joints))]
@@ -114,7 +114,7 @@ def spread(arm: Arm, count: int) -> list[Array]:
     return [lower + share * (upper - lower) for share in shares]
 
 
-def one_turn(arm: Arm) -> tuple[Array, Array]:
+def one_turn(arm: ArmDescription) -> tuple[Array, Array]:
     """Lower and upper (n,) [rad] or [m] of where starts are spread."""
     lower, upper = np.array([_turn_of(joint) for joint in arm.joints]).T
     return lower, upper

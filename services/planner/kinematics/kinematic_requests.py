@@ -21,7 +21,7 @@ from schemas.planning import (
 )
 from schemas.scene import Contact
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.clearance import DistanceChecker, last_free
 from services.planner.collision.world import World
 from services.planner.kinematics.goals import INVALID, Goals, Start
@@ -38,7 +38,7 @@ LOOKED_THROUGH = 256  # configurations, of which all may touch something; chosen
 class KinematicRequests:
     """Answers for one arm; `present` is its newest joint state and `age` [s] how old that is."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics | None = None) -> None:
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics | None = None) -> None:
         self._arm = arm
         self._kinematics = kinematics or Kinematics(arm)
         self._goals = Goals(arm, self._kinematics)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import FramePose, Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.kinematics.closed_form import chain_order
 from services.planner.kinematics.joint_ranges import FullTurns, one_turn
 from services.planner.kinematics.targets import any_normal
@@ -30,7 +30,7 @@ STRETCHED = 1e-9  # how far a cosine may be beyond 1 by rounding
 class ParallelAxes:
     """All configurations of one arm for a position of the tool; joint values are (3,) in the arm's order."""
 
-    def __init__(self, arm: Arm, pose: FramePose, jacobian: Array, order: tuple[int, int, int]) -> None:
+    def __init__(self, arm: ArmDescription, pose: FramePose, jacobian: Array, order: tuple[int, int, int]) -> None:
         """The tool's pose and Jacobian (6, 3) at zero; `order` is of the shoulder, the elbow and the slide."""
         self._turns = FullTurns(arm)
         self._first, self._second, self._slide = order
@@ -76,7 +76,7 @@ class ParallelAxes:
         return complex(x, y)
 
 
-def parallel_axes(arm: Arm, kinematics: Kinematics) -> ParallelAxes | None:
+def parallel_axes(arm: ArmDescription, kinematics: Kinematics) -> ParallelAxes | None:
     """The arm's closed form, or None where its joints are others."""
     if sorted(joint.unit for joint in arm.joints) != ["m", "rad", "rad"]:
         return None
@@ -90,7 +90,7 @@ def parallel_axes(arm: Arm, kinematics: Kinematics) -> ParallelAxes | None:
     return solver if solver.shorter > LEAST and _agrees(arm, kinematics, solver) else None
 
 
-def _agrees(arm: Arm, kinematics: Kinematics, solver: ParallelAxes) -> bool:
+def _agrees(arm: ArmDescription, kinematics: Kinematics, solver: ParallelAxes) -> bool:
     """True if random configurations are among those of their own position."""
     lower, upper = one_turn(arm)
     for configuration in np.random.default_rng(1).uniform(lower, upper, (SAMPLES, JOINTS)):

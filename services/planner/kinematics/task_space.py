@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.kinematics.targets import ROTATION_TOLERANCE, ToolTarget
 
 Array = NDArray[np.float64]
@@ -115,7 +115,7 @@ class TaskSpace:
         return "yaw" if self._is_upright else "the turn about that axis"
 
 
-def task_space(arm: Arm, kinematics: Kinematics) -> TaskSpace:
+def task_space(arm: ArmDescription, kinematics: Kinematics) -> TaskSpace:
     """Read from the Jacobians of some configurations within the limits; those at a stretch do not hide what others
     can."""
     lower = [max(joint.lower, -math.pi) for joint in arm.joints]

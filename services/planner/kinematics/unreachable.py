@@ -12,7 +12,7 @@ from schemas.message import Vector
 from schemas.planning import PlanCode, PoseGoal, Refusal
 from services.arm.frames.transforms import IDENTITY, Rigid, compose, inverse
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.clearance import DistanceChecker, last_free
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.pose_goals import as_goal
@@ -34,7 +34,12 @@ class UnreachableRefusals:
     """Refusals of pose goals for one arm."""
 
     def __init__(
-        self, arm: Arm, kinematics: Kinematics, ik: InverseKinematics, able: TaskSpace, collisions: DistanceChecker
+        self,
+        arm: ArmDescription,
+        kinematics: Kinematics,
+        ik: InverseKinematics,
+        able: TaskSpace,
+        collisions: DistanceChecker,
     ) -> None:
         self._arm, self._kinematics, self._ik = arm, kinematics, ik
         self._task_space, self._collisions = able, collisions

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import Attachment, CollisionShape, ShapeKind, TriangleMesh
 from services.planner.native.binding import motion
@@ -70,7 +70,7 @@ class CompiledScene:
 class Assembly:
     """Everything about the arm that does not change with its surroundings; `covers` are in the links' frames."""
 
-    def __init__(self, arm: Arm, bulge: float) -> None:
+    def __init__(self, arm: ArmDescription, bulge: float) -> None:
         self.arm = arm
         shapes = link_shapes(arm)
         self.covers = {link: _told_cover(arm, link, shapes, bulge) for link in shapes}
@@ -155,7 +155,9 @@ class Assembly:
         return not self.arm.collisions_are_disabled(link, second_link)
 
 
-def _told_cover(arm: Arm, link: str, shapes: Mapping[str, Sequence[CollisionShape]], bulge: float) -> SphereCover:
+def _told_cover(
+    arm: ArmDescription, link: str, shapes: Mapping[str, Sequence[CollisionShape]], bulge: float
+) -> SphereCover:
     """The link's spheres; what takes long, and what reaches far beyond the shapes, is said in the log."""
     several, number = shapes[link], list(shapes).index(link) + 1
     triangles = sum(len(shape.mesh.faces) for shape in several if shape.mesh is not None)
@@ -173,7 +175,7 @@ def _told_cover(arm: Arm, link: str, shapes: Mapping[str, Sequence[CollisionShap
 
 
 def wide_spheres(
-    arm: Arm, link: str, shapes: Sequence[CollisionShape], cover: SphereCover, bulge: float
+    arm: ArmDescription, link: str, shapes: Sequence[CollisionShape], cover: SphereCover, bulge: float
 ) -> tuple[str, str] | None:
     """What it means that a link's spheres reach far beyond its shapes, more than the `bulge` [m] that is usual, and the
     remedy; None where they do not, and for one simple shape."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.chain import origin_of
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.urdf import JointKind, UrdfJoint
 from services.planner.collision_geometry.shapes import matrix_of
 
@@ -25,7 +25,7 @@ class ChainFrames:
     places: dict[str, tuple[int, Array]]
 
 
-def frames_of(arm: Arm) -> ChainFrames:
+def frames_of(arm: ArmDescription) -> ChainFrames:
     """The arm's tree, without its fixed joints."""
     root = _root(arm)
     links, numbers = [(0, 0, 0)], [_row(np.eye(4), 1.0, 0.0, 0.0)]
@@ -61,12 +61,12 @@ def _row(matrix: Array, multiplier: float, offset: float, travel: float) -> Arra
     return np.concatenate((transform_row(matrix), (multiplier, offset, travel)))
 
 
-def _root(arm: Arm) -> str:
+def _root(arm: ArmDescription) -> str:
     children = {joint.child for joint in arm.model.joints}
     return next(name for name in arm.model.link_names if name not in children)
 
 
-def _base_in_root(arm: Arm, root: str) -> Array:
+def _base_in_root(arm: ArmDescription, root: str) -> Array:
     """(4, 4) of the base frame, which no joint moves."""
     pose, link = np.eye(4), arm.base_frame
     while link != root:
@@ -78,7 +78,7 @@ def _base_in_root(arm: Arm, root: str) -> Array:
     return pose
 
 
-def _from_root(arm: Arm, root: str) -> list[UrdfJoint]:
+def _from_root(arm: ArmDescription, root: str) -> list[UrdfJoint]:
     """All joints, parents before children."""
     ordered: list[UrdfJoint] = []
     waiting = [root]
@@ -99,7 +99,7 @@ def _to_axis(axis: Array) -> Array:
     return matrix
 
 
-def _drive(arm: Arm, joint: UrdfJoint) -> tuple[int, float, float]:
+def _drive(arm: ArmDescription, joint: UrdfJoint) -> tuple[int, float, float]:
     """Which joint value moves it, times what, plus what: through chains of mimics."""
     multiplier, offset = 1.0, 0.0
     for _ in arm.model.joints:
@@ -111,7 +111,7 @@ def _drive(arm: Arm, joint: UrdfJoint) -> tuple[int, float, float]:
     raise DescriptionError(f'{arm.urdf_path}: joint "{joint.name}" mimics itself')
 
 
-def _travel(arm: Arm, joint: UrdfJoint, drive: int, multiplier: float, offset: float) -> float:
+def _travel(arm: ArmDescription, joint: UrdfJoint, drive: int, multiplier: float, offset: float) -> float:
     """[m] a sliding joint can be away from 0; 0 for a turning one."""
     if joint.kind is not JointKind.PRISMATIC:
         return 0.0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import Attachment, CollisionShape
 from services.planner.native.assembly import Assembly, wide_spheres
@@ -50,7 +50,7 @@ class NativePlanner:
     A question and a change of the scene may come from different threads: a running plan keeps the scene it began with.
     """
 
-    def __init__(self, arm: Arm, margin: float = MARGIN, bulge: float = BULGE, kernel: str = "") -> None:
+    def __init__(self, arm: ArmDescription, margin: float = MARGIN, bulge: float = BULGE, kernel: str = "") -> None:
         """`margin` [m] stays free around everything; `kernel` "avx2", "vector", "plain", or "" for the fastest."""
         self.arm = arm
         self.margin = margin

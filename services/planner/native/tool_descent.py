@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.native.binding import motion
 from services.planner.native.chain import frames_of, transform_row
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 class NativeDescent:
     """Joint values are (n,) [rad] or [m] in the arm's order, poses in its base frame."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: ArmDescription) -> None:
         frames = frames_of(arm)
         frame, pose = frames.places[arm.tool_frame]
         bounds = np.array([[joint.lower for joint in arm.joints], [joint.upper for joint in arm.joints]])

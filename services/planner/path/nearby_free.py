@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.path.validity import ValidityChecker
 from services.planner.request.deadline import Deadline
 
@@ -25,7 +25,12 @@ TRIED = 3  # of them, the nearest, to which the straight path is looked at
 
 
 def nearby_free(
-    arm: Arm, core: NativePlanner, ends: list[Array], validity: ValidityChecker, seed: int, deadline: Deadline
+    arm: ArmDescription,
+    core: NativePlanner,
+    ends: list[Array],
+    validity: ValidityChecker,
+    seed: int,
+    deadline: Deadline,
 ) -> list[Array | None]:
     """For each of `ends` (n,) [rad] or [m] itself where the native planner lets it move, else a near one where it does;
     None where none was found."""
@@ -36,7 +41,12 @@ def nearby_free(
 
 
 def _nearby(
-    arm: Arm, core: NativePlanner, configuration: Array, validity: ValidityChecker, seed: int, deadline: Deadline
+    arm: ArmDescription,
+    core: NativePlanner,
+    configuration: Array,
+    validity: ValidityChecker,
+    seed: int,
+    deadline: Deadline,
 ) -> Array | None:
     for rows in _around(arm, configuration, seed):
         for row in rows[core.free(rows, SPARE)][:TRIED]:
@@ -47,7 +57,7 @@ def _nearby(
     return None
 
 
-def _around(arm: Arm, configuration: Array, seed: int) -> Iterator[Array]:
+def _around(arm: ArmDescription, configuration: Array, seed: int) -> Iterator[Array]:
     """(m, n) configurations within the limits, nearest first, from farther and farther away."""
     random = np.random.default_rng(seed)
     speed = np.array([joint.velocity for joint in arm.joints])

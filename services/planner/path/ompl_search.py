@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.path.path import PathNotFound
 from services.planner.path.roadmap import shortest_path
 from services.planner.path.validity import ValidityChecker
@@ -33,7 +33,13 @@ AROUND = math.pi  # [rad] about start and goals that a joint without limits is s
 
 
 def ompl_corners(
-    arm: Arm, planner_id: str, start: Array, goals: Array, validity: ValidityChecker, seed: int, deadline: Deadline
+    arm: ArmDescription,
+    planner_id: str,
+    start: Array,
+    goals: Array,
+    validity: ValidityChecker,
+    seed: int,
+    deadline: Deadline,
 ) -> Array:
     """Corners (m, n) [rad] or [m] of a polyline from `start` (n,) to one of `goals` (k, n), exact at both ends; raises
     `PathNotFound`."""
@@ -55,7 +61,7 @@ def load_ompl() -> None:
 class _Problem:
     """One question in OMPL's terms; states are joint values divided by the speed limits."""
 
-    def __init__(self, arm: Arm, validity: ValidityChecker, ends: Array) -> None:
+    def __init__(self, arm: ArmDescription, validity: ValidityChecker, ends: Array) -> None:
         from ompl import base  # slow to load
 
         self._scale = np.array([joint.velocity for joint in arm.joints])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.planning import PlanCode, Refusal
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.checker import CollisionChecker
 from services.planner.path.native_search import NATIVE, native_path
 from services.planner.path.nearby_free import nearby_free
@@ -35,7 +35,7 @@ SEEDS = 2**32  # that are told apart; the generators take none below 0
 class Search:
     """All searches for one arm, in the world of the plan at hand."""
 
-    def __init__(self, arm: Arm, checker: CollisionChecker) -> None:
+    def __init__(self, arm: ArmDescription, checker: CollisionChecker) -> None:
         self._arm, self._checker = arm, checker
 
     def prepare(self) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from schemas.message import Vector
 from schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.checker import CollisionChecker
 from services.planner.collision.clearance import ROUNDING, first_collision, last_free, usable_clearance
 from services.planner.kinematics.goals import Goals
@@ -31,7 +31,7 @@ LOOKS = 33  # at distances on a straight path that is refused, for the clearance
 class CollisionRefusals:
     """Says of one arm, in the world of the plan at hand, what is in the way."""
 
-    def __init__(self, arm: Arm, goals: Goals, checker: CollisionChecker) -> None:
+    def __init__(self, arm: ArmDescription, goals: Goals, checker: CollisionChecker) -> None:
         self._arm, self._goals, self._checker = arm, goals, checker
 
     def goal(

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import Arm, Joint
+from services.arm.model.description import ArmDescription, Joint
 from services.planner.collision.checker import CollisionChecker
 from services.planner.jog.jog_obstacles import CONTACT_SPEED, comes_away
 from services.planner.path.path import Start
@@ -36,7 +36,9 @@ class FreeConfiguration:
     can_be_jogged: bool
 
 
-def nearest_free(arm: Arm, checker: CollisionChecker, start: Start, deadline: Deadline) -> FreeConfiguration | None:
+def nearest_free(
+    arm: ArmDescription, checker: CollisionChecker, start: Start, deadline: Deadline
+) -> FreeConfiguration | None:
     """The nearest free configuration to `start` (n,) [rad] or [m] that can be jogged to, or else the nearest; None
     where there is none near."""
     nearest: FreeConfiguration | None = None
@@ -51,7 +53,7 @@ def nearest_free(arm: Arm, checker: CollisionChecker, start: Start, deadline: De
     return nearest
 
 
-def jog_words(arm: Arm, reach: Array, start: Start, configuration: Start) -> str:
+def jog_words(arm: ArmDescription, reach: Array, start: Start, configuration: Start) -> str:
     """The command that moves from `start` to `configuration`, (n,) [rad] or [m]; `reach` (n,) [m/rad] or [m/m] as a
     world's."""
     moves = [after - before for before, after in zip(start, configuration, strict=True)]
@@ -68,7 +70,7 @@ def _speed(joint: Joint, velocity: float) -> str:
     return f"{joint.name}={1000.0 * velocity:.3g}mm/s"
 
 
-def _around(arm: Arm, reach: Array, start: Array) -> Iterator[Array]:
+def _around(arm: ArmDescription, reach: Array, start: Array) -> Iterator[Array]:
     """Configurations within the limits, the near ones first: of one joint moved, then of all; the same every time."""
     lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
     random, size = np.random.default_rng(0), len(start)

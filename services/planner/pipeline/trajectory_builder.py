@@ -10,7 +10,7 @@ import numpy as np
 
 from schemas.motion import JointTrajectory
 from schemas.planning import PlanRequest, StepMargin, StepPolicy, Timing
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.clearance import PathChecker
 from services.planner.path.curve import TurnsOnTheSpot
 from services.planner.path.path import Array, Path, Start
@@ -55,7 +55,7 @@ class TrajectoryBuilder:
 
     def __init__(
         self,
-        arm: Arm,
+        arm: ArmDescription,
         checker: PathChecker,
         request: PlanRequest,
         limits: JointLimits,

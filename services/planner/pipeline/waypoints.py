@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory
 from schemas.planning import FreeMotion, Timing, WaypointGoal
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.cartesian.path_points import Run, states_of_runs
 from services.planner.cartesian.tool_motions import points_of
 from services.planner.collision.checker import CollisionChecker
@@ -37,7 +37,12 @@ class WaypointPlanner:
     """Paths by waypoints for one arm."""
 
     def __init__(
-        self, arm: Arm, goals: Goals, checker: CollisionChecker, collision_refusals: CollisionRefusals, search: Search
+        self,
+        arm: ArmDescription,
+        goals: Goals,
+        checker: CollisionChecker,
+        collision_refusals: CollisionRefusals,
+        search: Search,
     ) -> None:
         self._arm, self._goals, self._checker = arm, goals, checker
         self._collision_refusals, self._search = collision_refusals, search

@@ -9,7 +9,7 @@ from schemas.message import Vector
 from schemas.planning import PlanCode, Refusal
 from schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
 from services.arm.errors import nearest_name, suggestion
-from services.arm.model.description import Arm, Joint
+from services.arm.model.description import ArmDescription, Joint
 
 Point = Sequence[float]
 
@@ -104,7 +104,7 @@ def malformed(code: PlanCode, subject: str, message: str, remedy: str, check: st
     return PlanRefused(code, Refusal(check=check, subject=subject, message=message, remedy=remedy))
 
 
-def beyond_limit(arm: Arm, joint: Joint, value: float, nearest: Vector) -> PlanRefused:
+def beyond_limit(arm: ArmDescription, joint: Joint, value: float, nearest: Vector) -> PlanRefused:
     """The refusal of a goal whose `value` [rad] or [m] is beyond the joint's limit; `nearest` [rad] or [m] has all
     joints of the goal within their limits."""
     limit = joint.clamp(value)
@@ -261,7 +261,7 @@ def not_verified(why: str) -> PlanRefused:
     )
 
 
-def out_of_reach(arm: Arm, goal: Point, nearest: Point, shown: Vector, held: Sequence[str]) -> PlanRefused:
+def out_of_reach(arm: ArmDescription, goal: Point, nearest: Point, shown: Vector, held: Sequence[str]) -> PlanRefused:
     """The refusal of a tool position `goal` (3,) [m] in the base frame; `nearest` (3,) [m] in the base frame can be
     reached, and `shown` is the same in the goal's own form and frame."""
     missing = [a - b for a, b in zip(goal, nearest, strict=True)]

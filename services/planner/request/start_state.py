@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from schemas.joints import JointState
 from schemas.planning import PlanCode
-from services.arm.model.description import Arm, Joint
+from services.arm.model.description import ArmDescription, Joint
 from services.planner.request.per_arm import once_per_arm
 from services.planner.request.refusals import malformed, moving_start, stale_state, start_beyond_limit, unknown_name
 
@@ -18,7 +18,9 @@ MOST_TURNED = 90.0  # [rad] of a joint without limits: the native planner takes 
 ROUNDING = 0.51  # [steps] executed positions are whole steps, so they may be this far beyond a limit
 
 
-def resolve_start(arm: Arm, given: JointState | None, present: JointState | None, age: float) -> tuple[float, ...]:
+def resolve_start(
+    arm: ArmDescription, given: JointState | None, present: JointState | None, age: float
+) -> tuple[float, ...]:
     """Joint values [rad] or [m] in the arm's order, within the limits; raises `PlanRefused`."""
     told = present if given is None and age <= STALE_AFTER else given
     if told is not None and told.name == arm.joint_names and not any(told.velocity) and are_usable(arm, told.position):
@@ -34,7 +36,7 @@ def resolve_start(arm: Arm, given: JointState | None, present: JointState | None
     return tuple(joint.clamp(values[joint.name]) for joint in arm.joints)
 
 
-def _present(arm: Arm, present: JointState | None, age: float) -> dict[str, float]:
+def _present(arm: ArmDescription, present: JointState | None, age: float) -> dict[str, float]:
     if present is None:
         raise stale_state(None, STALE_AFTER)
     if age > STALE_AFTER:
@@ -52,7 +54,7 @@ def _present(arm: Arm, present: JointState | None, age: float) -> dict[str, floa
     return values
 
 
-def _values(arm: Arm, state: JointState) -> dict[str, float]:
+def _values(arm: ArmDescription, state: JointState) -> dict[str, float]:
     """The positions by name; the joints must stand."""
     require_parallel(state.name, state.position, "the start state")
     for name in state.name:
@@ -65,7 +67,7 @@ def _values(arm: Arm, state: JointState) -> dict[str, float]:
     return dict(zip(state.name, state.position, strict=True))
 
 
-def are_usable(arm: Arm, positions: Sequence[float]) -> bool:
+def are_usable(arm: ArmDescription, positions: Sequence[float]) -> bool:
     """True if there is a value [rad] or [m] for each joint, in the arm's order, and all are where a plan may begin or
     end: an answer in a tenth of the time that it takes to say why not."""
     spans = _spans(arm)
@@ -75,7 +77,7 @@ def are_usable(arm: Arm, positions: Sequence[float]) -> bool:
 
 
 @once_per_arm
-def _spans(arm: Arm) -> list[tuple[float, float]]:
+def _spans(arm: ArmDescription) -> list[tuple[float, float]]:
     """The limits of each joint [rad] or [m], and `MOST_TURNED` where it has none."""
     endless = (-MOST_TURNED, MOST_TURNED)
     return [endless if math.isinf(joint.upper) else (joint.lower, joint.upper) for joint in arm.joints]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from schemas.frames import Transform
 from schemas.scene import PlaneShape, PlanningScene, SceneObject
 from services.arm.frames.transforms import Rigid, compose, from_message, inverse, rotate
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.gripper import jaw_edges
 from services.planner.collision.scene_shapes import Folders, SceneError, pose_of, shape_of
 from services.planner.collision_geometry.coal_shapes import geometry_of
@@ -30,7 +30,9 @@ class Grasp(NamedTuple):
     width: float  # [m] along the way of the jaws
 
 
-def find_grasp(arm: Arm, scene: PlanningScene, links: Mapping[str, Transform] | None, folders: Folders) -> Grasp | None:
+def find_grasp(
+    arm: ArmDescription, scene: PlanningScene, links: Mapping[str, Transform] | None, folders: Folders
+) -> Grasp | None:
     """The object between the open jaws whose middle is nearest to theirs; None if there is none that fits.
 
     `links`: poses in the base. Raises `SceneError` without a gripper, or where it is not known where the arm is.

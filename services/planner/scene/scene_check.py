@@ -8,7 +8,7 @@ import msgspec
 
 from schemas.scene import AllowedPair, PlaneShape, PlanningScene, SceneObject
 from services.arm.errors import suggestion
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.gripper import JAWS
 from services.planner.collision.scene_shapes import ANY, Folders, SceneError, shape_of
 
@@ -17,7 +17,7 @@ LONGEST_NAME = 64  # chosen: fits into a line of a table and of a refusal
 MOST_OBJECTS = 1000  # chosen: more than a cell has; a plan stays fast among so many
 
 
-def require_scene(arm: Arm, scene: PlanningScene, folders: Folders) -> None:
+def require_scene(arm: ArmDescription, scene: PlanningScene, folders: Folders) -> None:
     """Raises `SceneError` for the first thing that cannot be."""
     if len(scene.objects) > MOST_OBJECTS:
         raise SceneError(
@@ -32,7 +32,7 @@ def require_scene(arm: Arm, scene: PlanningScene, folders: Folders) -> None:
         require_pair(arm, pair, names)
 
 
-def require_object(arm: Arm, item: SceneObject, folders: Folders) -> None:
+def require_object(arm: ArmDescription, item: SceneObject, folders: Folders) -> None:
     """Raises `SceneError` for a name, link, shape, pose or padding that cannot be."""
     _require_name(arm, item.name)
     shape_of(item, folders)
@@ -47,13 +47,13 @@ def require_object(arm: Arm, item: SceneObject, folders: Folders) -> None:
         require_link(arm, link, f'object "{item.name}" cannot touch it')
 
 
-def require_link(arm: Arm, link: str, why: str) -> None:
+def require_link(arm: ArmDescription, link: str, why: str) -> None:
     """Raises `SceneError` for a link that the arm does not have."""
     if link not in arm.model.link_names:
         raise SceneError(f'{why}: {arm.name} has no link "{link}"{suggestion(link, arm.model.link_names)}')
 
 
-def require_pair(arm: Arm, pair: AllowedPair, objects: Iterable[str]) -> None:
+def require_pair(arm: ArmDescription, pair: AllowedPair, objects: Iterable[str]) -> None:
     """Raises `SceneError` for a pair whose names mean nothing, or that allows everything."""
     if pair.first == pair.second:
         what = "everything to touch everything" if pair.first == ANY else f'"{pair.first}" to touch itself'
@@ -64,7 +64,7 @@ def require_pair(arm: Arm, pair: AllowedPair, objects: Iterable[str]) -> None:
             raise SceneError(f'there is no link or object "{name}"{suggestion(name, known)}')
 
 
-def _require_name(arm: Arm, name: str) -> None:
+def _require_name(arm: ArmDescription, name: str) -> None:
     if not name or name != name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
         raise SceneError(
             f'"{name[:LONGEST_NAME]}" is no name for an object; give 1 to {LONGEST_NAME} printable characters without '
@@ -78,7 +78,7 @@ def _require_name(arm: Arm, name: str) -> None:
         raise SceneError(f'"{name}" is a link of {arm.name}; give the object another name')
 
 
-def usable_part(arm: Arm, scene: PlanningScene, folders: Folders) -> tuple[PlanningScene, list[str]]:
+def usable_part(arm: ArmDescription, scene: PlanningScene, folders: Folders) -> tuple[PlanningScene, list[str]]:
     """The scene without what cannot be, and why each of that cannot."""
     kept: dict[str, SceneObject] = {}
     pairs: list[AllowedPair] = []

@@ -27,7 +27,7 @@ from schemas.scene import (
 )
 from services.arm.errors import suggestion
 from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.scene_shapes import SceneError, pose_of
 from services.planner.scene.grasp import Grasp
 from services.planner.scene.scene_check import require_link
@@ -40,7 +40,7 @@ replace = msgspec.structs.replace
 
 
 def edited(
-    arm: Arm, scene: PlanningScene, edit: SceneEdit, links: LinkPoses, grasp: Grasp | None = None
+    arm: ArmDescription, scene: PlanningScene, edit: SceneEdit, links: LinkPoses, grasp: Grasp | None = None
 ) -> PlanningScene:
     """The scene after the change, with the same version; `scene_check` says if it is valid. Raises `SceneError`.
 
@@ -77,7 +77,7 @@ def edited(
 class SceneEditor:
     """One scene and where the arm's links are, to be changed in one way or another."""
 
-    def __init__(self, arm: Arm, scene: PlanningScene, links: LinkPoses) -> None:
+    def __init__(self, arm: ArmDescription, scene: PlanningScene, links: LinkPoses) -> None:
         self._arm, self._scene, self._links = arm, scene, links
 
     def named(self, name: str) -> SceneObject:

@@ -14,7 +14,7 @@ from schemas.planning import PlanCode, PlanResponse
 from schemas.scene import Contacts, PlanningScene, SceneGrip, SceneRelease, SceneRequest, SceneResponse
 from schemas.topics import CONTACTS, GRIPPER_STATE, SCENE, SCENE_EDIT
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.gripper import jaw_objects, jaws_apart
 from services.planner.collision.clearance import ROUNDING
 from services.planner.collision.world import World
@@ -38,7 +38,13 @@ class SceneKeeper:
     """
 
     def __init__(
-        self, node: Node, arm: Arm, states: Latest[JointState], folder: Path, on_world: OnWorld, log: AnswerLog
+        self,
+        node: Node,
+        arm: ArmDescription,
+        states: Latest[JointState],
+        folder: Path,
+        on_world: OnWorld,
+        log: AnswerLog,
     ) -> None:
         self._node, self._arm, self._states, self._on_world = node, arm, states, on_world
         self._kinematics = Kinematics(arm)  # its own: the planner's is in use in another thread

@@ -12,7 +12,7 @@ from typing import TypeVar
 import msgspec
 
 from schemas.scene import PlanningScene, SceneGrip, SceneRelease, SceneRequest, SceneResponse
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision.scene_shapes import Folders, SceneError
 from services.planner.scene.grasp import find_grasp
 from services.planner.scene.scene_check import require_scene
@@ -24,7 +24,7 @@ W = TypeVar("W")
 class SceneStore:
     """Takes a change wholly or not at all; mesh files are looked for in `folders`."""
 
-    def __init__(self, arm: Arm, folders: Folders = (), scene: PlanningScene | None = None) -> None:
+    def __init__(self, arm: ArmDescription, folders: Folders = (), scene: PlanningScene | None = None) -> None:
         """Raises `SceneError` for a scene that cannot be."""
         self._arm, self._folders = arm, folders
         self.scene = scene or PlanningScene()

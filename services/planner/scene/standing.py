@@ -10,12 +10,12 @@ from schemas.message import Vector
 from schemas.planning import SceneVersion
 from schemas.scene import PlanningScene
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.gripper import JAWS
 from services.planner.request.start_state import STALE_AFTER
 
 
-def standing(arm: Arm, state: JointState | None, age: float) -> Vector | None:
+def standing(arm: ArmDescription, state: JointState | None, age: float) -> Vector | None:
     """[rad] or [m] of every joint, or None without a fresh joint state of all joints; `age` [s] is of `state`."""
     if state is None or age > STALE_AFTER:
         return None

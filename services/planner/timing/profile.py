@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
 from schemas.motion import JointTrajectory, TrajectoryPoint
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.native.compiled import motion, where_built
 from services.planner.request.per_arm import once_per_arm
 
@@ -53,7 +53,7 @@ class JointLimits:
         return self.velocity, self.acceleration, self.jerk
 
 
-def joint_limits(arm: Arm, velocity_scaling: float = 1.0, acceleration_scaling: float = 1.0) -> JointLimits:
+def joint_limits(arm: ArmDescription, velocity_scaling: float = 1.0, acceleration_scaling: float = 1.0) -> JointLimits:
     """The arm's limits (n,), in [rad] or [m] per s, s^2 and s^3; the scalings are dimensionless. The acceleration's
     scaling applies to the jerk as well, so that its ramp keeps its duration."""
     full = _full_limits(arm)
@@ -67,7 +67,7 @@ def joint_limits(arm: Arm, velocity_scaling: float = 1.0, acceleration_scaling: 
 
 
 @once_per_arm
-def _full_limits(arm: Arm) -> JointLimits:
+def _full_limits(arm: ArmDescription) -> JointLimits:
     return JointLimits(
         velocity=np.array([joint.velocity for joint in arm.joints]),
         acceleration=np.array([joint.acceleration for joint in arm.joints]),

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.planning import PlanCode, Refusal, StepMargin
-from services.arm.model.description import Arm, Joint
+from services.arm.model.description import ArmDescription, Joint
 from services.planner.native.compiled import motion, where_built
 from services.planner.request.deadline import NEVER, Deadline
 from services.planner.request.per_arm import once_per_arm
@@ -93,7 +93,7 @@ def peak_rates(stream: StepStream) -> Array:
     return motion.peak_rates(start, square, cube, PLACES, KNOT * Q8)
 
 
-def step_stream(arm: Arm, trajectory: JointTrajectory, part: tuple[int, int] | None = None) -> StepStream:
+def step_stream(arm: ArmDescription, trajectory: JointTrajectory, part: tuple[int, int] | None = None) -> StepStream:
     """The integer steps of `trajectory`, whose points have velocities and accelerations, played as planned.
 
     Of all of it, or from one knot to another.
@@ -101,7 +101,7 @@ def step_stream(arm: Arm, trajectory: JointTrajectory, part: tuple[int, int] | N
     return _stream(arm, states_of(trajectory), part)
 
 
-def _stream(arm: Arm, states: States, part: tuple[int, int] | None = None) -> StepStream:
+def _stream(arm: ArmDescription, states: States, part: tuple[int, int] | None = None) -> StepStream:
     duration = float(states.times[-1])
     last = _knots(duration)
     begin, end = part or (0, last)
@@ -116,20 +116,20 @@ def _stream(arm: Arm, states: States, part: tuple[int, int] | None = None) -> St
     return StepStream(first, start, 3 * rise - 2 * start - end_slope, start + end_slope - 2 * rise)
 
 
-def margins(arm: Arm, stream: StepStream) -> tuple[StepMargin, ...]:
+def margins(arm: ArmDescription, stream: StepStream) -> tuple[StepMargin, ...]:
     """How near each stepper comes to what it can do."""
     torques = (_torque_share(joint, index, stream) for index, joint in enumerate(arm.joints))
     return tuple(map(_margin, _rate_limits(arm), stream.peaks.tolist(), torques))
 
 
-def demands_in_python(arm: Arm, states: States, part: tuple[int, int]) -> tuple[list[float], list[float]]:
+def demands_in_python(arm: ArmDescription, states: States, part: tuple[int, int]) -> tuple[list[float], list[float]]:
     """`demands`, where the core is not built."""
     stream = _stream(arm, states, part)
     return stream.peaks.tolist(), [_torque_share(joint, index, stream) for index, joint in enumerate(arm.joints)]
 
 
 @where_built(demands_in_python)
-def demands(arm: Arm, states: States, part: tuple[int, int]) -> tuple[list[float], list[float]]:
+def demands(arm: ArmDescription, states: States, part: tuple[int, int]) -> tuple[list[float], list[float]]:
     """From one knot to another of the stream through `states`: the largest rate [steps/s] of each joint, and the
     largest share of the pull-out torque of its motor."""
     last = _knots(float(states.times[-1]))
@@ -139,13 +139,13 @@ def demands(arm: Arm, states: States, part: tuple[int, int]) -> tuple[list[float
 
 
 @once_per_arm
-def _scale(arm: Arm) -> Array:
+def _scale(arm: ArmDescription) -> Array:
     """(n,) [1/256 steps per rad or m]."""
     return np.array([joint.steps.per_unit * Q8 for joint in arm.joints])
 
 
 @once_per_arm
-def _motors(arm: Arm) -> tuple[Array, Array]:
+def _motors(arm: ArmDescription) -> tuple[Array, Array]:
     """(n, 3) inertia [kg m^2], friction [Nm] and the turn of a step [rad] of each joint, and (k, 3) joint, rate
     [steps/s] and pull-out torque [Nm] of each point of their curves."""
     loads, curves = np.zeros((len(arm.joints), 3)), []
@@ -157,7 +157,7 @@ def _motors(arm: Arm) -> tuple[Array, Array]:
     return loads, np.array(curves, dtype=np.float64).reshape(-1, 3)
 
 
-def _margins(arm: Arm, states: States) -> tuple[StepMargin, ...]:
+def _margins(arm: ArmDescription, states: States) -> tuple[StepMargin, ...]:
     """Of all of it, by parts that the memory holds."""
     knots = _knots(float(states.times[-1]))
     parts = [(begin, min(begin + MOST_KNOTS, knots)) for begin in range(0, knots, MOST_KNOTS)]
@@ -173,12 +173,12 @@ def _knots(duration: float) -> int:
     return max(1, math.ceil(duration / KNOT - 1e-9))
 
 
-def queue_share(arm: Arm, trajectory: JointTrajectory) -> float:
+def queue_share(arm: ArmDescription, trajectory: JointTrajectory) -> float:
     """The share of the device's queue that the gateway fills to play `trajectory` at full speed."""
     return _queue_share(arm, states_of(trajectory))
 
 
-def _queue_share(arm: Arm, states: States) -> float:
+def _queue_share(arm: ArmDescription, states: States) -> float:
     braking = longest_braking(states.velocities, _accelerations(arm))
     return float(LEAD + 0.5 * braking) / (arm.device.queue_capacity * KNOT)
 
@@ -195,7 +195,7 @@ def longest_braking(velocities: Array, accelerations: Array) -> float:
 
 
 @once_per_arm
-def _accelerations(arm: Arm) -> Array:
+def _accelerations(arm: ArmDescription) -> Array:
     """(n,) [rad/s^2] or [m/s^2] of the joints."""
     return np.array([joint.acceleration for joint in arm.joints])
 
@@ -207,7 +207,9 @@ def sentence(margin: StepMargin) -> str:
     return f"{margin.name} peaks at {margin.share:.0%} of {margin.rate_limit:g} steps/s ({margin.limited_by})"
 
 
-def require_feasible(arm: Arm, trajectory: JointTrajectory, states: States | None = None) -> tuple[StepMargin, ...]:
+def require_feasible(
+    arm: ArmDescription, trajectory: JointTrajectory, states: States | None = None
+) -> tuple[StepMargin, ...]:
     """The margins; raises `PlanRefused` with the joint that cannot, and the scaling that would do. `states` are the
     points of `trajectory`, where they are at hand."""
     states = states or states_of(trajectory)
@@ -243,7 +245,7 @@ def require_feasible(arm: Arm, trajectory: JointTrajectory, states: States | Non
     )
 
 
-def feasible_scale(arm: Arm, trajectory: JointTrajectory, deadline: Deadline = NEVER) -> float:
+def feasible_scale(arm: ArmDescription, trajectory: JointTrajectory, deadline: Deadline = NEVER) -> float:
     """The largest dimensionless time scale in (0, 1] that the steppers can follow, by bisection; 0.0 where none above 1
     % is, or none in a time that a plan may take; raises `PlanRefused` once the deadline has passed."""
     slowest = max(SLOWEST, trajectory.points[-1].time_from_start / LONGEST)
@@ -275,7 +277,7 @@ def slowed(trajectory: JointTrajectory, scale: float) -> JointTrajectory:
     return JointTrajectory(stamp=trajectory.stamp, joint_names=trajectory.joint_names, points=points)
 
 
-def _can(arm: Arm, trajectory: JointTrajectory) -> bool:
+def _can(arm: ArmDescription, trajectory: JointTrajectory) -> bool:
     states = states_of(trajectory)
     found = _margins(arm, states)
     return max(margin.share for margin in found) <= FULL and _queue_share(arm, states) <= 1.0
@@ -299,7 +301,7 @@ class _RateLimit(NamedTuple):
 
 
 @once_per_arm
-def _rate_limits(arm: Arm) -> list[_RateLimit]:
+def _rate_limits(arm: ArmDescription) -> list[_RateLimit]:
     """Of each joint: its own speed, one pulse in two ticks, or the driver's pulse width."""
     return [
         _RateLimit(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.native.compiled import motion, where_built
 from services.planner.request.per_arm import once_per_arm
 from services.planner.timing.profile import JointLimits, States
@@ -165,7 +165,9 @@ def is_within(reached: Array, most: Array) -> bool:
     return motion.is_within(reached, most)
 
 
-def require_limits(arm: Arm, states: States, seen: SampledStates, limits: JointLimits, is_jerk_limited: bool) -> None:
+def require_limits(
+    arm: ArmDescription, states: States, seen: SampledStates, limits: JointLimits, is_jerk_limited: bool
+) -> None:
     """`require_within_limits` and, where it is jerk-limited, `require_jerk` of the trajectory through `states`, at
     which `seen` has looked; raises `BadTrajectory`."""
     if not is_within(seen.reached, _most(arm, limits, is_jerk_limited)):
@@ -176,7 +178,7 @@ def require_limits(arm: Arm, states: States, seen: SampledStates, limits: JointL
 
 
 @once_per_arm
-def _most(arm: Arm, limits: JointLimits, is_jerk_limited: bool) -> Array:
+def _most(arm: ArmDescription, limits: JointLimits, is_jerk_limited: bool) -> Array:
     """(5, n) that each row of `SampledStates.reached` may be, the first at least and the others at most."""
     lower, upper = _bounds(arm)
     loose = 1.0 + ROUNDING
@@ -185,13 +187,13 @@ def _most(arm: Arm, limits: JointLimits, is_jerk_limited: bool) -> Array:
 
 
 @once_per_arm
-def _bounds(arm: Arm) -> tuple[Array, Array]:
+def _bounds(arm: ArmDescription) -> tuple[Array, Array]:
     """Where positions may be, (n,) each [rad] or [m]."""
     lower = np.array([joint.lower for joint in arm.joints]) - ROUNDING
     return lower, np.array([joint.upper for joint in arm.joints]) + ROUNDING
 
 
-def require_within_limits(arm: Arm, samples: Samples, limits: JointLimits) -> None:
+def require_within_limits(arm: ArmDescription, samples: Samples, limits: JointLimits) -> None:
     """Position, velocity and acceleration of every sample; raises `BadTrajectory`."""
     lower, upper = _bounds(arm)
     loose = 1.0 + ROUNDING
@@ -208,7 +210,7 @@ def require_within_limits(arm: Arm, samples: Samples, limits: JointLimits) -> No
             raise BadTrajectory(f'{what} of "{name}" is {value:.6g} at {t:.3f} s, {over:.2g} beyond its limit')
 
 
-def require_jerk(arm: Arm, samples: Samples, limits: JointLimits) -> None:
+def require_jerk(arm: ArmDescription, samples: Samples, limits: JointLimits) -> None:
     """Of every sample of a jerk-limited trajectory; raises `BadTrajectory`."""
     share = np.abs(samples.jerks) / limits.jerk
     if not float(share.max()) <= LOOSE_JERK:

@@ -16,7 +16,7 @@ from schemas.device import (
     StopKind,
 )
 from services.arm.errors import suggestion
-from services.arm.model.description import Arm, Joint
+from services.arm.model.description import ArmDescription, Joint
 from services.stepper_gateway.device.pending_commands import NO_ARGUMENTS, Arguments
 from services.stepper_gateway.goals.limit_checks import SLACK, beyond
 from services.stepper_gateway.goals.rejections import invalid
@@ -43,7 +43,7 @@ def kind_of(request: DeviceCommandRequest) -> DeviceCommandKind:
     return KINDS[type(request.command)]
 
 
-def arguments_of(request: DeviceCommandRequest, arm: Arm) -> Arguments:
+def arguments_of(request: DeviceCommandRequest, arm: ArmDescription) -> Arguments:
     """Raises `GoalRejected` for a name, position or value that the arm does not have."""
     match request.command:
         case ReferenceCommand() as command:
@@ -58,7 +58,7 @@ def arguments_of(request: DeviceCommandRequest, arm: Arm) -> Arguments:
             return NO_ARGUMENTS
 
 
-def _reference(command: ReferenceCommand, arm: Arm) -> Arguments:
+def _reference(command: ReferenceCommand, arm: ArmDescription) -> Arguments:
     """Where the joints named stand, by the command or else by robot.toml; all of them if none is named."""
     if command.position and len(command.position) != len(command.name):
         raise invalid(f"{len(command.name)} joints are named and {len(command.position)} positions given")
@@ -76,7 +76,7 @@ def _require_within(joint: Joint, position: float) -> None:
         raise invalid(beyond(joint, position))
 
 
-def _homing_mask(names: tuple[str, ...], arm: Arm) -> int:
+def _homing_mask(names: tuple[str, ...], arm: ArmDescription) -> int:
     require_known(names, arm.joints)
     asked = [joint for joint in arm.joints if not names or joint.name in names]
     able = [joint.name for joint in asked if joint.drive.homing is not None]
@@ -89,7 +89,7 @@ def _homing_mask(names: tuple[str, ...], arm: Arm) -> int:
     return _mask(names, arm)
 
 
-def _output(command: OutputCommand, arm: Arm) -> Arguments:
+def _output(command: OutputCommand, arm: ArmDescription) -> Arguments:
     names = [output.name for output in arm.outputs]
     if command.output not in names:
         raise invalid(f'{arm.name} has no output "{command.output}"{suggestion(command.output, names)}')
@@ -102,6 +102,6 @@ def _permil(speed: float) -> int:
     return round(speed * 1000.0)
 
 
-def _mask(names: tuple[str, ...], arm: Arm) -> int:
+def _mask(names: tuple[str, ...], arm: ArmDescription) -> int:
     """Bit j for joint j; 0, which means all, for no names."""
     return sum(1 << index for index, joint in enumerate(arm.joints) if joint.name in names)

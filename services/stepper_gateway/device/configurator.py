@@ -9,7 +9,7 @@ from schemas.device_config import config_crc, config_text
 from schemas.system import LogLevel
 from schemas.topics import DEVICE_CONFIGURATION
 from services.arm.device.device_config import device_config
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.stepper_gateway.device.session import DeviceSession
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.links.reports import ConfigAckReport
@@ -29,7 +29,7 @@ class Configuration:
     one of somebody else that a device meets shows in an answer to a text that is not ours, and is then replaced.
     """
 
-    def __init__(self, arm: Arm, session: DeviceSession, out: Outbox) -> None:
+    def __init__(self, arm: ArmDescription, session: DeviceSession, out: Outbox) -> None:
         self._name = arm.device.name
         self._session, self._out = session, out
         self._text = config_text(device_config(arm))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from schemas.device import DeviceEvent, DeviceStatus
 from schemas.system import LogLevel
 from schemas.topics import DEVICE_EVENTS
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.stepper_gateway.device.configurator import Configuration
 from services.stepper_gateway.device.pending_commands import PendingCommands
 from services.stepper_gateway.device.readiness import not_ready_reason
@@ -23,7 +23,7 @@ SETTLING = 2.5  # messages; chosen: the one under way, the last one, and the wor
 class GatewayDevice:
     """One device; nothing here moves it."""
 
-    def __init__(self, arm: Arm, session_id: int, parameters: GatewayParameters, out: Outbox) -> None:
+    def __init__(self, arm: ArmDescription, session_id: int, parameters: GatewayParameters, out: Outbox) -> None:
         """`session_id` is the gateway's own, and the first number of its commands."""
         self.arm = arm
         self.joints = arm.joints

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from schemas.device import InjectKind, InjectRequest, InjectResponse
 from services.arm.errors import suggestion
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.stepper_gateway.device.gateway_device import GatewayDevice
 from services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from services.stepper_gateway.links.link import Kind
@@ -94,7 +94,7 @@ class InjectionHandler:
         self._device.out.put(Answer(ticket, InjectResponse(accepted=accepted, reason=reason)))
 
 
-def target_of(request: InjectRequest, arm: Arm) -> str:
+def target_of(request: InjectRequest, arm: ArmDescription) -> str:
     """The target as the device knows it, which calls joints by their wire names; raises `GoalRejected`."""
     match request.kind:
         case InjectKind.BLOCK | InjectKind.SLIP:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from schemas.device import DeviceMode
 from schemas.device_config import InputRole
 from schemas.device_faults import fault_text
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.stepper_gateway.links.frames import StateFlag, StateFrame
 
 
-def not_ready_reason(arm: Arm, state: StateFrame | None) -> str:
+def not_ready_reason(arm: ArmDescription, state: StateFrame | None) -> str:
     """A sentence, empty where a motion may start."""
     name = arm.device.name
     if state is None:
@@ -31,17 +31,17 @@ def not_ready_reason(arm: Arm, state: StateFrame | None) -> str:
             return f'device "{name}" is in mode {DeviceMode(mode).name}: wait until it is IDLE'
 
 
-def joint_name(arm: Arm, index: int) -> str:
+def joint_name(arm: ArmDescription, index: int) -> str:
     """The joint's name; empty for the number that means none."""
     return arm.joint_names[index] if index < len(arm.joints) else ""
 
 
-def input_names(arm: Arm, state: StateFrame) -> tuple[str, ...]:
+def input_names(arm: ArmDescription, state: StateFrame) -> tuple[str, ...]:
     """The switches that are active."""
     return tuple(switch.name for index, switch in enumerate(arm.inputs) if state.inputs >> index & 1)
 
 
-def _unreferenced(arm: Arm, state: StateFrame) -> str:
+def _unreferenced(arm: ArmDescription, state: StateFrame) -> str:
     lost = [joint for index, joint in enumerate(arm.joints) if not state.referenced >> index & 1]
     names = ", ".join(joint.name for joint in lost) or "its joints"
     by_hand = "put the arm into its reference pose and run `gemelo reference`"
@@ -52,7 +52,7 @@ def _unreferenced(arm: Arm, state: StateFrame) -> str:
     return f'device "{arm.device.name}" does not know where {names} stands: {remedy}'
 
 
-def _estop(arm: Arm, state: StateFrame) -> str:
+def _estop(arm: ArmDescription, state: StateFrame) -> str:
     stops = [switch.name for switch in arm.inputs if switch.role is InputRole.ESTOP]
     pressed = [name for name in input_names(arm, state) if name in stops]
     again = "run `gemelo reset`, `gemelo device arm`, then `gemelo home` or `gemelo reference`"

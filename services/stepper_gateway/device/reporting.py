@@ -5,7 +5,7 @@ from __future__ import annotations
 from schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState, ShaftPositions
 from schemas.joints import JointState, StepErrors
 from schemas.message import Vector
-from services.arm.model.description import Arm, Joint
+from services.arm.model.description import ArmDescription, Joint
 from services.stepper_gateway.device.clock import ClockSync
 from services.stepper_gateway.device.readiness import input_names, joint_name
 from services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, StateFlag, StateFrame, code_name
@@ -20,7 +20,7 @@ HALF_STEP = 0.5 + 1.0 / 256.0  # [steps] of whole steps beside the path: their r
 class Reporter:
     """Converts for one arm; steps stay behind this edge."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: ArmDescription) -> None:
         joints = arm.joints
         self._arm = arm
         self._joints = joints

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 
 from schemas.device import DeviceCommandKind
 from schemas.robot import OutputGripper, ServoGripper
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.gripper import opening_of, pulse_of
 from services.stepper_gateway.device.pending_commands import Arguments
 from services.stepper_gateway.goals.rejections import invalid
@@ -87,7 +87,7 @@ class ServoJaws(Jaws):
 class OutputJaws(Jaws):
     """Open or closed; how far it is on its way is known by its travel time alone."""
 
-    def __init__(self, gripper: OutputGripper, arm: Arm) -> None:
+    def __init__(self, gripper: OutputGripper, arm: ArmDescription) -> None:
         self._gripper = gripper
         self._index = [output.name for output in arm.outputs].index(gripper.output)
         self._from = 0.0  # [m]
@@ -136,7 +136,7 @@ class OutputJaws(Jaws):
         return abs(position - self._gripper.closed) <= SLACK
 
 
-def jaws_of(arm: Arm) -> Jaws | None:
+def jaws_of(arm: ArmDescription) -> Jaws | None:
     """The jaws of robot.toml's gripper; None without one."""
     match arm.gripper:
         case ServoGripper() as gripper:

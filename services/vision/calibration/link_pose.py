@@ -8,14 +8,14 @@ import numpy as np
 
 from services.arm.frames.transforms import inverse, to_message
 from services.arm.kinematics.chain import complete, joint_transform, link_transforms
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.model.urdf import JointKind, UrdfJoint
 from services.vision.rigid import Array, from_transform
 
 LinkAt = Callable[[Array], Array]  # base_from_link (4, 4) at joint values (n,) [rad] or [m] in the arm's order
 
 
-def link_pose(arm: Arm, link: str) -> LinkAt:
+def link_pose(arm: ArmDescription, link: str) -> LinkAt:
     """The function from joint values to the pose of `link` in the arm's base frame."""
     above = {joint.child: joint for joint in arm.model.joints}
     chain: list[UrdfJoint] = []

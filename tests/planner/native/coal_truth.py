@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from services.arm.kinematics.joint_mapping import JointMapping
 from services.arm.kinematics.kinematics import frame_of_link
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.planner.collision_geometry.coal_shapes import hull_around
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 class Truth:
     """Distances of an arm to itself and to `shapes`, whose poses are in the arm's base."""
 
-    def __init__(self, arm: Arm, shapes: Sequence[CollisionShape] = ()) -> None:
+    def __init__(self, arm: ArmDescription, shapes: Sequence[CollisionShape] = ()) -> None:
         self._model = pin.buildModelFromUrdf(str(arm.urdf_path))
         self._data = self._model.createData()
         self._configuration = JointMapping(arm, self._model)

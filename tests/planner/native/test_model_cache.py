@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from services.arm.kinematics import self_collisions
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.arm.stl import read_stl
 from services.planner.collision_geometry.link_shapes import link_shapes, solid_of
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
@@ -137,11 +137,13 @@ def test_a_solid_is_covered_once_too_and_as_it_would_be_anew(folder: Path, monke
     assert again.bulge == fresh.bulge
 
 
-def test_the_shapes_of_an_arm_are_read_once_and_their_triangles_too(meshed: Arm, monkeypatch: pytest.MonkeyPatch):
+def test_the_shapes_of_an_arm_are_read_once_and_their_triangles_too(
+    meshed: ArmDescription, monkeypatch: pytest.MonkeyPatch
+):
     read = self_collisions.read_collision_geometry
-    times: list[Arm] = []
+    times: list[ArmDescription] = []
 
-    def counted(arm: Arm, model: object) -> object:
+    def counted(arm: ArmDescription, model: object) -> object:
         times.append(arm)
         return read(arm, model)
 
@@ -155,7 +157,7 @@ def test_the_shapes_of_an_arm_are_read_once_and_their_triangles_too(meshed: Arm,
 
 
 @pytest.fixture
-def meshed(rm1_folder: Path, tmp_path: Path) -> Arm:
+def meshed(rm1_folder: Path, tmp_path: Path) -> ArmDescription:
     """rm1 with a mesh on two links."""
     shutil.copytree(rm1_folder, tmp_path / "rm1")
     (tmp_path / "rm1" / "cube.stl").write_bytes(stl_box(0.02))
@@ -164,7 +166,7 @@ def meshed(rm1_folder: Path, tmp_path: Path) -> Arm:
     return load_arm(tmp_path / "rm1")
 
 
-def test_another_process_finds_what_the_first_has_made(meshed: Arm, made: list[int], folder: Path):
+def test_another_process_finds_what_the_first_has_made(meshed: ArmDescription, made: list[int], folder: Path):
     program = (
         "import sys; from pathlib import Path; from services.arm.model.description import load_arm; "
         "from services.planner.native.native_planner import NativePlanner; NativePlanner(load_arm(Path(sys.argv[1])))"
@@ -179,7 +181,7 @@ def test_another_process_finds_what_the_first_has_made(meshed: Arm, made: list[i
 
 
 def test_the_log_says_how_far_it_is_and_which_model_is_too_large(
-    meshed: Arm, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    meshed: ArmDescription, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ):
     monkeypatch.setattr("services.planner.native.sphere_cover.MOST_SPHERES", 1)
     with caplog.at_level(logging.INFO):
@@ -190,7 +192,9 @@ def test_the_log_says_how_far_it_is_and_which_model_is_too_large(
     assert f"`gemelo collision fit {meshed.folder} --meshes --link brazo_link --within" in caplog.text
 
 
-def test_the_trial_names_a_model_that_is_too_large_with_the_remedy(meshed: Arm, monkeypatch: pytest.MonkeyPatch):
+def test_the_trial_names_a_model_that_is_too_large_with_the_remedy(
+    meshed: ArmDescription, monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.setattr("services.planner.native.sphere_cover.MOST_SPHERES", 1)
     found = [finding for finding in trial(meshed, 0.0) if finding.subject == 'link "brazo_link"']
     assert len(found) == 1
@@ -207,7 +211,7 @@ def sliced(count: int) -> list[CollisionShape]:
     ]
 
 
-def test_the_remedy_for_too_many_fitted_shapes_is_fewer_of_them_and_for_one_shape_there_is_none(meshed: Arm):
+def test_the_remedy_for_too_many_fitted_shapes_is_fewer_of_them_and_for_one_shape_there_is_none(meshed: ArmDescription):
     bulge, link = 0.1, "base_link"
     wide = SphereCover(np.zeros((1500, 4)), bulge)
     many = wide_spheres(meshed, link, sliced(20), wide, 0.005)

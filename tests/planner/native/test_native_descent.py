@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import Arm, load_arm
+from services.arm.model.description import ArmDescription, load_arm
 from services.planner.kinematics.centring import Centring
 from services.planner.kinematics.descent import Descent
 from services.planner.kinematics.targets import ToolTarget
@@ -23,7 +23,7 @@ STARTS = 12
 class Both:
     """One arm's descents, compiled and not, and random configurations within its limits."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: ArmDescription) -> None:
         self.kinematics = Kinematics(arm)
         self.compiled, self.plain = Descent(arm, self.kinematics), Descent(arm, self.kinematics, is_plain=True)
         assert self.compiled.knows_centring(ToolTarget(self.kinematics.tool(np.zeros(len(arm.joints))).position))

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import msgspec
 
 from services.arm.device.device_config import reference_steps
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.arm.motors.relative_moves import ramp_of
 from services.stepper_gateway.links.foreign import ra_messages
 from services.stepper_gateway.links.foreign.ra_sender import RaSender
@@ -23,7 +23,7 @@ COMPLAINTS = 1.0  # [s] between two about messages that cannot be read; chosen: 
 class RaDevice:
     """One arm behind one sketch; `now` [s] is any clock that only goes forward."""
 
-    def __init__(self, arm: Arm, new_boot: Callable[[], int], now: float) -> None:
+    def __init__(self, arm: ArmDescription, new_boot: Callable[[], int], now: float) -> None:
         """Nobody knows where the sketch's joints are: a person has to say it, with REFERENCE."""
         self._ramps = tuple(ramp_of(joint.drive) for joint in arm.joints)
         self._telemetry_time, steps = arm.device.telemetry_time, reference_steps(arm)

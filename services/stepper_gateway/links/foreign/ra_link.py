@@ -11,7 +11,7 @@ from functools import partial
 
 from paho.mqtt import client as paho
 
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.mqtt.access import BrokerAccess
 from services.mqtt.client import CONNECT_TIMEOUT, MqttClient, code_of, is_failure
 from services.mqtt.failures import failure, refusal
@@ -26,7 +26,7 @@ from services.stepper_gateway.links.mqtt import KEEP_ALIVE
 class RaLink:
     """A link to the one sketch behind a broker."""
 
-    def __init__(self, access: BrokerAccess, arm: Arm, wake: Callable[[], None]) -> None:
+    def __init__(self, access: BrokerAccess, arm: ArmDescription, wake: Callable[[], None]) -> None:
         self._access, self._wake = access, wake
         self._client: MqttClient | None = None
         self._reason = f"no connection yet to {access}"

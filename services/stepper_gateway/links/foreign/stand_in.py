@@ -14,7 +14,7 @@ from firmware.bindings.device import CoreDevice
 from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.device_config import config_text
 from services.arm.device.device_config import device_config
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.stepper_gateway.links.frames import (
     BadFrame,
     Code,
@@ -38,7 +38,9 @@ Report = tuple[Kind, bytes]
 class StandIn:
     """One core; `now` [s] is any clock that only goes forward, `new_boot` gives every start another boot id."""
 
-    def __init__(self, arm: Arm, name: str, steps: Sequence[int], new_boot: Callable[[], int], now: float) -> None:
+    def __init__(
+        self, arm: ArmDescription, name: str, steps: Sequence[int], new_boot: Callable[[], int], now: float
+    ) -> None:
         """`name` stands for the firmware's version."""
         self._config, self._name = config_text(device_config(arm)), name
         self._new_boot = new_boot

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import msgspec
 
 from services.arm.device.device_config import reference_steps
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.stepper_gateway.links.foreign.stand_in import Report, StandIn
 from services.stepper_gateway.links.foreign.text_exchange import TextExchange
 from services.stepper_gateway.links.foreign.text_messages import AnswerReader, line_of
@@ -25,7 +25,7 @@ class TextDevice:
     Nothing is sent until a person has said with REFERENCE where the joints stand: the board moves to whatever it reads.
     """
 
-    def __init__(self, arm: Arm, new_boot: Callable[[], int], now: float) -> None:
+    def __init__(self, arm: ArmDescription, new_boot: Callable[[], int], now: float) -> None:
         self._arm = arm
         self._stand_in = StandIn(arm, NAME, reference_steps(arm), new_boot, now)
         self._reader, self.exchange = AnswerReader(), TextExchange()

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from services.arm.model.description import Arm
+from services.arm.model.description import ArmDescription
 from services.stepper_gateway.links.connection import keep_connected
 from services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor
 from services.stepper_gateway.links.foreign.text_device import TextDevice
@@ -19,7 +19,7 @@ from services.stepper_gateway.links.serial_port import OpenPort, complaint, open
 class TextLink:
     """A link to the one board at the other end of `port`."""
 
-    def __init__(self, port: str, baud: int, arm: Arm, wake: Callable[[], None]) -> None:
+    def __init__(self, port: str, baud: int, arm: ArmDescription, wake: Callable[[], None]) -> None:
         self._port, self._baud, self._wake = port, baud, wake
         self._line: OpenPort | None = None
         self._reason = f"the serial port {port} has not been opened yet"
