@@ -78,6 +78,7 @@ class Assembly:
         self._chain = motion.chain(self._frames.links, self._frames.numbers, len(arm.joints))
         self._links: dict[str, motion.Part] = {}
         self._cores: dict[str, motion.Part | None] = {}
+        self._link_pairs: dict[tuple[str, ...], NDArray[np.int32]] = {}  # by the parts' names
         for link, cover in self.covers.items():
             self._links[link], self._cores[link] = self._part_and_core(link, shapes[link], cover)
 
@@ -97,25 +98,34 @@ class Assembly:
         parts += [NamedPart(name, one.attachment.link, one.part) for name, one in held.items()]
         cores = [NamedPart(link, link, core) for link, core in self._cores.items() if core is not None]
         cores += [NamedPart(name, one.attachment.link, one.core) for name, one in held.items() if one.core is not None]
-        names = tuple(part.name for part in parts)
+        names, core_names = tuple(part.name for part in parts), tuple(core.name for core in cores)
         _require_known(shapes, names)
-        world = self._world(parts, shapes, held)
-        sure = self._world(cores, shapes, held) if cores else None
+        obstacles = _obstacles(shapes, names)
+        world = self._world(parts, obstacles, held)
+        same = obstacles if core_names == names else _obstacles(shapes, core_names)
+        sure = self._world(cores, same, held) if cores else None
         return CompiledScene(world, names, tuple(shapes), dict(held), sure)
 
     def _world(
-        self, parts: Sequence[NamedPart], shapes: Sequence[CollisionShape], held: Mapping[str, HeldPart]
+        self, parts: Sequence[NamedPart], obstacles: list[motion.Obstacle], held: Mapping[str, HeldPart]
     ) -> motion.World:
-        names = [part.name for part in parts]
+        return motion.world(self._chain, [part.part for part in parts], self._pairs(parts, held), obstacles)
+
+    def _pairs(self, parts: Sequence[NamedPart], held: Mapping[str, HeldPart]) -> NDArray[np.int32]:
+        """(k, 2) the places of the parts that are checked against each other; of links alone computed once."""
+        names = tuple(part.name for part in parts)
+        if not held and names in self._link_pairs:
+            return self._link_pairs[names]
         pairs = [
             (first, second)
             for first in range(len(parts))
             for second in range(first + 1, len(parts))
             if self._is_checked(parts[first], parts[second], held)
         ]
-        obstacles = [_obstacle(shape, _bits(shape, names)) for shape in shapes]
         both = np.array(pairs, dtype=np.int32).reshape(-1, 2)
-        return motion.world(self._chain, [part.part for part in parts], both, obstacles)
+        if not held:
+            self._link_pairs[names] = both
+        return both
 
     def _part_and_core(
         self, link: str, shapes: Sequence[CollisionShape], cover: SphereCover
@@ -221,6 +231,11 @@ def _bulge(shapes: Sequence[CollisionShape]) -> float:
     longest = [max(shape.size, default=0.0) for shape in shapes]
     longest += [float(np.ptp(shape.mesh.vertices, axis=0).max()) for shape in shapes if shape.mesh is not None]
     return max(BULGE, ATTACHED_SHARE * max(longest, default=0.0))
+
+
+def _obstacles(shapes: Sequence[CollisionShape], names: Sequence[str]) -> list[motion.Obstacle]:
+    """The shapes as they are for a world whose parts have these names."""
+    return [_obstacle(shape, _bits(shape, names)) for shape in shapes]
 
 
 @lru_cache(maxsize=MOST_KNOWN)

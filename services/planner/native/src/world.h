@@ -22,6 +22,7 @@ class World {
             part_views_.push_back(
                 {part->nodes.data(), part->solid_views.data(), count(part->solid_views), part->frame});
         }
+        for (const auto& part : parts_) reaches_.push_back(reaches(*chain_, *part));
         for (int32_t part = 0; part < count(parts_); ++part) carriers_.push_back(carriers(part, 0));
         for (const PairView& pair : pairs_) {
             pair_carriers_.push_back({carriers(pair.first, pair.common), carriers(pair.second, pair.common)});
@@ -111,10 +112,9 @@ class World {
 
     // The joints of `part` beyond the frame `from`.
     Carriers carriers(int32_t part, int32_t from) const {
-        const Part& whole = *parts_[static_cast<size_t>(part)];
-        const std::vector<double> reach = reaches(*chain_, whole);
+        const std::vector<double>& reach = reaches_[static_cast<size_t>(part)];
         Carriers found;
-        for (int32_t i = whole.frame; i != from; i = chain_->frame(i).parent) {
+        for (int32_t i = parts_[static_cast<size_t>(part)]->frame; i != from; i = chain_->frame(i).parent) {
             const FrameView& frame = chain_->frame(i);
             found.push_back(
                 {frame.drive, reach[static_cast<size_t>(i)], frame.slides ? 0.0 : std::abs(double{frame.multiplier})});
@@ -155,6 +155,7 @@ class World {
     std::vector<PairView> pairs_;
     std::vector<Obstacle> owned_;
     std::vector<PartView> part_views_;
+    std::vector<std::vector<double>> reaches_;  // of every part by frame: [m/rad] or [m/m]
     std::vector<Carriers> carriers_;
     std::vector<std::array<Carriers, 2>> pair_carriers_;
     std::vector<ObstacleView> obstacles_;
