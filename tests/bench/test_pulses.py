@@ -38,7 +38,7 @@ def test_an_estop_is_silent_within_one_tick(monkeypatch):
 
 
 def test_a_press_that_does_nothing_is_no_figure(monkeypatch):
-    monkeypatch.setattr(pulses.Device, "press_input", lambda *_: None)
+    monkeypatch.setattr(pulses.CoreDevice, "press_input", lambda *_: None)
     monkeypatch.setattr(pulses, "PRESSES", 1)
     with pytest.raises(NotMeasured, match="after the e-stop"):
         pulses.estop_reaction_ticks()
