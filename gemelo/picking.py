@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from gemelo.errors import Aborted, BadArgument, Canceled, Lost, Refused
 from gemelo.grasping import grasp_point, lift_above, looking_down, turn_between, yaw_of
-from gemelo.seeing import MOVING, NO_GOOD_IMAGE, Eyes, Seen, add_to_scene, body_of
+from gemelo.seeing import Eyes, Seen, add_to_scene, body_of
 from gemelo.targets import FULL
 from gemelo.units import Point, Pose
 from schemas.actions import GoalStatusCode
@@ -33,6 +33,7 @@ MOST_TURN = math.radians(35.0)  # that closing jaws may turn a thing by: beyond 
 ATTEMPTS = 2
 STAYED = 0.01  # [m] a thing that is seen nearer than that to where it stood was not taken
 DOWN = (0.0, 0.0, -1.0)
+NO_GOOD_IMAGE = ("camera", "moving")  # checks of a `Refused` for the images, not for what they show
 SOLUTIONS = 8  # configurations of a tool pose that are considered
 
 OnPicking = Callable[[str], object]
@@ -162,7 +163,7 @@ def look_twice(eyes: Eyes, name: str, camera: str) -> Seen:
     try:
         return eyes.one(name, camera)
     except (Refused, Lost) as error:
-        if isinstance(error, Refused) and error.check not in (NO_GOOD_IMAGE, MOVING):
+        if isinstance(error, Refused) and error.check not in NO_GOOD_IMAGE:
             raise
         return eyes.one(name, camera)
 

@@ -33,7 +33,6 @@ STILL = 1e-3  # [rad] or [m] that it may be elsewhere after the images
 OLDEST = 0.5  # [s] that an image may be old
 UNCERTAIN = 0.002  # [m] standard deviation from which on a thing is not gripped
 FLIPPED = 0.6  # ratio of the two poses' errors from which on they cannot be told apart
-NO_GOOD_IMAGE, MOVING = "camera", "moving"  # the checks of a `Refused` for the images, not for what they show
 SHEET = 0.002  # [m] thickness of a tag without a body
 
 
@@ -166,10 +165,10 @@ class Eyes:
             for each in subscriptions:
                 each.close()
         if len(heard) < ENOUGH:
-            raise Refused(_why_none(camera, status, late, patience), check=NO_GOOD_IMAGE, subject=camera)
+            raise Refused(_why_none(camera, status, late, patience), check="camera", subject=camera)
         doubt = heard[-1].doubt
         if doubt:
-            raise Refused(f'camera "{camera}": {doubt}', check=NO_GOOD_IMAGE, subject=camera)
+            raise Refused(f'camera "{camera}": {doubt}', check="camera", subject=camera)
         return heard
 
     def _put_into_scene(self, cell: Cell, seen: Iterable[Seen]) -> None:
@@ -243,7 +242,7 @@ def _trouble(item: Detection, camera: str, sigma: float) -> str:
 
 
 def _moving() -> Refused:
-    return Refused("the arm moves: images of it are blurred; wait until it stands", check=MOVING)
+    return Refused("the arm moves: images of it are blurred; wait until it stands", check="moving")
 
 
 def _apart(first: Sequence[float], second: Sequence[float]) -> float:

@@ -10,7 +10,7 @@ import pytest
 from gemelo import Lost, Refused
 from gemelo.grasping import lift_above, looking_down, turn_between, yaw_of
 from gemelo.picking import look_twice
-from gemelo.seeing import MOVING, NO_GOOD_IMAGE, Seen
+from gemelo.seeing import Seen
 from gemelo.units import Pose
 from schemas.cell import ColourThing, TagThing
 from schemas.robot import Gripper
@@ -88,7 +88,7 @@ class Blinking:
 
 
 @pytest.mark.parametrize(
-    "error", [Refused("late", check=NO_GOOD_IMAGE), Refused("it moves", check=MOVING), Lost("no answer")]
+    "error", [Refused("late", check="camera"), Refused("it moves", check="moving"), Lost("no answer")]
 )
 def test_it_looks_once_more_where_no_image_was_of_use(error: Exception) -> None:
     assert look_twice(Blinking(error), "thing", "") == seen(0.015)  # type: ignore[arg-type]
