@@ -55,9 +55,10 @@ class JogCommands:
                 f"the planner has said nothing for {GAP:g} s: the arm has stopped in the middle of the jog; "
                 "`gemelo node list`"
             )
-        is_refused = heard is not None and not heard.active and bool(heard.limited_by)
-        if heard is not None and is_refused and now - self._began > (PERIOD if heard.check else BEGIN):
-            raise _refused(heard)
+        if heard is not None and not heard.active and heard.limited_by:
+            counts_after = PERIOD if heard.check else BEGIN
+            if now - self._began > counts_after:
+                raise _refused(heard)
         return heard
 
     def hold(

@@ -62,9 +62,9 @@ class Picked(NamedTuple):
         """One line for a person."""
         turned = f", turned {math.degrees(self.turned):.0f} deg by the jaws" if abs(self.turned) > 0.01 else ""
         again = "" if self.attempts == 1 else f", at attempt {self.attempts}"
-        return f"{self.name} is at {self.place}: seen +-{1e3 * self.sigma:.1f} mm{turned}{again}, {self.took:.1f} s" + (
-            f"; not seen afterwards: {self.unseen}" if self.unseen else ""
-        )
+        unseen = f"; not seen afterwards: {self.unseen}" if self.unseen else ""
+        error = 1e3 * self.sigma  # [mm]
+        return f"{self.name} is at {self.place}: seen +-{error:.1f} mm{turned}{again}, {self.took:.1f} s{unseen}"
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ class Parser(argparse.ArgumentParser):
             self.typed.error(self.typed.left_over_message(left_over[1]))
         one_of = re.fullmatch(r"one of the arguments (.*) is required", message)
         if one_of is not None:
-            message = self._one_is_needed(one_of[1].split())
+            message = self._with_examples(self._one_is_needed(one_of[1].split()))
         self.exit(ExitCode.USAGE, f"{self.prog}: {message}\n")
 
     def _one_is_needed(self, options: Sequence[str]) -> str:
@@ -77,13 +77,13 @@ class Parser(argparse.ArgumentParser):
         word = next(iter(self._given), "")
         has_places = any(not each.option_strings for each in self._actions)  # for words without an option
         if has_places or not word or word.startswith("-"):
-            return f"{needed}\nsee `{self.prog} --help`, with examples"
+            return needed
         names = [each for each in self._actions if set(each.option_strings) & set(options)]
         pairs = [each for each in names if "=" in str(each.metavar)]
         texts = [each for each in names if each.nargs is None and each.type is None]
         meant = [each.option_strings[0] for each in (pairs if "=" in word else texts)]
         hint = f"did you mean {meant[0]} {word}?" if meant and not word[0].isdigit() else needed
-        return f'"{word}" stands without an option: {hint}\nsee `{self.prog} --help`, with examples'
+        return f'"{word}" stands without an option: {hint}'
 
     def left_over_message(self, word: str) -> str:
         """What is said of a word that the command does not take, with the option that is most like it."""
@@ -92,7 +92,10 @@ class Parser(argparse.ArgumentParser):
         said = f'"{word}" is no option' if word.startswith("-") else f'"{word}" is one word too many'
         there_is = f"there is {', '.join(dict.fromkeys(options))}" if options else "it has no options"
         hint = f"did you mean {alike[0]}?" if alike else there_is
-        return f"{said}: {hint}\nsee `{self.prog} --help`, with examples"
+        return self._with_examples(f"{said}: {hint}")
+
+    def _with_examples(self, message: str) -> str:
+        return f"{message}\nsee `{self.prog} --help`, with examples"
 
 
 def build(

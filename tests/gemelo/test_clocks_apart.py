@@ -9,15 +9,17 @@ from pathlib import Path
 
 import pytest
 
+from gemelo import seeing
 from gemelo.errors import Refused
 from gemelo.scene import Scene
 from gemelo.seeing import Eyes
 from gemelo.session import Session
+from schemas.camera import CameraCondition, CameraStatus
 from schemas.deployment import Deployment, PathsSection
 from schemas.detections import Detection, DetectionKind, Detections
 from schemas.frames import Transform
 from schemas.joints import JointState
-from schemas.topics import JOINT_STATES, camera_detections
+from schemas.topics import JOINT_STATES, camera_detections, camera_status
 from services.arm.model.description import load_arm
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
@@ -80,10 +82,20 @@ def seen(stamp: int, x: float) -> Detections:
 
 
 @contextmanager
-def speaking(session: Session, nodes: dict[str, Node], late: int) -> Iterator[None]:
-    """An arm that stands, and images that come `late` [ns]; those that were taken before now show the cup elsewhere."""
+def speaking(
+    session: Session,
+    nodes: dict[str, Node],
+    late: int,
+    silent: float = 0.0,
+    condition: CameraCondition = CameraCondition.STREAMING,
+) -> Iterator[None]:
+    """An arm that stands, and images that come `late` [ns]; those that were taken before now show the cup elsewhere.
+
+    The camera is in that condition; the detector says nothing for the first `silent` [s].
+    """
     gateway, camera, detector = (nodes[name] for name in ("stepper_gateway", "camera", "detector"))
     states, found = gateway.publisher(JOINT_STATES), detector.publisher(camera_detections("overhead"))
+    status = camera.publisher(camera_status("overhead"))
     names = session.description.joint_names
     end = threading.Event()
 
@@ -91,8 +103,10 @@ def speaking(session: Session, nodes: dict[str, Node], late: int) -> Iterator[No
         began = camera.now()
         while not end.wait(0.02):
             states.put(JointState(stamp=gateway.now(), name=names, position=(0.0,) * 3, velocity=(0.0,) * 3))
+            status.put(CameraStatus(stamp=camera.now(), camera="overhead", condition=condition))
             stamp = camera.now() - late
-            found.put(seen(stamp, 0.1 if stamp < began else 0.2))
+            if camera.now() - began >= 1e9 * silent:
+                found.put(seen(stamp, 0.1 if stamp < began else 0.2))
 
     speaker = threading.Thread(target=speak)
     speaker.start()
@@ -123,3 +137,23 @@ def test_images_older_than_half_a_second_are_refused_with_their_age(deployment, 
         with pytest.raises(Refused, match=late) as refused:
             Eyes(session, Scene(session)).detect("cup", "overhead", False)
         assert (refused.value.check, refused.value.subject) == ("camera", "overhead")
+
+
+def test_a_detector_that_comes_late_to_its_images_is_waited_for_while_the_camera_streams(deployment, monkeypatch):
+    monkeypatch.setattr(seeing, "PATIENCE", -0.5)  # with the time that five images take, half a second in all
+    with (
+        hosts(deployment, *clocks_of_cameras(0.0, 0.0)) as (session, nodes),
+        speaking(session, nodes, 20 * MS, silent=1.5),
+    ):
+        (cup,) = Eyes(session, Scene(session)).detect("cup", "overhead", False)
+        assert cup.pose.position[0] == pytest.approx(0.2)
+
+
+def test_it_is_not_waited_for_where_the_camera_gives_no_images(deployment, monkeypatch):
+    monkeypatch.setattr(seeing, "PATIENCE", -0.5)
+    with (
+        hosts(deployment, *clocks_of_cameras(0.0, 0.0)) as (session, nodes),
+        speaking(session, nodes, 20 * MS, silent=1.5, condition=CameraCondition.FROZEN),
+        pytest.raises(Refused, match=r"within 0\.5 s"),
+    ):
+        Eyes(session, Scene(session)).detect("cup", "overhead", False)

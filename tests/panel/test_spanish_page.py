@@ -118,7 +118,7 @@ WITHIN_OTHERS = {  # parts of sentences, which are tested as a whole below
     "goals": "a motion goes to one of {}: {}",
     "gone": "{} for {} s: take control anew with `gemelo control take --force`",
     "seen": "{} is not seen by {}{}: is it in the image, lit, and not behind the arm? `gemelo camera view`",
-    "picked": "{} is at {}: seen +-{} mm{}{}, {} s",
+    "picked": "{} is at {}: seen +-{} mm{}{}, {} s{}",
     "unseen": "{}; not seen afterwards: {}",
     "mesh": "if it is drawn in mm, give scale=0.001",
     "expected": 'a share in per cent, as "50%"',
