@@ -185,6 +185,7 @@ class InverseKinematics:
         if not first.is_solution:
             return []
         found = [self._as_near(first.positions, near)]
+        known = [found[0].tolist()]
         idle = int(np.count_nonzero(self._idle))
         if len(near) - idle < FULL_POSE_JOINTS and not self._centring.is_redundant(target, first.positions, idle):
             for joint in self._mirrored:
@@ -192,9 +193,9 @@ class InverseKinematics:
                 start[joint] = self._lower[joint] + self._upper[joint] - start[joint]
                 attempt = self.descend(target, start)
                 positions = self._as_near(attempt.positions, near)
-                known = [other.tolist() for other in found]
                 if attempt.is_solution and self._is_new(positions.tolist(), known, SAME):
                     found.append(positions)
+                    known.append(positions.tolist())
         return sorted(found, key=lambda positions: self.travel(near, positions))
 
     def _collect(

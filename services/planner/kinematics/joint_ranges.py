@@ -44,13 +44,9 @@ class FullTurns:
     def other_ways_round(self, values: Array, near: Array, most: int) -> list[Array]:
         """`values` (n,) [rad] or [m] with a full turn more or less of one or more joints without limits, where the arm
         stands as it does at `values`: at most `most`, the fastest to reach from `near` (n,) first."""
-        if not self.has_endless:
-            return []
         choices = [(-1, 0, 1) if endless else (0,) for endless in np.isinf(self._upper).tolist()]
         turns = np.array([each for each in product(*choices) if any(each)], dtype=float).reshape(-1, len(values))
-        rows = values + math.tau * turns
-        nearest = np.argsort((np.abs(rows - near) / self._speed).max(axis=1), kind="stable")
-        return list(rows[nearest[:most]])
+        return list(nearest_first(values + math.tau * turns, near, self._speed)[:most])
 
     def nearly(self, branches: Array) -> tuple[Array, Array]:
         """The branches (m, n) [rad] or [m] with the full turns that bring them nearest to the limits, and (m,) [rad] or

@@ -102,8 +102,9 @@ class Assembly:
         _require_known(shapes, names)
         obstacles = _obstacles(shapes, names)
         world = self._world(parts, obstacles, held)
-        same = obstacles if core_names == names else _obstacles(shapes, core_names)
-        sure = self._world(cores, same, held) if cores else None
+        sure = None
+        if cores:
+            sure = self._world(cores, obstacles if core_names == names else _obstacles(shapes, core_names), held)
         return CompiledScene(world, names, tuple(shapes), dict(held), sure)
 
     def _world(
