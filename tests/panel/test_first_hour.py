@@ -13,7 +13,7 @@ from services.panel.words.words import TABLES
 from services.stack.stack import Stack
 from tests.panel.conftest import SIZE
 from tests.panel.person import Person, until
-from tests.panel.test_page import is_moving, rests, slowed
+from tests.panel.test_page import is_moving, rests
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {"en": DOCS / "first_hour.md", "es": DOCS / "es" / "primera_hora.md"}
@@ -90,11 +90,10 @@ def moves(person: Newcomer, arm: gemelo.Arm) -> None:
     person.reads(person.words("ended_succeeded"))
     assert arm.joints["brazo_joint"] == pytest.approx(0.5236, abs=1e-3)
     person.types("brazo_joint [°]", -150)
-    with slowed(arm):
-        person.press(person.words("plan_and_execute"))
-        until(lambda: is_moving(arm), bool)
-        person.page.keyboard.press("Space")
-        rests(arm)
+    person.press(person.words("plan_and_execute"))
+    until(lambda: is_moving(arm), bool)
+    person.page.keyboard.press("Space")
+    rests(arm)
     person.reads(person.words("check_ended"))
 
 
