@@ -81,19 +81,27 @@ def test_a_late_reader_hears_what_is_new_and_nothing_old_whatever_its_clock_says
     writer.close()
 
 
-def test_a_writer_that_starts_anew_is_heard_from_its_first_message(router):
+def heard_by(reader: ZenohBus) -> list[bytes]:
+    """What a reader that joins now hears from now on."""
     heard: list[bytes] = []
-    buses = [ZenohBus(router.deployment.router, "rm1") for _ in range(2)]
-    reader, first = buses
+    reader.subscribe("device/events", Delivery.EVERY, lambda arrival: heard.append(arrival.payload), lambda lost: None)
+    return heard
+
+
+def test_a_writer_that_starts_anew_is_heard_from_its_first_message(router):
+    earlier, reader, first = (ZenohBus(router.deployment.router, "rm1") for _ in range(3))
+    heard_earlier = heard_by(earlier)
     before = first.publish("device/events", "DeviceEvent", Delivery.EVERY)
     for _ in range(5):
         before.put(b"before it joined")
-    reader.subscribe("device/events", Delivery.EVERY, lambda arrival: heard.append(arrival.payload), lambda lost: None)
+    # Until then the router does not know the writer, and nobody could ask it what it has said so far.
+    assert until(lambda: len(heard_earlier) == 5), heard_earlier
+    heard = heard_by(reader)
     before.put(b"of the first")
-    assert until(lambda: heard == [b"of the first"])
+    assert until(lambda: heard == [b"of the first"]), heard
     first.close()
     second = ZenohBus(router.deployment.router, "rm1")
     second.publish("device/events", "DeviceEvent", Delivery.EVERY).put(b"of the second")
     assert until(lambda: heard == [b"of the first", b"of the second"]), heard
-    for bus in (reader, second):
+    for bus in (earlier, reader, second):
         bus.close()
