@@ -97,7 +97,9 @@ inline Lanes mesh_gap(const MeshView& mesh, const Point& p, const Lanes& limit) 
 
 // `limit`: from where on the distance does not matter any more.
 inline Lanes squared_gap(const ObstacleView& obstacle, const Point& centre, const Lanes& limit) {
-    const Point p = placed(obstacle.pose, centre);
+    const float* shift = obstacle.pose + 9;
+    const Point p = obstacle.is_turned != 0 ? placed(obstacle.pose, centre)
+                                            : Point{centre.x + shift[0], centre.y + shift[1], centre.z + shift[2]};
     switch (obstacle.shape) {
         case ShapeKind::kCylinder:
             return cylinder_gap(p, obstacle.size);

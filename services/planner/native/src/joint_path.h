@@ -27,7 +27,7 @@ class JointPath {
 
 // Through rows (count, dof); a span leads from a row to the one `stride` rows on, or to the last, by way of those
 // between them.
-class Polyline : public JointPath {
+class Polyline final : public JointPath {
   public:
     Polyline(const double* rows, size_t count, size_t dof, size_t stride = 1)
         : rows_(rows), count_(count), dof_(dof), stride_(stride) {}
@@ -35,12 +35,11 @@ class Polyline : public JointPath {
     size_t span_count() const override { return (count_ - 2) / stride_ + 1; }
 
     void at(size_t span, double share, double* joints) const override {
+        if (stride_ == 1) return line_at(rows_ + span * dof_, share, joints);
         const size_t lines = lines_of(span);
         const double along = share * static_cast<double>(lines);
         const size_t line = std::min(static_cast<size_t>(along), lines - 1);
-        const double here = along - static_cast<double>(line);
-        const double *from = rows_ + (span * stride_ + line) * dof_, *to = from + dof_;
-        for (size_t i = 0; i < dof_; ++i) joints[i] = from[i] + here * (to[i] - from[i]);
+        line_at(rows_ + (span * stride_ + line) * dof_, along - static_cast<double>(line), joints);
     }
 
     void speed(size_t span, double* speeds) const override {
@@ -55,6 +54,11 @@ class Polyline : public JointPath {
 
     // Between the least and the largest of the lines that are reached.
     double rate(size_t span, double share, double half, const double* speeds, double* rates) const override {
+        if (stride_ == 1) {
+            const double *from = rows_ + span * dof_, *to = from + dof_;
+            for (size_t i = 0; i < dof_; ++i) rates[i] = to[i] - from[i];
+            return 0.0;
+        }
         const size_t lines = lines_of(span);
         const double scale = static_cast<double>(lines);
         const size_t first = static_cast<size_t>(std::max(0.0, (share - half) * scale));
@@ -75,6 +79,11 @@ class Polyline : public JointPath {
     }
 
   private:
+    // At `share` of the line from one row to the next.
+    void line_at(const double* from, double share, double* joints) const {
+        for (size_t i = 0; i < dof_; ++i) joints[i] = from[i] + share * (from[dof_ + i] - from[i]);
+    }
+
     size_t lines_of(size_t span) const { return std::min(stride_, count_ - 1 - span * stride_); }
 
     const double* rows_;
@@ -84,7 +93,7 @@ class Polyline : public JointPath {
 // The uniform cubic B-spline of control points (n, dof); span i is that of the points i to i + 3.
 //
 // With both end points given thrice it begins and ends on them, at rest in its parameter.
-class Spline : public JointPath {
+class Spline final : public JointPath {
   public:
     Spline(const double* points, size_t count, size_t dof) : points_(points), count_(count), dof_(dof) {}
 

@@ -71,7 +71,8 @@ class MotionValidator {
         return look(Polyline(ends_.data(), 3, dof()), stop) == Verdict::kFree;
     }
 
-    Verdict look(const JointPath& path, const StopCondition& stop) {
+    template <class Path>
+    Verdict look(const Path& path, const StopCondition& stop) {
         begin(path);
         for (size_t next = 0; next < stretches_.size();) {
             if (stop()) return Verdict::kStopped;
@@ -97,7 +98,8 @@ class MotionValidator {
     };
 
     // In order; empty where all of the path is free.
-    std::vector<Unresolved> unresolved(const JointPath& path, const StopCondition& stop) {
+    template <class Path>
+    std::vector<Unresolved> unresolved(const Path& path, const StopCondition& stop) {
         begin(path);
         std::vector<Stretch> found;
         for (size_t next = 0, count = 0; next < stretches_.size(); next += count) {
@@ -121,7 +123,8 @@ class MotionValidator {
     static double middle_of(const Stretch& stretch) { return static_cast<double>(stretch.span) + stretch.middle; }
 
     // In order, and those that meet as one, with the pairs of all of them.
-    std::vector<Unresolved> joined(const JointPath& path, std::vector<Stretch> found) {
+    template <class Path>
+    std::vector<Unresolved> joined(const Path& path, std::vector<Stretch> found) {
         std::sort(found.begin(), found.end(),
                   [](const Stretch& a, const Stretch& b) { return middle_of(a) < middle_of(b); });
         stretches_ = std::move(found);
@@ -140,7 +143,8 @@ class MotionValidator {
     }
 
     // All that are near in any of the stretches from one up to another.
-    std::vector<std::array<int32_t, 2>> near_pairs(const JointPath& path, size_t first, size_t last) {
+    template <class Path>
+    std::vector<std::array<int32_t, 2>> near_pairs(const Path& path, size_t first, size_t last) {
         const size_t parts = static_cast<size_t>(world_.view().part_count);
         const size_t columns = kMaxParts + static_cast<size_t>(world_.view().obstacle_count);
         std::vector<uint8_t> marks(parts * columns, 0);
@@ -164,7 +168,8 @@ class MotionValidator {
     double* speed(size_t span) { return speeds_.data() + span * dof(); }
 
     // The bounds for the fastest span, how much of them each span needs, and the first stretches.
-    void begin(const JointPath& path) {
+    template <class Path>
+    void begin(const Path& path) {
         const size_t spans = path.span_count();
         double fastest[kMaxDof] = {};
         speeds_.resize(spans * dof());
@@ -201,19 +206,20 @@ class MotionValidator {
     }
 
     // The lanes that touch; the others are not looked at where one does and `is_one_enough`.
-    uint32_t check(const JointPath& path, size_t next, size_t count, bool is_one_enough = true,
-                   uint8_t* marks = nullptr) {
+    template <class Path>
+    uint32_t check(const Path& path, size_t next, size_t count, bool is_one_enough = true, uint8_t* marks = nullptr) {
         float joints[kMaxDof * kLanes], half[kLanes], steps[kMaxDof * kLanes], slack[kLanes];
         double row[kMaxDof], rates[kMaxDof];
+        const size_t dof = this->dof();
         const bool is_moving = !slowness_.empty();
         for (size_t lane = 0; lane < kLanes; ++lane) {
             const Stretch& stretch = stretches_[next + std::min(lane, count - 1)];
             path.at(stretch.span, stretch.middle, row);
-            for (size_t i = 0; i < dof(); ++i) joints[i * kLanes + lane] = static_cast<float>(row[i]);
+            for (size_t i = 0; i < dof; ++i) joints[i * kLanes + lane] = static_cast<float>(row[i]);
             half[lane] = raised(stretch.half * (is_moving ? slowness_[stretch.span] : 0.0));
             if (!is_moving) continue;
             const double off = path.rate(stretch.span, stretch.middle, stretch.half, speed(stretch.span), rates);
-            for (size_t i = 0; i < dof(); ++i) steps[i * kLanes + lane] = static_cast<float>(stretch.half * rates[i]);
+            for (size_t i = 0; i < dof; ++i) steps[i * kLanes + lane] = static_cast<float>(stretch.half * rates[i]);
             slack[lane] = raised(off * static_cast<double>(half[lane]));
         }
         const uint32_t lanes = (1u << count) - 1;

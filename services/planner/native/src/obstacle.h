@@ -36,6 +36,9 @@ inline ObstacleView view_of(const Obstacle& obstacle) {
         }
         view.pose[9 + row] = static_cast<float>(shift);
         view.size[row] = static_cast<float>(obstacle.size[row]);
+        for (int column = 0; column < 3; ++column) {
+            if (view.pose[3 * row + column] != (row == column ? 1.0f : 0.0f)) view.is_turned = 1;
+        }
     }
     return view;
 }

@@ -33,17 +33,14 @@ constexpr uint64_t kNextSeed = 1000003;  // from search to search; chosen: a pri
 constexpr double kFinestSearched = 1e-3, kFinestShortened = 6e-3;
 constexpr double kRoom = 1.2;  // times that, beyond the margin, which start and goals need; chosen
 
-// `otherwise`, or with lines told apart to `finest` [m] where the start and all goals have room for it.
-inline Tolerances told_to(double finest, const World& world, const Kernel& kernel, const PlanQuery& query,
-                          const Tolerances& otherwise) {
-    Tolerances wide = otherwise;
+// True if the start and all goals are free, and have room for lines that are told apart to `finest` [m].
+inline bool have_room(double finest, const World& world, const Kernel& kernel, const PlanQuery& query,
+                      const Tolerances& tolerances) {
+    Tolerances wide = tolerances;
     wide.margin += kRoom * finest;
-    MotionValidator validator(world, kernel, wide);
     std::vector<const double*> ends = {query.start.data()};
     for (const Joints& goal : query.goals) ends.push_back(goal.data());
-    Tolerances result = otherwise;
-    if (finest > otherwise.finest && validator.are_free(ends)) result.finest = finest;
-    return result;
+    return MotionValidator(world, kernel, wide).are_free(ends);
 }
 
 // How many configurations are to be checked, as much of `enough` as there is to be gained: nothing where a path is of
@@ -88,15 +85,21 @@ inline void find_shortest(const Space& space, MotionValidator& searching, Motion
 inline Plan plan(const World& world, const Kernel& kernel, const Space& space, const Tolerances& tolerances,
                  const PlanQuery& query, const StopCondition& stop) {
     Plan result;
-    const Tolerances hasty = told_to(kFinestSearched, world, kernel, query, tolerances);
-    MotionValidator searching(world, kernel, hasty), last(world, kernel, tolerances);
-    MotionValidator shortening(world, kernel, told_to(kFinestShortened, world, kernel, query, hasty));
+    // The widest room is asked for first: mostly it is there, and the rest needs no question.
+    const bool is_wide = have_room(kFinestShortened, world, kernel, query, tolerances);
+    const bool is_roomy = is_wide || have_room(kFinestSearched, world, kernel, query, tolerances);
+    Tolerances hasty = tolerances;
+    if (is_roomy) hasty.finest = std::max(hasty.finest, kFinestSearched);
+    Tolerances hastier = hasty;
+    if (is_wide) hastier.finest = std::max(hastier.finest, kFinestShortened);
+    MotionValidator searching(world, kernel, hasty), shortening(world, kernel, hastier),
+        last(world, kernel, tolerances);
     for (MotionValidator* validator : {&searching, &shortening, &last}) validator->learn();
     std::vector<Joints> goals;
     for (const Joints& goal : query.goals) {
-        if (searching.is_free(goal.data())) goals.push_back(goal);
+        if (is_roomy || searching.is_free(goal.data())) goals.push_back(goal);
     }
-    if (!searching.is_free(query.start.data())) {
+    if (!is_roomy && !searching.is_free(query.start.data())) {
         result.outcome = Outcome::kStartTouches;
         return result;
     }

@@ -52,26 +52,30 @@ class SphereTree {
     Sphere around(size_t begin, size_t end) const {
         Sphere best = spheres_[static_cast<size_t>(order_[begin])];
         for (int step = 1; step <= 64; ++step) {
-            const Sphere& far = spheres_[static_cast<size_t>(farthest(best, begin, end))];
+            const Sphere& far = *farthest(best, begin, end).sphere;
             const double share = 1.0 / (step + 1);
             best.x += share * (far.x - best.x);
             best.y += share * (far.y - best.y);
             best.z += share * (far.z - best.z);
         }
-        best.radius = reach(best, spheres_[static_cast<size_t>(farthest(best, begin, end))]) + 1e-6;
+        best.radius = farthest(best, begin, end).reach + 1e-6;
         return best;
     }
 
-    int32_t farthest(const Sphere& from, size_t begin, size_t end) const {
-        return *std::max_element(order_.begin() + static_cast<long>(begin), order_.begin() + static_cast<long>(end),
-                                 [&](int32_t a, int32_t b) {
-                                     return reach(from, spheres_[static_cast<size_t>(a)]) <
-                                            reach(from, spheres_[static_cast<size_t>(b)]);
-                                 });
-    }
+    struct Farthest {
+        const Sphere* sphere;
+        double reach;  // to its far side
+    };
 
-    static double reach(const Sphere& from, const Sphere& to) {
-        return std::hypot(to.x - from.x, to.y - from.y, to.z - from.z) + to.radius;
+    Farthest farthest(const Sphere& from, size_t begin, size_t end) const {
+        Farthest found{nullptr, -1.0};
+        for (size_t i = begin; i < end; ++i) {
+            const Sphere& to = spheres_[static_cast<size_t>(order_[i])];
+            const double x = to.x - from.x, y = to.y - from.y, z = to.z - from.z;
+            const double reach = std::sqrt(x * x + y * y + z * z) + to.radius;
+            if (reach > found.reach) found = {&to, reach};
+        }
+        return found;
     }
 
     // At the median along the axis in which the centres are spread the most.

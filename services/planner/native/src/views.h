@@ -64,7 +64,8 @@ struct MeshView {
 
 struct ObstacleView {
     ShapeKind shape;
-    float pose[12];  // from the base into the obstacle's own frame
+    int32_t is_turned;  // 0: its axes are those of the base, as of most tables, walls and shelves
+    float pose[12];     // from the base into the obstacle's own frame
     float size[3];
     float rounding;     // [m] radius and padding, added to the shape on all sides
     uint64_t touching;  // bit for every part that may touch it
