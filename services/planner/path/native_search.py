@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 NATIVE = "native"
 # Tuning constants: chosen, where a line does not say measured or standard.
-ENOUGH = 2_000  # configurations checked; measured: with twice as many plans are as long, and take a tenth longer
+ENOUGH = 500  # configurations checked; measured: with 2,000 paths are 0.1 % shorter, and a plan takes 6 % longer (p50)
 REASONS = {"START_TOUCHES": SearchFailure.START_TOUCHES, "GOAL_TOUCHES": SearchFailure.GOAL_TOUCHES}
 
 

@@ -79,13 +79,14 @@ class Search:
         if not ends:
             raise PathNotFound(SearchFailure.GOAL_TOUCHES)
         path = native_path(core, start, np.array([near for _, near in ends]), sought.seed, sought.attempts, deadline)
-        goal = next(goal for goal, near in ends if (near == path.corners[-1]).all())
+        reached = path.corners[-1].tolist()
+        goal = next(goal for goal, near in ends if near.tolist() == reached)
         return self._joined(sought, start, path, goal, deadline)
 
     def _joined(self, sought: _Sought, near: Array, path: FreePath, goal: Array, deadline: Deadline) -> Path:
         """The native planner's path from near the start to near the goal, continued to both; where it is not, the curve
         stays as it is."""
-        is_at_goal = bool((goal == path.corners[-1]).all())
+        is_at_goal = goal.tolist() == path.corners[-1].tolist()
         if near is sought.start and is_at_goal:
             return Path(path.corners, path.control, NATIVE)
         with sought.watch.phase("smoothing"):

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain, pairwise
+from operator import lt
 from typing import NamedTuple
 
 import numpy as np
@@ -223,9 +224,9 @@ def require_ends(trajectory: JointTrajectory, start: tuple[float, ...], goal: tu
     """Raises `BadTrajectory` unless the trajectory leads exactly from `start` to `goal`, (n,) [rad] or [m], at rest at
     both, with increasing times."""
     times = [point.time_from_start for point in trajectory.points]
-    for before, after in pairwise(times):
-        if not before < after:
-            raise BadTrajectory(f"the trajectory goes from {before:.6f} s to {after:.6f} s")
+    if not all(map(lt, times, times[1:])):
+        before, after = next(pair for pair in pairwise(times) if not lt(*pair))
+        raise BadTrajectory(f"the trajectory goes from {before:.6f} s to {after:.6f} s")
     first, last = trajectory.points[0], trajectory.points[-1]
     if first.positions != start or last.positions != goal or first.time_from_start != 0.0:
         raise BadTrajectory("the trajectory does not lead from the start to the goal")
