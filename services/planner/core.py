@@ -120,11 +120,10 @@ class Planner:
         rows = trajectory.points
         chosen = {round(index * (len(rows) - 1) / (PATH_POINTS - 1)) for index in range(PATH_POINTS)}
         shown = [rows[index] for index in sorted(chosen)]
-        points = (self.kinematics.tool(row.positions).position.tolist() for row in shown)
         return PlannedPath(
             stamp=stamp,
             frame=self.arm.base_frame,
-            points=tuple((x, y, z) for x, y, z in points),
+            points=tuple(self._goals.tool_position(row.positions) for row in shown),
             name=trajectory.joint_names,
             positions=tuple(row.positions for row in shown),
             times=tuple(row.time_from_start for row in shown),
@@ -155,7 +154,7 @@ class Planner:
             code=PlanCode.SUCCESS,
             trajectory=finished.trajectory,
             duration=finished.trajectory.points[-1].time_from_start,
-            tool_goal=tuple(self.kinematics.tool(finished.trajectory.points[-1].positions).position.tolist()),
+            tool_goal=self._goals.tool_position(finished.trajectory.points[-1].positions),
             margins=finished.margins,
             slowed=finished.slowed,
             planner_id=planner_id,

@@ -54,8 +54,9 @@ class CollisionChecker:
     def keeps(self, positions: Positions, margin: float) -> bool:
         """True if everything is farther than `margin` [m] in this configuration (n,)."""
         self.deadline.check()
-        row = np.array((positions,))
-        return self._spheres.is_free(self.world, row, margin) or self._touching(row.repeat(2, axis=0), margin) is None
+        if self._spheres.keeps(self.world, positions, margin):
+            return True
+        return self._touching(np.array((positions, positions)), margin) is None
 
     def distance(self, positions: Positions) -> float:
         """Distance [m] of the nearest pair, as `World.distance`."""

@@ -50,8 +50,11 @@ class SphereCheck(Protocol):
     def least_distance(self, world: World, positions: Positions) -> float:
         """[m] that every pair is apart at least in this configuration (n,) [rad] or [m]; 0 where nothing is known."""
 
+    def keeps(self, world: World, positions: Positions, margin: float) -> bool:
+        """True if the one configuration (n,) [rad] or [m] is known to keep `margin` [m]."""
+
     def is_free(self, world: World, rows: Array, margin: float) -> bool:
-        """True if the polyline through `rows` (m, n) [rad] or [m], or the only row, is known to keep `margin` [m]."""
+        """True if the polyline through `rows` (m, n) [rad] or [m], m >= 2, is known to keep `margin` [m]."""
 
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
         """What is certain of the polyline through `rows` (m, n) [rad] or [m], m >= 2, that is not known to be free,
@@ -79,11 +82,13 @@ class NativeCheck:
         planner = self._planner if self._shown is world else self.planner(world, world.clearance)
         return planner.distance(positions)
 
+    def keeps(self, world: World, positions: Positions, margin: float) -> bool:
+        """True if the spheres keep `margin` [m] in the one configuration (n,) [rad] or [m]."""
+        return self.planner(world, margin).is_free(positions)
+
     def is_free(self, world: World, rows: Array, margin: float) -> bool:
-        """True if the spheres keep `margin` [m] all along the polyline through `rows` (m, n) [rad] or [m], or in the
-        only row."""
-        planner = self.planner(world, margin)
-        return bool(planner.free(rows)[0]) if len(rows) == 1 else planner.path_free(rows)
+        """True if the spheres keep `margin` [m] all along the polyline through `rows` (m, n) [rad] or [m], m >= 2."""
+        return self.planner(world, margin).path_free(rows)
 
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
         """The result of the spheres for the polyline through `rows` (m, n) [rad] or [m] with `margin` [m] to keep, and
@@ -113,6 +118,10 @@ class ExactShapesOnly:
     def least_distance(self, world: World, positions: Positions) -> float:
         """0 for every configuration (n,) [rad] or [m]: nothing is known."""
         return 0.0
+
+    def keeps(self, world: World, positions: Positions, margin: float) -> bool:
+        """False, whatever the `positions` (n,) [rad] or [m] and the `margin` [m]: nothing is known."""
+        return False
 
     def is_free(self, world: World, rows: Array, margin: float) -> bool:
         """False, whatever the `rows` (m, n) [rad] or [m] and the `margin` [m]: nothing is known."""

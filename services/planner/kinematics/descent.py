@@ -8,7 +8,7 @@ somewhere, and everything where they are not built.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -53,6 +53,13 @@ class Descent:
         self._upper = np.array([joint.upper for joint in arm.joints])
         self._identity = np.eye(len(arm.joints))
         self._native = None if is_plain else _native_descent(arm)
+
+    def tool_position(self, positions: Sequence[float] | Array) -> tuple[float, float, float]:
+        """[m] where the tool is in the base at joint values (n,) [rad] or [m]."""
+        if self._native is not None:
+            return self._native.tool_position(positions)
+        x, y, z = self._kinematics.tool(positions).position.tolist()
+        return x, y, z
 
     def clip(self, positions: Array) -> Array:
         """The nearest joint values (n,) [rad] or [m] within the limits."""

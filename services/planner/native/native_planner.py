@@ -113,6 +113,10 @@ class NativePlanner:
         to itself and everything else; raises ValueError for another shape."""
         return motion.are_free(self._scene.world, self._kernel, self._rows(positions), self.margin + spare)
 
+    def is_free(self, positions: Sequence[float] | Array) -> bool:
+        """True if the one configuration (n,) [rad] or [m] keeps the margin; raises ValueError for another shape."""
+        return motion.is_free(self._scene.world, self._kernel, positions, self.margin)
+
     def edge_free(self, start: ArrayLike, goal: ArrayLike) -> bool:
         """True if the whole straight line of the joints from `start` to `goal`, (n,) [rad] or [m], keeps the margin,
         between samples too."""

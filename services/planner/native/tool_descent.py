@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +22,10 @@ class NativeDescent:
         frame, pose = frames.places[arm.tool_frame]
         bounds = np.array([[joint.lower for joint in arm.joints], [joint.upper for joint in arm.joints]])
         self._arm = motion.tool_descent(frames.links, frames.numbers, frame, transform_row(pose), bounds)
+
+    def tool_position(self, positions: Sequence[float] | Array) -> tuple[float, float, float]:
+        """[m] where the tool is at joint values (n,) [rad] or [m]."""
+        return motion.tool_position(self._arm, positions)
 
     def descend(
         self,

@@ -39,6 +39,14 @@ def both(request: pytest.FixtureRequest) -> Both:
     return Both(load_arm(request.param))
 
 
+def test_the_tool_is_where_pinocchio_has_it(both: Both):
+    for row in both.rows:
+        expected = pytest.approx(both.kinematics.tool(row).position, abs=1e-12)
+        assert both.compiled.tool_position(row) == expected
+        assert both.compiled.tool_position(tuple(row.tolist())) == both.compiled.tool_position(row)
+        assert both.plain.tool_position(row) == expected
+
+
 @pytest.mark.parametrize("with_turn", [False, True])
 def test_they_end_where_those_in_python_end(both: Both, with_turn: bool):
     for wanted, start in both.pairs():

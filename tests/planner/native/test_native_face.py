@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+import math
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 from services.planner.native.binding import motion
@@ -64,6 +66,37 @@ def test_one_module_alone_chooses_between_the_compiled_core_and_python():
     choosing = [path.name for path in PLANNER.rglob("*.py") if "IN_PYTHON" in path.read_text()]
     assert choosing == ["compiled.py"]
     assert set(asking) <= {path.name for path in (PLANNER / "native").glob("*.py")}
+
+
+def test_one_configuration_alone_is_judged_as_among_others(arm, core, configurations):
+    core.set_scene([CollisionShape("box", ShapeKind.BOX, (0.3, 0.2, 0.4), ((0.3, 0.1, 0.2), (0.0, 0.0, 0.0, 1.0)))])
+    rows = configurations(300, 4)
+    free = core.free(rows)
+    assert [core.is_free(row.tolist()) for row in rows] == free.tolist()
+    assert core.is_free(rows[0]) == free[0]
+    assert 0 < free.sum() < len(rows)
+    with pytest.raises(ValueError, match=f"{len(arm.joints)} columns"):
+        core.is_free(rows[0, 1:])
+    with pytest.raises(ValueError, match="wrap it into one turn"):
+        core.is_free([101.0, *rows[0, 1:]])
+
+
+def test_an_obstacle_along_the_axes_is_judged_as_one_that_is_hardly_turned(arm, core, configurations):
+    rows = configurations(2000, 5)
+    verdicts = []
+    for turn in (0.0, 1e-7):
+        turned = (math.sin(turn), 0.0, math.sin(turn), math.cos(turn))
+        shapes = [
+            CollisionShape(f"{kind}", kind, size, ((x, 0.2, 0.3), turned))
+            for kind, size, x in (
+                (ShapeKind.BOX, (0.2, 0.1, 0.3), 0.3), (ShapeKind.CYLINDER, (0.1, 0.4), -0.3),
+                (ShapeKind.SPHERE, (0.12,), 0.0), (ShapeKind.CAPSULE, (0.05, 0.3), 0.5),
+            )
+        ]  # fmt: skip
+        core.set_scene(shapes)
+        verdicts.append(core.free(rows))
+    assert (verdicts[0] != verdicts[1]).mean() < 0.002  # those that stand within a hair of the margin
+    assert 0 < verdicts[0].sum() < len(rows)
 
 
 def test_two_hundred_obstacles_are_no_more_than_the_same_asked_one_by_one():

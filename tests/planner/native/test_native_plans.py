@@ -144,7 +144,7 @@ def test_what_the_spheres_say_of_a_configuration_for_certain_is_so_on_the_exact_
     for row in configurations(150, 6):
         distance = world.distance(row)
         assert check.least_distance(world, row) <= max(distance, 0.0) + UNSURE
-        if check.is_free(world, row[None], CLEARANCE):
+        if check.keeps(world, row, CLEARANCE):
             assert distance >= CLEARANCE
         elif check.resolve(world, np.array((row, row)), CLEARANCE).touching is not None:
             touching += 1

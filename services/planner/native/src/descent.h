@@ -64,6 +64,13 @@ class DescentRun {
         return {std::sqrt(now.cost), is_there(now)};
     }
 
+    // Where the tool is [m] at `joints` (dof,).
+    static std::array<double, 3> tool_position(const ToolDescent& arm, const double* joints) {
+        Matrix at[kMaxFrames];
+        const Matrix tool = place(arm, joints, at);
+        return {tool[9], tool[10], tool[11]};
+    }
+
     // The product (dof, dof) of the weighted Jacobian at `joints` with itself.
     void squared_jacobian(const double* joints, double (*squared)[kMaxDof]) const {
         const Residual at = residual(joints);
@@ -121,16 +128,21 @@ class DescentRun {
         return at;
     }
 
-    // What is missing [m], turns weighted, and how the joints change that.
-    Residual residual(const double* joints) const {
-        Matrix at[kMaxFrames];
+    // The tool's pose at `joints` (dof,), and those of the frames into `at`.
+    static Matrix place(const ToolDescent& arm, const double* joints, Matrix* at) {
         Matrix here{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0};
-        for (size_t i = 0; i < arm_.frames.size(); ++i) {
-            const ToolFrame& frame = arm_.frames[i];
+        for (size_t i = 0; i < arm.frames.size(); ++i) {
+            const ToolFrame& frame = arm.frames[i];
             const double value = joints[frame.drive] * frame.multiplier + frame.offset;
             at[i] = here = moved(product(here, frame.fixed), frame, value);
         }
-        const Matrix tool = product(here, arm_.tool);
+        return product(here, arm.tool);
+    }
+
+    // What is missing [m], turns weighted, and how the joints change that.
+    Residual residual(const double* joints) const {
+        Matrix at[kMaxFrames];
+        const Matrix tool = place(arm_, joints, at);
         Residual result{};
         for (size_t i = 0; i < arm_.frames.size(); ++i) add_column(result, arm_.frames[i], at[i], tool);
         for (size_t row = 0; row < 3; ++row) result.error[row] = target_.position[row] - tool[9 + row];

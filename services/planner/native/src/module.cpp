@@ -127,6 +127,12 @@ nb::ndarray<nb::numpy, double> descend(const ToolDescent& arm, const Rows& start
     return array_of(std::move(rows), {count, dof + 2});
 }
 
+nb::tuple tool_position(const ToolDescent& arm, const Joints& joints) {
+    require_columns(joints.size(), arm.lower.size(), "joint values");
+    const auto position = DescentRun::tool_position(arm, joints.data());
+    return nb::make_tuple(position[0], position[1], position[2]);
+}
+
 // `branches` (m, n) with every choice of full turns [rad] within the limits, (k, n), `most` choices of each at most.
 nb::ndarray<nb::numpy, double> turned(const Rows& branches, const Row& lower, const Row& upper, const Row& period,
                                       double turn, double most) {
@@ -293,6 +299,13 @@ nb::ndarray<nb::numpy, bool> are_free(const World& world, const Kernel& kernel, 
         }
     }
     return nb::ndarray<nb::numpy, bool>(verdicts, {count}, owner);
+}
+
+// The same of one configuration, with the interpreter's lock held: it takes as long as to release it.
+bool is_free(const World& world, const Kernel& kernel, const Joints& joints, double margin) {
+    require_columns(joints.size(), static_cast<size_t>(world.dof()), "joint values");
+    require_usable(joints.data(), joints.size());
+    return MotionValidator(world, kernel, {margin, 0.0, 0.0}).is_free(joints.data());
 }
 
 // Eight paddings at once: the largest in [low, high] with which nothing is near, narrowed eightfold each time.
@@ -465,6 +478,7 @@ NB_MODULE(_motion, module) {
         "kernel", [](const std::string& name) { return &kernel_named(name); }, "name"_a, nb::rv_policy::reference);
     module.def("chain", &make_chain, "links"_a, "numbers"_a, "dof"_a);
     module.def("tool_descent", &make_tool_descent, "links"_a, "numbers"_a, "frame"_a, "pose"_a, "bounds"_a);
+    module.def("tool_position", &tool_position, "arm"_a, "joints"_a);
     module.def("descend", &descend, "arm"_a, "starts"_a, "position"_a, "rotation"_a, "metres_per_radian"_a,
                "position_tolerance"_a, "rotation_tolerance"_a);
     module.def("centre", &centre, "arm"_a, "joints"_a, "middle"_a, "weight"_a, "position"_a, "rotation"_a,
@@ -480,6 +494,7 @@ NB_MODULE(_motion, module) {
     module.def("obstacle", &make_obstacle, "shape"_a, "pose"_a, "size"_a, "rounding"_a, "touching"_a, "mesh"_a.none());
     module.def("world", &make_world, "chain"_a, "parts"_a, "pairs"_a, "obstacles"_a);
     module.def("are_free", &are_free, "world"_a, "kernel"_a, "rows"_a, "margin"_a);
+    module.def("is_free", &is_free, "world"_a, "kernel"_a, "joints"_a, "margin"_a);
     module.def("clearance", &clearance, "world"_a, "kernel"_a, "row"_a, "most"_a);
     module.def("first_contact", &first_contact, "world"_a, "kernel"_a, "row"_a, "margin"_a);
     module.def("look", &look, "world"_a, "kernel"_a, "rows"_a, "degree"_a, "margin"_a, "finest"_a, "seconds"_a,
