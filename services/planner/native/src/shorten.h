@@ -41,16 +41,14 @@ class Shortener {
     static constexpr double kWorthAMove = 0.995;  // of the length of both edges before
 
     void pull(std::vector<Joints>& path, size_t corner) {
-        for (double share = 0.5; share > 0.1; share *= 0.5) {
+        for (const double share : {0.5, 0.25}) {
             while (!stop_() && move(path, corner, between(path[corner], foot(path, corner), share))) continue;
         }
         const Joints there = foot(path, corner);
-        for (size_t i = 0; i < there.size(); ++i) {
-            for (double share = 1.0; share > 0.2; share *= 0.5) {
-                Joints at = path[corner];
-                at[i] += share * (there[i] - at[i]);
-                if (stop_() || move(path, corner, at)) break;
-            }
+        for (size_t i = 0; i < there.size() && !stop_(); ++i) {
+            Joints at = path[corner];
+            at[i] = there[i];
+            move(path, corner, at);
         }
     }
 
