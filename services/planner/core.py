@@ -54,7 +54,10 @@ Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
 PATH_POINTS = 100  # chosen: enough to draw a path smoothly, and small as a message
 MOST_GOALS = 8  # configurations of one goal that are tried; chosen: an arm of six joints mostly has eight
-LATEST = 0.06  # of the time allowed, beyond it: then every question about collisions ends the plan
+PLANNED = (
+    0.93  # of the time allowed is for the plan, the rest for its answer: what is in the way, where there is no plan
+)
+LATEST = 0.06  # of the time for the plan, beyond it: then every question about collisions ends the plan
 LONGEST = 120.0  # [s] that may be allowed; chosen: nobody waits longer, and a worker is busy for all of it
 ATTEMPTS = 3  # searches, where the finished path fails its verification; chosen: the next seed mostly succeeds
 NEAR_START = 0.9  # of the distance at the start is kept on the way, where that is less than the clearance
@@ -99,7 +102,7 @@ class Planner:
         Another thread may set `cancel`, and see on `watch` what the plan is at.
         """
         self.checker.begin()
-        watch, deadline = watch or Stopwatch(clock), Deadline(clock, request.allowed_time, clock(), cancel)
+        watch, deadline = watch or Stopwatch(clock), Deadline(clock, PLANNED * request.allowed_time, clock(), cancel)
         self.checker.deadline = self.checker.world.deadline = deadline.extended(LATEST)
         try:
             return self._plan(request, present, age, deadline, watch)

@@ -41,7 +41,7 @@ from tests.planner.test_world import stl_box
 from tests.planner.walled import WALLED, past_the_wall
 
 ALLOWED = 1.0  # [s]
-LATEST = 1.1  # times that
+LATEST = 1.04  # times that; 1.1 is promised, but no clock here counts what a machine does besides
 # [s] for all pairs at once, and for one alone: up to a hundred times what solids take, and what raw meshes take.
 COSTS = {"solids": ((0.005, 0.001), (0.001, 0.0002)), "meshes": ((0.02, 0.004), (0.005, 0.001), (0.001, 0.0002))}
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

@@ -123,6 +123,8 @@ class _Problem:
         is_late = self._late(deadline)
         while not is_late():
             planner.growRoadmapPtc(self._base.PlannerTerminationCondition(_after(BATCH, is_late)))
+            if is_late():
+                break
             data = self._base.PlannerData(self.information)
             planner.getPlannerData(data)
             configurations = [
