@@ -18,6 +18,8 @@ from services.arm.model.description import ArmDescription, load_arm
 from services.bench.planner.scene_intake import drawn_scene
 from services.planner.collision import arm_geometry
 from services.planner.collision.world import World
+from services.planner.collision_geometry.coal_shapes import geometry_of
+from services.planner.collision_geometry.shapes import SIZES, CollisionShape, ShapeKind
 from tests.planner.test_world import configurations, stl_box
 
 SEVEN = Path(__file__).parent / "arms" / "seven"
@@ -46,6 +48,15 @@ class Counted:
     def __call__(self, *arguments: object, **more: object) -> object:
         self.calls += 1
         return self._function(*arguments, **more)  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("kind", [ShapeKind.BOX, ShapeKind.CYLINDER, ShapeKind.SPHERE, ShapeKind.CAPSULE])
+def test_the_box_around_a_plain_solid_is_that_of_coal(kind: ShapeKind):
+    for size in np.random.default_rng(3).uniform(0.01, 2.0, (20, SIZES[kind])):
+        shape = CollisionShape("it", kind, tuple(size.tolist()))
+        ours, theirs = geometry_of(shape), geometry_of(shape)
+        assert arm_geometry.box_around(shape, ours) == pytest.approx(arm_geometry.box_of(theirs), abs=1e-12)
+        assert ours.aabb_radius == theirs.aabb_radius > 0.0
 
 
 def test_a_scene_costs_no_walk_along_the_chain_for_what_stands_still(

@@ -18,7 +18,7 @@ from services.arm.kinematics.self_collisions import driver_of, load_collision_ge
 from services.arm.model.description import ArmDescription
 from services.planner.collision.scene_shapes import SceneError, is_read_from_a_file, shape_of
 from services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
-from services.planner.collision_geometry.shapes import CollisionShape
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -69,14 +69,14 @@ class ArmGeometry:
         geometry = geometry_of(shape)
         if not item.attached:
             placed = pin.GeometryObject(item.name, 0, 0, self._base.act(inner), geometry)
-            return PlacedObject(shape, placed, 0, box_of(geometry), np.zeros(len(self.drivers)))
+            return PlacedObject(shape, placed, 0, box_around(shape, geometry), np.zeros(len(self.drivers)))
         if item.frame not in self.arm.model.link_names:
             raise SceneError(f'object "{item.name}" is attached to "{item.frame}", which {self.arm.name} does not have')
         number = frame_of_link(self.pinocchio, item.frame)
         frame = self.pinocchio.frames[number]
         joint = int(frame.parentJoint)
         placed = pin.GeometryObject(item.name, joint, number, frame.placement.act(inner), geometry)
-        return PlacedObject(shape, placed, joint, box_of(geometry), self.reach_of(placed))
+        return PlacedObject(shape, placed, joint, box_around(shape, geometry), self.reach_of(placed))
 
     def reach_of(self, shape: pin.GeometryObject) -> Array:
         """(joints,) [m/rad] or [m/m] that any point of the shape moves at most per unit of each joint; 0 for those that
@@ -113,6 +113,21 @@ def arm_geometry(arm: ArmDescription, kinematics: Kinematics) -> ArmGeometry:
     if known is None or known.arm is not arm:
         known = _KNOWN[kinematics] = ArmGeometry(arm, kinematics)
     return known
+
+
+def box_around(shape: CollisionShape, geometry: coal.CollisionGeometry) -> Array:
+    """(2, 3) as `box_of` the `geometry` of `shape`: of a plain solid by its sizes, in an eighth of the time."""
+    match shape.kind, shape.size:
+        case ShapeKind.BOX, (x, y, z):
+            half = (0.5 * x, 0.5 * y, 0.5 * z)
+        case ShapeKind.CYLINDER, (radius, length):
+            half = (radius, radius, 0.5 * length)
+        case ShapeKind.SPHERE, (radius,):
+            half = (radius, radius, radius)
+        case _:
+            return box_of(geometry)
+    geometry.computeLocalAABB()  # coal knows its centre and radius only from then on
+    return np.array(((0.0, 0.0, 0.0), half))
 
 
 def box_of(geometry: coal.CollisionGeometry) -> Array:

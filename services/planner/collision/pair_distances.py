@@ -25,7 +25,7 @@ class PairDistances:
         is_mesh = np.array([mesh is not None for mesh in geometry.meshes])
         self._is_slow = np.any(is_mesh[geometry.both], axis=1)
         self._pair: dict[int, tuple[coal.ComputeDistance, coal.DistanceResult]] = {}
-        self._poses = [coal.Transform3s() for _ in geometry.boxes]
+        self._poses: list[coal.Transform3s | None] = [None] * len(geometry.boxes)
 
     def of(self, placed: pin.GeometryData, index: int) -> coal.DistanceResult:
         """The distance of a pair and its nearest points, in the frame of `placed`; raises `PlanRefused` once the
@@ -51,5 +51,7 @@ class PairDistances:
 
     def _pose(self, placed: pin.GeometryData, number: int) -> coal.Transform3s:
         pose, there = self._poses[number], placed.oMg[number]
+        if pose is None:
+            pose = self._poses[number] = coal.Transform3s()
         pose.setTransform(there.rotation, there.translation)
         return pose

@@ -68,7 +68,7 @@ class CollisionShape:
             raise ValueError(f'"{self.name}": a mesh or hull, and nothing else, comes with its triangles')
         if not 0.0 <= self.padding < math.inf:
             raise ValueError(f'"{self.name}": padding must be 0 m or more, not {self.padding}')
-        if not all(math.isfinite(value) for part in self.pose for value in part):
+        if not math.isfinite(sum(map(sum, self.pose))):
             raise ValueError(f'"{self.name}": its pose is not finite')
         if abs(math.hypot(*self.pose[1]) - 1.0) > 1e-3:
             raise ValueError(f'"{self.name}": its rotation is no unit quaternion (x, y, z, w)')
@@ -93,13 +93,13 @@ def matrix_of(pose: Rigid) -> Array:
     x, y, z, w = (value / length for value in pose[1])
     a, b, c = pose[0]
     return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), a],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), b],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), c],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
+        (
+            1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), a,
+            2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), b,
+            2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), c,
+            0.0, 0.0, 0.0, 1.0,
+        )
+    ).reshape(4, 4)  # fmt: skip
 
 
 @dataclass(frozen=True)
