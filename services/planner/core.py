@@ -54,9 +54,7 @@ Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
 PATH_POINTS = 100  # chosen: enough to draw a path smoothly, and small as a message
 MOST_GOALS = 8  # configurations of one goal that are tried; chosen: an arm of six joints mostly has eight
-PLANNED = (
-    0.93  # of the time allowed is for the plan, the rest for its answer: what is in the way, where there is no plan
-)
+PLANNED = 0.93  # of the time allowed is for the plan, the rest for its answer: what is in the way, where there is none
 LATEST = 0.06  # of the time for the plan, beyond it: then every question about collisions ends the plan
 LONGEST = 120.0  # [s] that may be allowed; chosen: nobody waits longer, and a worker is busy for all of it
 ATTEMPTS = 3  # searches, where the finished path fails its verification; chosen: the next seed mostly succeeds

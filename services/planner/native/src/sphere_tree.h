@@ -68,7 +68,7 @@ class SphereTree {
     };
 
     Farthest farthest(const Sphere& from, size_t begin, size_t end) const {
-        Farthest found{nullptr, -1.0};
+        Farthest found{&spheres_[static_cast<size_t>(order_[begin])], -1.0};
         for (size_t i = begin; i < end; ++i) {
             const Sphere& to = spheres_[static_cast<size_t>(order_[i])];
             const double x = to.x - from.x, y = to.y - from.y, z = to.z - from.z;
