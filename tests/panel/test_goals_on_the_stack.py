@@ -73,7 +73,7 @@ def test_what_a_dragged_goal_would_touch_is_named_with_how_deep_and_drawn_red_an
     arm.check(goal.goal.joints)
     until(lambda: (obstacles.red, served.labels), lambda now: not any(now))
     assert not served.world.bad_goal.is_visible
-    assert move.problem.content == ""
+    until(lambda: move.problem.content, lambda content: content == "")
 
 
 def test_a_goal_is_checked_anew_when_anybody_changes_what_stands_around(served: Served, arm: gemelo.Arm) -> None:
