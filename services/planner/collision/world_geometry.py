@@ -43,7 +43,7 @@ class WorldGeometry:
         self.moving: list[int] = np.flatnonzero(joints).tolist()
         both, self.direct = self._checked(joints)
         self.both: NDArray[np.int_] = both  # (k, 2) numbers of the shapes
-        self.pairs: list[tuple[int, int]] = list(zip(*both.T.tolist(), strict=True)) if len(both) else []
+        self.pairs: list[tuple[int, int]] = list(zip(*both.T.tolist(), strict=True))
         paddings = np.array([0.0] * self._links + [each.shape.padding for each in objects])
         self.padding: list[float] = paddings[both].sum(axis=1).tolist()
         self.boxes = np.array([*own.boxes, *(each.box for each in objects)])
