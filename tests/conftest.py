@@ -1,6 +1,7 @@
-"""The arm most tests are about, and property tests that run the same examples everywhere.
+"""The arm most tests are about, the lanes, and property tests that run the same examples everywhere.
 
-HYPOTHESIS_PROFILE=explore looks for new examples.
+`make test` runs what is not marked `full`; `make test-all` also the rest, and every property again with
+HYPOTHESIS_PROFILE=full. HYPOTHESIS_PROFILE=explore looks for new examples.
 """
 
 from __future__ import annotations
@@ -16,16 +17,31 @@ from hypothesis.internal.conjecture import providers
 
 from services.arm.model.description import ArmDescription, load_arm
 
+pytest_plugins = ["tests.cost", "pytester"]
+
 # A run in the background begins with Ctrl-C ignored, and every process that a test starts would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # No deadline: two cores, shared; time is measured by the bench.
-settings.register_profile("same", derandomize=True, deadline=None)
+settings.register_profile("quick", derandomize=True, deadline=None)
+settings.register_profile("full", derandomize=True, deadline=None)
 settings.register_profile("explore", deadline=None)
-profile = os.environ.get("HYPOTHESIS_PROFILE", "same")
+profile = os.environ.get("HYPOTHESIS_PROFILE", "quick")
 settings.load_profile(profile)
-if profile == "same":  # not those with the numbers of whatever modules happen to be loaded
+if profile != "explore":  # not those with the numbers of whatever modules happen to be loaded
     providers._get_local_constants = lambda: providers._local_constants
+
+WHOLE = {"twin", "chromium"}  # fixtures that start a stack's processes, or a browser
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Gives each test its lane, and the tests of a file one worker, unless they share a stack with other files."""
+    for item in items:
+        if item.get_closest_marker("alone") or not WHOLE.isdisjoint(getattr(item, "fixturenames", ())):
+            item.add_marker("full")
+        if not item.get_closest_marker("xdist_group"):
+            item.add_marker(pytest.mark.xdist_group(str(item.path.relative_to(item.config.rootpath))))
 
 
 @pytest.fixture(scope="session")

@@ -20,6 +20,8 @@ from services.stack.stack import Stack
 from tests.gemelo.conftest import BROKER
 from tests.stack.person import Operator, jumps
 
+pytestmark = pytest.mark.full
+
 NEEDED = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner")
 LONGEST = 90.0  # [s]
 MOVES = ["above the part", "down", "up", "around the post", "down", "up", "home"]

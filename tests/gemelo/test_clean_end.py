@@ -11,6 +11,8 @@ import gemelo
 from services.stack.stack import Stack
 from tests.gemelo.conftest import BROKER, NEEDED, make_ready
 
+pytestmark = pytest.mark.full
+
 
 def test_after_a_streamed_session_no_process_tells_of_leaks(tmp_path: Path) -> None:
     stack = Stack(broker=BROKER, out=tmp_path, processes=NEEDED)

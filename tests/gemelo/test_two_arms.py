@@ -12,6 +12,8 @@ import gemelo
 from services.stack.stack import Stack
 from tests.gemelo.conftest import BROKER, NEEDED, make_ready
 
+pytestmark = pytest.mark.full
+
 ROBOTS = ("rm1", "parol6")
 
 

@@ -8,9 +8,13 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
+import pytest
+
 from schemas.actions import GoalStatusCode
 from tests.real_time import may_run_in_real_time
 from tests.stack.person import Operator, jumps
+
+pytestmark = pytest.mark.alone
 
 HOGS = 16  # chosen: without priorities a stack beside them loses its heartbeats within seconds
 SECONDS = 60  # that they live at the most

@@ -12,6 +12,8 @@ import pytest
 from tests.optional import need
 from tests.runtime.support import until
 
+pytestmark = pytest.mark.alone
+
 SEED = 1
 
 

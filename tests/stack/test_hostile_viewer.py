@@ -17,6 +17,8 @@ from tests.optional import need, need_root
 from tests.stack.hostile import RATE, SIZE
 from tests.stack.links import Links
 
+pytestmark = pytest.mark.alone
+
 STOP_GOAL = 100.0  # [ms] of the median
 STOPS = 3
 

@@ -18,6 +18,8 @@ from tests.stack.gemelo import COMMAND, gemelo
 from tests.stack.person import jumps
 from tests.stack.typist import Typist
 
+pytestmark = pytest.mark.alone
+
 UP, DOWN = "\x1b[A", "\x1b[B"
 SPEED = 0.2  # of the limits, with which the keys begin
 STOPPED = 2.5  # [s] after the last key: its repetition, the dead-man, what is under way to the device, and braking

@@ -10,6 +10,8 @@ from tests.optional import need, need_root
 from tests.stack.link_cases import CASES, Case
 from tests.stack.links import Links
 
+pytestmark = pytest.mark.alone
+
 # All of them: sudo .venv/bin/python -m tests.stack.links
 FEW = ("desk-cut-both-0.2s", "cell-cut-into-1s", "board-slow-300ms", "desk-cut-out-10s-attached")
 CHOSEN = [case for case in CASES if case.name in FEW]

@@ -13,6 +13,8 @@ from schemas.actions import GoalStatusCode
 from services.runtime.errors import ServerLost
 from tests.stack.person import jumps
 
+pytestmark = pytest.mark.alone
+
 LONGEST_END = 3.0  # [s] from SIGTERM to the end of a process
 PAUSE = 3.0  # [s] that a process stands still: longer than any lease or heartbeat
 BOUND = 5.0  # [s] after the move's own time in which a waiting client must know

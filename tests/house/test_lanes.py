@@ -1,0 +1,80 @@
+"""Every test is run by `make test` or by the rest of `make test-all`, once, and nothing is run again."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def runs(target: str) -> list[str]:
+    """The marker expressions of the runs of pytest that a target of the Makefile makes."""
+    command = ["make", "-n", "--no-print-directory", target]
+    recipe = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60.0, check=True).stdout
+    calls = [line for line in recipe.splitlines() if "bin/pytest " in line]
+    assert not [line for line in calls if "--last-failed" in line or "--lf" in line or "rerun" in line]
+    return [re.findall(r'-m "([^"]+)" tests/?$', line)[0] for line in calls]
+
+
+def is_chosen(expression: str, marks: dict[str, bool]) -> bool:
+    return bool(eval(expression, {"__builtins__": {}}, marks))
+
+
+def test_every_test_is_run_once_and_every_property_once_more_with_all_its_examples():
+    [quick], [properties, *slow] = runs("test"), runs("test-rest")
+    for full, alone, hypothesis in product((False, True), repeat=3):
+        if alone and not full:
+            continue  # tests/conftest.py marks what is alone as full
+        marks = {"full": full, "alone": alone, "hypothesis": hypothesis}
+        assert sum(is_chosen(each, marks) for each in (quick, *slow)) == 1, marks
+        assert is_chosen(properties, marks) is (hypothesis and not full), marks
+
+
+def test_all_is_what_is_quick_and_then_the_rest():
+    assert runs("test-all") == runs("test") + runs("test-rest")
+
+
+def test_one_room_is_run_by_its_name():
+    command = ["make", "-n", "test", "ROOM=planner"]
+    recipe = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60.0, check=True).stdout
+    [call] = [line for line in recipe.splitlines() if "bin/pytest " in line]
+    assert call.endswith('-m "not full" tests/planner')
+    assert "deploy/test_firmware" not in recipe
+
+
+def test_pytest_finds_every_file_with_tests():
+    files = [
+        path for path in (ROOT / "tests").rglob("*.py") if re.search(r"^def test_", path.read_text(), re.MULTILINE)
+    ]
+    assert len(files) > 300
+    assert [str(path) for path in files if not path.name.startswith("test_")] == []
+
+
+def test_what_starts_a_stack_or_a_browser_or_runs_alone_is_full(pytester: pytest.Pytester):
+    pytester.makeconftest((ROOT / "tests/conftest.py").read_text().replace("pytest_plugins", "plugins"))
+    pytester.makeini("[pytest]\nmarkers =\n    full\n    alone\n")
+    pytester.makepyfile(
+        """
+        import pytest
+
+        @pytest.fixture
+        def twin(): ...
+
+        @pytest.fixture
+        def arm(twin): ...
+
+        @pytest.mark.alone
+        def test_alone(): ...
+
+        def test_on_a_stack(arm): ...
+
+        def test_quick(): ...
+        """
+    )
+    pytester.inline_run("-m", "not full").assertoutcome(passed=1)
+    pytester.inline_run("-m", "full").assertoutcome(passed=2)
