@@ -9,6 +9,7 @@ import uuid
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from queue import SimpleQueue
 
 import msgspec
@@ -36,6 +37,7 @@ from schemas.planning import (
     ValidityRequest,
 )
 from schemas.scene import Contact
+from schemas.text_file import NotUtf8, read_text
 from schemas.topics import FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS, STATE_VALIDITY
 from services.arm.model.description import ArmDescription
 from services.runtime.requests.client import PendingCall
@@ -138,9 +140,8 @@ class Plan:
         <Plan rm1: named='left', ... s>
         """
         try:
-            with open(path, "rb") as file:
-                saved = msgspec.json.decode(file.read(), type=SavedPlan)
-        except (OSError, msgspec.MsgspecError) as error:
+            saved = msgspec.json.decode(read_text(Path(path)), type=SavedPlan)
+        except (OSError, NotUtf8, msgspec.MsgspecError) as error:
             raise Error(f"{path} holds no plan: {error}") from error
         return cls(saved.robot, Target(**saved.target), saved.response)  # type: ignore[typeddict-item]
 

@@ -10,6 +10,7 @@ from gemelo.errors import BadArgument, Error
 from gemelo.targets import number
 from gemelo.whole_files import write_whole
 from schemas.scene import MeshShape, PlanningScene
+from schemas.text_file import read_text
 from services.runtime.deployment import project_root
 
 LARGEST_MESH = 10.0  # [m]; what is larger was drawn in mm
@@ -59,7 +60,7 @@ def write_scene(scene: PlanningScene, path: Path) -> None:
 def read_scene(path: Path) -> PlanningScene:
     """The scene of a file; raises `Error` where it cannot be read, or holds none."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=PlanningScene)
+        return msgspec.json.decode(read_text(path), type=PlanningScene)
     except OSError as error:
         raise Error(f"{path} cannot be read: {error.strerror}") from error
     except ValueError as error:

@@ -6,6 +6,7 @@ import unicodedata
 from pathlib import Path
 
 from gemelo.errors import BadArgument, Error
+from schemas import text_file
 
 LONGEST = 64  # [characters] of a name
 LARGEST_FILE = 1_000_000  # [bytes] of a file of points or of a program
@@ -42,10 +43,10 @@ def read_text(path: Path) -> str:
     try:
         if path.is_file() and path.stat().st_size > LARGEST_FILE:
             raise Error(f"{path} has {path.stat().st_size} bytes: no file of points or program is over {LARGEST_FILE}")
-        return path.read_text(encoding="utf-8")
+        return text_file.read_text(path)
     except OSError as error:
         raise Error(f"{path} cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
+    except text_file.NotUtf8 as error:
         raise Error(f"{path} is no UTF-8 text: {error}") from error
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from schemas.actions import GoalStatusCode
 from schemas.message import Message
+from schemas.text_file import NotUtf8, decode_text
 from schemas.topics import ACTIONS, Action
 from services.cli.errors import CommandError, ExitCode, unknown, usage
 from services.cli.forms import json_line, print_value
@@ -105,11 +107,8 @@ def goal_text(source: str) -> str:
     if source.lstrip().startswith("{"):
         return source
     try:
-        if source == "-":
-            return sys.stdin.read()
-        with open(source, encoding="utf-8") as file:
-            return file.read()
-    except (OSError, UnicodeDecodeError) as error:
+        return decode_text(sys.stdin.buffer.read() if source == "-" else Path(source).read_bytes())
+    except (OSError, NotUtf8) as error:
         raise usage(f"cannot read the goal: {error}") from error
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from schemas.system import Parameter, ParameterValue
+from schemas.text_file import NotUtf8, decode_text
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.node import living
 from services.cli.param import change_parameter, parameter_of, parameters_of, require_in_range, value_of, written
@@ -67,9 +68,9 @@ def dumped(session: CommandSession, names: list[str]) -> str:
 def read(file: str) -> dict[str, dict[str, object]]:
     """The tables of a file, by node; raises `CommandError`."""
     try:
-        text = sys.stdin.read() if file == "-" else Path(file).read_text(encoding="utf-8")
+        text = decode_text(sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes())
         tables = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, NotUtf8, tomllib.TOMLDecodeError) as error:
         raise usage(f"{file}: cannot be read as parameters: {error}") from error
     for node, table in tables.items():
         if not isinstance(table, dict):

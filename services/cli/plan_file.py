@@ -10,6 +10,7 @@ import msgspec
 
 import gemelo
 from schemas.planning import PlanResponse
+from schemas.text_file import decode_text
 from services.cli.errors import CommandError, usage
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def read_plan(source: str, arm: ArmDescription) -> Plan:
     """
     name = "standard input" if source == STANDARD_INPUT else source
     try:
-        saved = msgspec.json.decode(_read(source, name), type=PlanFile)
+        saved = msgspec.json.decode(decode_text(_read(source, name)), type=PlanFile)
     except (msgspec.MsgspecError, ValueError) as error:
         raise usage(f"{name} holds no plan: {error}; {HOW_TO_WRITE}") from error
     if saved.robot != arm.name:

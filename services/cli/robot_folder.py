@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from schemas.text_file import read_text
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.text_table import table
@@ -150,7 +151,7 @@ def print_matrix(folder: Path, write: bool, always_within: float | None) -> Exit
 
     try:
         arm = load_arm(folder)
-        text = arm.srdf_path.read_text(encoding="utf-8")
+        text = read_text(arm.srdf_path)
     except (ValueError, OSError) as error:
         raise usage(str(error)) from error
     verdicts = collision_matrix(arm, tell=_say, always_within=always_within)

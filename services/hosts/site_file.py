@@ -15,6 +15,7 @@ import msgspec
 from gemelo.programs.toml_lines import Where, toml_lines
 from schemas.errors import ConfigurationError
 from schemas.site import Site, SiteBroker, SiteHost, SiteRecord, SiteRobot, SiteRouter
+from schemas.text_file import NotUtf8, read_text
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,30}")  # of a host or a site: part of file names, units and certificates
 PLAIN = '1 to 31 lower-case letters, digits, "_" or "-"'
@@ -54,14 +55,11 @@ class Problems:
 def read_site(file: Path) -> tuple[Site, Problems]:
     """The site, and where to add what else is wrong; raises `SiteError`."""
     try:
-        text = file.read_text(encoding="utf-8-sig")  # some editors begin with a mark of the encoding
+        text = read_text(file)
         raw = tomllib.loads(text)
     except FileNotFoundError:
         raise SiteError(f"{file}: there is no such file; deploy/hosts/example.toml is one to copy") from None
-    except UnicodeDecodeError as error:
-        at = error.object[: error.start].count(b"\n") + 1
-        raise SiteError(f"{file}, line {at}: this is not UTF-8: save the file in that encoding") from error
-    except (OSError, tomllib.TOMLDecodeError) as error:
+    except (OSError, NotUtf8, tomllib.TOMLDecodeError) as error:
         raise SiteError(f"{file}: {error}") from error
     problems = Problems(file, text)
     site = _site(raw, file.stem, problems)

@@ -13,6 +13,7 @@ from typing import Any, Generic, TypeVar, cast
 import msgspec
 
 from schemas.message import Message
+from schemas.text_file import read_text
 from schemas.topics import Topic
 from services.arm.model.description import ArmDescription, load_arm
 from services.recordings.channels import schema_of
@@ -126,7 +127,7 @@ class Recorded:
                 "folder of that robot with --robot"
             )
         for name, path in (("urdf", arm.urdf_path), ("srdf", arm.srdf_path), ("robot_toml", arm.robot_path)):
-            if recorded[name] != (here := path.read_text(encoding="utf-8")):
+            if recorded[name] != (here := read_text(path)):
                 raise NotReplayable(
                     f"{self.path}: its {FILES[name]} is another than {path}, first in line "
                     f"{first_other_line(recorded[name], here)}: {self._with_its_own_version()}"

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
+from schemas.text_file import NotUtf8, read_text
 from services.arm.errors import DescriptionError, suggestion
 
 T = TypeVar("T")
@@ -68,8 +69,8 @@ class Questions:
 def read_answers(file: Path) -> dict[str, str]:
     """Of a file that an import wrote; raises `DescriptionError`."""
     try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        data = tomllib.loads(read_text(file))
+    except (OSError, NotUtf8, tomllib.TOMLDecodeError) as error:
         raise DescriptionError(f"{file}: cannot be read as answers: {error}") from error
     for key, value in data.items():
         if isinstance(value, (dict, list)):

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from schemas.text_file import read_text
 from services.arm.checks.meshes import MeshFacts
 from services.arm.errors import DescriptionError
 from services.arm.model.description import load_arm
@@ -132,7 +133,7 @@ def _run(*words: str) -> None:
 def _write_states(folder: Path) -> dict[str, float]:
     """The SRDF anew with states that are free of contact, and the pairs that are in it; returns `home` [rad] or [m]."""
     arm = load_arm(folder)
-    before = arm.srdf_path.read_text(encoding="utf-8")
+    before = read_text(arm.srdf_path)
     pairs = {(first, second): entry.reason for entry in entries(before) for first, second in [sorted(entry.pair)]}
     states = named_states(arm)
     text = srdf_text(arm.name, arm.joint_names, states)

@@ -17,6 +17,7 @@ import msgspec
 
 from schemas.deployment import Deployment, DeploymentRecord
 from schemas.errors import ConfigurationError
+from schemas.text_file import NotUtf8, read_text
 
 DEFAULT_FILE = "deploy/local.toml"
 MQTT_FILES = ("secure_folder", "password_file", "device_password_file", "ca", "certificate", "key")
@@ -130,10 +131,10 @@ def when_silent(host: str) -> str:
 
 def _read(file: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(read_text(file))
     except FileNotFoundError:
         raise DeploymentError(f"{file}: there is no such file; name another with --config or GEMELO_CONFIG") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, NotUtf8, tomllib.TOMLDecodeError) as error:
         raise DeploymentError(f"{file}: {error}") from error
 
 

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from schemas.system import ParameterValue
+from schemas.text_file import NotUtf8, read_text
 from services.runtime.errors import RequestRefused
 
 FOLDER = "parameters"
@@ -26,10 +27,10 @@ class SavedParameters:
     def read(self) -> dict[str, ParameterValue]:
         """The values by name, none where there is no file; raises `RequestRefused` with the line that is wrong."""
         try:
-            text = self.path.read_text(encoding="utf-8")
+            text = read_text(self.path)
         except FileNotFoundError:
             return {}
-        except (OSError, UnicodeDecodeError) as error:
+        except (OSError, NotUtf8) as error:
             raise RequestRefused(f"{self.path} cannot be read: {error}") from error
         try:
             values = tomllib.loads(text)
@@ -48,8 +49,8 @@ class SavedParameters:
         """`, line 3`: where the file has the parameter; empty where it cannot be said."""
         begin = re.compile(rf"\s*[\"']?{re.escape(name)}[\"']?\s*[=.\]]")
         try:
-            lines = self.path.read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeDecodeError):
+            lines = read_text(self.path).splitlines()
+        except (OSError, NotUtf8):
             return ""
         return next((f", line {number}" for number, each in enumerate(lines, 1) if begin.match(each)), "")
 

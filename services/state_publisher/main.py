@@ -9,6 +9,7 @@ import msgspec
 from schemas.deployment import Deployment
 from schemas.frames import RobotDescription
 from schemas.joints import JointState
+from schemas.text_file import read_text
 from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
 from services.arm.model.description import ArmDescription, load_arm
 from services.runtime.application import service
@@ -29,9 +30,9 @@ def describe(arm: ArmDescription) -> RobotDescription:
     """The robot's own files."""
     return RobotDescription(
         robot=arm.name,
-        urdf=arm.urdf_path.read_text(encoding="utf-8"),
-        srdf=arm.srdf_path.read_text(encoding="utf-8"),
-        robot_toml=arm.robot_path.read_text(encoding="utf-8"),
+        urdf=read_text(arm.urdf_path),
+        srdf=read_text(arm.srdf_path),
+        robot_toml=read_text(arm.robot_path),
     )
 
 

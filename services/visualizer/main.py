@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from schemas.deployment import Deployment
 from schemas.frames import RobotDescription
 from schemas.scene import MeshShape
+from schemas.text_file import read_text
 from schemas.topics import ANY, DESCRIPTION, LOG
 from services.arm.cell.cell_file import deployed_cell
 from services.arm.model.description import load_arm
@@ -69,7 +70,7 @@ def _shared_view(node: Node, deployment: Deployment, parameters: VisualizerParam
     for each in deployments_beside(deployment):
         arm = load_arm(Path(each.robot))
         try:
-            model = parse_urdf(arm.urdf_path.read_text(encoding="utf-8"))
+            model = parse_urdf(read_text(arm.urdf_path))
         except ValueError as error:
             node.log.error(f"{arm.name} is left out of the view of all arms, as it cannot be drawn: {error}")
             continue

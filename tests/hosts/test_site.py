@@ -149,7 +149,7 @@ def test_a_file_of_any_editor_is_read_or_said_to_be_in_another_encoding(tmp_path
     file.write_text(text, encoding="utf-8-sig")
     load_site(file, project_root())
     file.write_text(text, encoding="latin-1")
-    with pytest.raises(SiteError, match="line 1: this is not UTF-8: save the file in that encoding"):
+    with pytest.raises(SiteError, match="line 1: the byte 0xf1 is not UTF-8: save it as UTF-8"):
         load_site(file, project_root())
 
 

@@ -12,6 +12,7 @@ from typing import get_args, get_origin, get_type_hints
 
 import msgspec
 
+from schemas import text_file
 from schemas.robot import RobotFile
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.motors.tick import chosen_tick
@@ -54,10 +55,12 @@ def typed_robot(data: object) -> RobotFile:
 def read_text(path: Path) -> str:
     """The text of a file of the robot's folder; raises `DescriptionError` where there is none."""
     try:
-        return path.read_text(encoding="utf-8")
+        return text_file.read_text(path)
     except FileNotFoundError as error:
         raise DescriptionError(f"{path}: there is no such file") from error
-    except (OSError, UnicodeDecodeError) as error:
+    except text_file.NotUtf8 as error:
+        raise DescriptionError(f"{path}: {error}") from error
+    except OSError as error:
         raise DescriptionError(f"{path}: cannot be read: {error}") from error
 
 
