@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 from gemelo.errors import Error
@@ -26,7 +27,8 @@ def write_whole(path: Path, content: bytes) -> None:
             os.chmod(beside, 0o644)
             os.replace(beside, path)
         except BaseException:
-            Path(beside).unlink(missing_ok=True)
+            with suppress(OSError):
+                Path(beside).unlink()
             raise
     except OSError as error:
         raise Error(f"{path} cannot be written: {error.strerror}") from error

@@ -67,6 +67,7 @@ class NodeInfo(Message, frozen=True, kw_only=True):
     ready: bool = False  # its state is valid
     problem: str = ""  # why it is not, where it says so
     certificate_ends: float | None = None  # [s] UNIX time, of the one that it shows to the router; None: it shows none
+    unwritten: str = ""  # what it cannot write to its disk, and the remedies; it works on without
 
 
 class TopicInterface(Message, frozen=True, kw_only=True):

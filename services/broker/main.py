@@ -21,6 +21,7 @@ from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.priority import step_ahead
 from services.runtime.process.readiness import Readiness
+from services.runtime.process.unwritten import UnwrittenFiles
 
 BEAT = 1.0  # [s] of the readiness file
 RENEWAL = (
@@ -44,8 +45,7 @@ def run(deployment: Deployment, log: logging.Logger) -> int:
     """Serves; the readiness file is beaten once a second for as long as connections are accepted."""
     section = deployment.mqtt
     folder = Path(deployment.paths.run)
-    folder.mkdir(parents=True, exist_ok=True)
-    readiness = Readiness(folder, "broker")
+    readiness = Readiness(folder, "broker", UnwrittenFiles(log.warning))
     if section.broker is Broker.EXTERNAL:
         log.info("the deployment has its broker at %s port %d: this one stands aside", section.host, section.port)
         return stand_aside(readiness)

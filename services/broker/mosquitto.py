@@ -21,6 +21,7 @@ PATIENCE = 1.5  # [s] for the handshake, and again for the answer: with BEAT les
 CONNECT = b"\x10\x0c\x00\x04MQTT\x04\x02\x00\x05\x00\x00"
 CONNACK, DISCONNECT = b"\x20", b"\xe0\x00"
 OPEN = "allow_anonymous true"
+CONFIGURATION = "mosquitto.conf"
 
 
 class NotInstalled(Exception):
@@ -45,8 +46,7 @@ def serve(section: MqttSection, run: Path, beat: Callable[[], None], on_end: Cal
     Does not return in the process that becomes mosquitto.
     """
     program = find()
-    conf = run / "mosquitto.conf"
-    conf.write_text(configuration(section))
+    conf = configuration_file(run, configuration(section))
     alive, held = os.pipe()
     if os.fork() == 0:
         os.close(held)
@@ -57,7 +57,7 @@ def serve(section: MqttSection, run: Path, beat: Callable[[], None], on_end: Cal
     os.set_inheritable(held, True)
     sys.stdout.flush()
     sys.stderr.flush()
-    os.execv(program, [program, "-c", str(conf)])
+    os.execv(program, [program, "-c", conf])
 
 
 def configuration(section: MqttSection) -> str:
@@ -65,6 +65,18 @@ def configuration(section: MqttSection) -> str:
     host, port = section.listening
     door = secure_folder.listener(Path(section.secure_folder)) if section.secure_folder else OPEN
     return secure_folder.mosquitto_conf(host, port, door)
+
+
+def configuration_file(run: Path, text: str) -> str:
+    """The path of a file with it in `run`; where that disk takes none, of one in memory that the program inherits."""
+    try:
+        run.mkdir(parents=True, exist_ok=True)
+        (run / CONFIGURATION).write_text(text)
+    except OSError:
+        held = os.memfd_create(CONFIGURATION, 0)
+        os.write(held, text.encode())
+        return f"/proc/self/fd/{held}"
+    return str(run / CONFIGURATION)
 
 
 def _watch_broker(section: MqttSection, alive: int, beat: Callable[[], None], on_end: Callable[[], None]) -> None:

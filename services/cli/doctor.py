@@ -6,6 +6,7 @@ import os
 import platform
 import shutil
 import socket
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -31,10 +32,12 @@ from services.mqtt.access import gateway_access
 from services.runtime.clock_offset import ClockOffset
 from services.runtime.deployment import load_deployment, project_root, when_silent
 from services.runtime.process.priority import may_step_ahead
+from services.runtime.process.unwritten import remedy_of
 
 BROKER_PAGE = "docs/my_broker.md has every such sentence with what to do"
 # Tuning constants: chosen.
 LEAST_DISK = 1e9  # [bytes] free: an hour of recordings
+FILE = 16_384  # [bytes] of a file that is tried: more than any of a run's has
 LEAST_MEMORY = 5e8  # [bytes] free: what the stack needs itself
 MOST_CPU = 85.0  # [%] of all cores: above it, ticks of a virtual device come late
 CPU_OVER = 1.0  # [s]
@@ -134,11 +137,21 @@ def _folders(deployment: Deployment) -> Iterator[Diagnosis]:
     for name, text in (("recordings", deployment.paths.out), ("run", deployment.paths.run)):
         path = project_root() / text
         there = next(each for each in (path, *path.parents) if each.exists())
-        if not os.access(there, os.W_OK | os.X_OK):
-            remedy = f"sudo chown {os.environ.get('USER', '$USER')} {there}, or set [paths] in the deployment file"
-            yield Diagnosis(Verdict.ERROR, f"folder {name}", f"{path} cannot be written", remedy)
+        if (error := _refusal(there)) is not None:
+            found = f"{path} cannot be written ({error.strerror}): what moves and stops the arm goes on without"
+            yield Diagnosis(Verdict.ERROR, f"folder {name}", found, remedy_of(error))
         elif name == "recordings":
             yield _enough("disk", shutil.disk_usage(there).free, LEAST_DISK, f"free space where {path} is")
+
+
+def _refusal(folder: Path) -> OSError | None:
+    """Why no file of some size can be written in the folder; None where one can. Nothing of it stays."""
+    try:
+        with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
+            file.write(bytes(FILE))
+    except OSError as error:
+        return error
+    return None
 
 
 def _robot(deployment: Deployment) -> Diagnosis:
@@ -206,6 +219,7 @@ def twin(session: CommandSession) -> Iterator[Diagnosis]:
     yield device(statuses[-1] if statuses else None, states[-1] if states else None, up)
     told = _told(session, nodes)
     yield versions({name: info for name, (info, _) in told.items()})
+    yield from unwritten(info for info, _ in told.values())
     yield clocks({name: clock for name, (_, clock) in told.items() if clock is not None})
 
 
@@ -229,6 +243,13 @@ def versions(infos: Mapping[str, NodeInfo]) -> Diagnosis:
         return Diagnosis(Verdict.OK, "versions of the nodes", f"{len(infos)} nodes run {own}, as this command")
     remedy = "put one version on every host (`make setup` there), and start its nodes anew"
     return Diagnosis(Verdict.WARNING, "versions of the nodes", f"{', '.join(others)}; this command is {own}", remedy)
+
+
+def unwritten(infos: Iterable[NodeInfo]) -> Iterator[Diagnosis]:
+    """What a node cannot write to its disk, with the remedies; nothing for one that can."""
+    for info in infos:
+        if info.unwritten:
+            yield Diagnosis(Verdict.WARNING, f"files of {info.node} on {info.host}", info.unwritten)
 
 
 def device(status: DeviceStatus | None, state: DeviceState | None, up: str) -> Diagnosis:

@@ -72,6 +72,15 @@ class MqttClient(paho.Client):
         with self._writing:
             return super().loop_write()
 
+    def loop_start(self) -> MQTTErrorCode:
+        """As paho's; raises OSError, and leaves no connection open, where its thread gets no descriptor to wake it."""
+        try:
+            return super().loop_start()
+        except OSError as error:
+            self.failure = error
+            self._sock_close()
+            raise
+
     def loop_stop(self) -> MQTTErrorCode:
         """As paho's, by `stop_loop`."""
         return stop_loop(self)

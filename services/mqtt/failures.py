@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 import ssl
 
@@ -30,6 +31,8 @@ def failure(error: OSError, access: BrokerAccess) -> str:
             return _tls_failure(error, access)
         case socket.gaierror():
             return f'no machine is called "{access.host}" here: check the name, or give the broker\'s IP address'
+    if error.errno in (errno.EMFILE, errno.ENFILE):
+        return f"no connection to {access}: no descriptor is left for one (`ulimit -n`); it is tried again"
     if access.tls is not None and isinstance(error, (ssl.SSLEOFError, ConnectionResetError, BrokenPipeError)):
         return f"{access} broke off the TLS handshake: is it the port for TLS (mostly 8883)?"
     return f"no MQTT broker answers at {access.host}:{access.port} ({error}): {_is_it_there(access)}"

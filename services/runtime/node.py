@@ -6,7 +6,6 @@ import gc
 import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
-from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeVar
 
@@ -38,6 +37,7 @@ from services.runtime.parameters import ParameterRegistry, ParameterSet
 from services.runtime.process.logs import BusHandler, line_logger
 from services.runtime.process.readiness import Readiness
 from services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
+from services.runtime.process.unwritten import UnwrittenFiles
 from services.runtime.requests import client as requests
 from services.runtime.requests.exchanges import exchange_topic
 from services.runtime.requests.limits import RequestRates
@@ -83,6 +83,7 @@ class Node:
         self._stop = stop or ShutdownRequest()
         self._loop = Loop(self._stop)
         self._worker = Worker()
+        self.unwritten = UnwrittenFiles(self.log.warning)
         self._readiness: Readiness | None = None
         self._problem = ""  # why it is not ready
         self._endpoints = NodeEndpoints()
@@ -232,7 +233,12 @@ class Node:
         """The node's identity, endpoints, readiness, and its clock."""
         about = self._endpoints.info(self._identity, self.robot)
         return msgspec.structs.replace(
-            about, clock=self.now(), ready=self.is_ready, problem=self._problem, certificate_ends=self._certificate.ends
+            about,
+            clock=self.now(),
+            ready=self.is_ready,
+            problem=self._problem,
+            certificate_ends=self._certificate.ends,
+            unwritten=self.unwritten.sentence,
         )
 
     def statistics(self) -> tuple[TopicStatistics, ...]:
@@ -243,7 +249,7 @@ class Node:
         """Says whether this node's state is valid; `reason` is logged when it changes."""
         self._problem = "" if ok else reason
         if self._readiness is None:
-            self._readiness = Readiness(project_root() / Path(self.deployment.paths.run), self.name)
+            self._readiness = Readiness(project_root() / self.deployment.paths.run, self.name, self.unwritten)
         if ok != self._readiness.is_ready:
             self.log.info("%s%s", "ready" if ok else "not ready", f": {reason}" if reason else "")
         if ok:

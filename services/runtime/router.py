@@ -22,6 +22,7 @@ from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.priority import step_ahead
 from services.runtime.process.readiness import Readiness
 from services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
+from services.runtime.process.unwritten import UnwrittenFiles
 
 BEAT = 1.0  # [s]
 _LOCATOR = re.compile(r"(tcp|tls)/(.+):(\d+)")
@@ -52,7 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 locked = " with TLS, for certificates of its authority" if is_locked else ""
                 log.info("listening on %s port %d%s", host, port, locked)
                 certificate = CertificateWatch(shown(config), log.warning)
-                _beat_until(stop, Readiness(Path(deployment.paths.run), "router"), certificate)
+                readiness = Readiness(Path(deployment.paths.run), "router", UnwrittenFiles(log.warning))
+                _beat_until(stop, readiness, certificate)
                 del watch
     except (DeploymentError, PortTaken, zenoh.ZError) as error:
         log.error("%s", error)

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import psutil
 
+from services.runtime.process.readiness import says_ready
 from services.stack.compose import ProcessState
 
 LINES = 8  # of a log that are shown
-STALE = 3.0  # [s] as deploy/probe: a process that is ready touches its file once a second
 
 
 class NotReady(NamedTuple):
@@ -38,14 +38,6 @@ def not_ready(name: str, state: ProcessState | None, run: Path, log: str) -> Not
     return NotReady(name, reason_of(name, state, run), tuple(lines[-LINES:]))
 
 
-def is_fresh(file: Path) -> bool:
-    """True if the file was touched within the last 3 s."""
-    try:
-        return time.time() - file.stat().st_mtime < STALE
-    except FileNotFoundError:
-        return False
-
-
 def reason_of(name: str, state: ProcessState | None, run: Path) -> str:
     """One sentence without its end."""
     if state is None:
@@ -69,7 +61,7 @@ def _said(name: str, run: Path) -> str:
         return (run / f"{name}.problem").read_text(encoding="utf-8", errors="replace").strip()
     except OSError:
         pass
-    if is_fresh(run / f"{name}.ready"):
+    if says_ready(run, name):
         return "it has become ready since"
     if (run / f"{name}.ready").exists():
         return "its loop stands still, it was ready before"

@@ -16,8 +16,9 @@ from types import TracebackType
 
 from services.mqtt import secure_folder
 from services.runtime.deployment import project_root
+from services.runtime.process.readiness import says_ready
 from services.stack.compose import Compose, ComposeError
-from services.stack.not_ready import NotReady, is_fresh, not_ready
+from services.stack.not_ready import NotReady, not_ready
 
 PROCESSES = (
     "router",
@@ -184,8 +185,8 @@ class Stack:
         raise StackError("\n".join([head, *map(str, unready), *silent]), unready)
 
     def is_ready(self, name: str) -> bool:
-        """True if `name` touched the file that deploy/probe looks at within the last 3 s."""
-        return is_fresh(self.run / f"{name}.ready")
+        """As deploy/probe: True if `name` has said so within the last 3 s."""
+        return says_ready(self.run, name)
 
     def why_not_ready(self, names: Sequence[str] | None = None) -> tuple[NotReady, ...]:
         """Of each of `names`, by default of all that are not ready at this moment, the reason and the last lines."""
@@ -215,7 +216,8 @@ class Stack:
             raise StackError(f"{name} does not run")
         os.kill(pid, number)
         if number is signal.SIGKILL:
-            (self.run / f"{name}.ready").unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # on a read-only disk it is old soon
+                (self.run / f"{name}.ready").unlink()
         return pid
 
     def logs(self, name: str) -> str:

@@ -38,7 +38,7 @@ def run(node: Node, deployment: Deployment) -> None:
     arm = load_arm(project_root() / deployment.robot)
     require_motors(arm, deployment.device)
     parameters = node.parameters(GatewayParameters)
-    file = LedgerFile(project_root() / deployment.paths.run, arm.name, node.log.warning)
+    file = LedgerFile(project_root() / deployment.paths.run, arm.name, node.unwritten)
     kept, trouble = read_ledger(file.path)
     if trouble:
         node.log.warning(trouble)

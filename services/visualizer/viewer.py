@@ -22,6 +22,7 @@ from services.runtime.deployment import DeploymentError, exposure, load_deployme
 from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.priority import step_behind
 from services.runtime.process.readiness import Readiness
+from services.runtime.process.unwritten import UnwrittenFiles
 from services.visualizer.program.rerun_program import rerun_binary, start, stop
 from services.visualizer.program.viewer_connection import ViewerConnection
 
@@ -63,8 +64,8 @@ def address(viewer: ViewerSection, mode: ViewerMode) -> str:
 def run(deployment: Deployment, memory: str, stopping: threading.Event) -> int:
     """Keep the viewer and its readiness until asked to stop; returns the exit code."""
     run_folder = project_root() / deployment.paths.run
-    run_folder.mkdir(parents=True, exist_ok=True)
-    readiness = Readiness(run_folder, "viewer")
+    unwritten = UnwrittenFiles(lambda said: print(f"viewer: {said}", flush=True))
+    readiness = Readiness(run_folder, "viewer", unwritten)
     mode = resolved(deployment.viewer.mode, os.environ)
     try:
         if mode is ViewerMode.NONE:

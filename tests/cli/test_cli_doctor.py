@@ -19,6 +19,7 @@ from services.cli.main import run
 from services.mqtt import secure_folder
 from services.runtime.clock_offset import ClockOffset
 from services.runtime.deployment import when_silent
+from tests.disks import WAYS, refusing_disk
 from tests.real_time import may_run_in_real_time
 from tests.stepper_gateway.locked import Mosquitto, external, locked
 
@@ -156,12 +157,31 @@ device = "/dev/nobody"
     assert found["broker" if wire == "mqtt" else "serial port"].verdict is doctor.Verdict.ERROR
 
 
-def test_the_doctor_says_that_a_folder_cannot_be_written(monkeypatch, tmp_path: Path, capsys):
-    monkeypatch.setenv("GEMELO_PATHS_OUT", str(tmp_path))
+REMEDIES = dict(
+    zip(WAYS, ("make room on that disk", "is read-only, as Linux makes one that fails", "[paths]"), strict=True)
+)
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(("variable", "name"), [("GEMELO_PATHS_OUT", "recordings"), ("GEMELO_PATHS_RUN", "run")])
+def test_the_doctor_says_that_a_folder_cannot_be_written(monkeypatch, tmp_path: Path, capsys, way, variable, name):
+    monkeypatch.setenv(variable, str(tmp_path / "here"))
     monkeypatch.setenv("GEMELO_ROUTER_PORT", "1")
-    monkeypatch.setattr("os.access", lambda path, mode: path != tmp_path)
-    assert run(["doctor"]) is ExitCode.FAILED
-    assert "folder recordings: sudo chown" in capsys.readouterr().out
+    with refusing_disk(way, tmp_path / "here") as disk:
+        disk.refuse()
+        assert run(["doctor", "--json"]) is ExitCode.FAILED
+        found = {each["subject"]: each for each in json.loads(capsys.readouterr().out)}[f"folder {name}"]
+        assert (found["verdict"], REMEDIES[way] in found["remedy"]) == ("error", True), found
+        disk.take()
+        run(["doctor", "--json"])
+        assert f"folder {name}" not in {each["subject"] for each in json.loads(capsys.readouterr().out)}
+
+
+def test_the_doctor_says_what_a_node_cannot_write_to_its_disk():
+    well, ill = NodeInfo(node="planner"), NodeInfo(node="logger", host="brain", unwritten="x cannot be written: y")
+    (found,) = doctor.unwritten([well, ill])
+    assert (found.verdict, found.subject) == ("warning", "files of logger on brain")
+    assert found.found == "x cannot be written: y"
 
 
 def test_the_doctor_says_what_is_wrong_with_the_deployment(monkeypatch, tmp_path: Path, capsys):

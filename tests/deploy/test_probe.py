@@ -13,6 +13,7 @@ import pytest
 
 from services.runtime.deployment import project_root
 from services.runtime.process.readiness import Readiness
+from services.runtime.process.unwritten import UnwrittenFiles
 from tests.runtime.support import until
 
 ROOT = project_root()
@@ -63,7 +64,8 @@ BEATS = """
 import sys, time
 from pathlib import Path
 from services.runtime.process.readiness import Readiness
-readiness = Readiness(Path(sys.argv[1]), "gateway")
+from services.runtime.process.unwritten import UnwrittenFiles
+readiness = Readiness(Path(sys.argv[1]), "gateway", UnwrittenFiles(print))
 while True:
     readiness.beat()
     time.sleep(0.1)
@@ -144,5 +146,5 @@ def test_another_process_that_has_the_number_now_is_not_ended(tmp_path, beating)
 
 def test_who_starts_anew_is_not_judged_by_the_beats_of_its_former_self(tmp_path):
     (tmp_path / "planner.alive").write_text("1 1\n")
-    Readiness(tmp_path, "planner")
+    Readiness(tmp_path, "planner", UnwrittenFiles(print))
     assert not (tmp_path / "planner.alive").exists()

@@ -13,6 +13,7 @@ from firmware.platform.host.flash import Flash, NetworkCredentials
 from schemas.device import DeviceCommandKind
 from services.cli.errors import ExitCode
 from services.cli.main import run
+from services.runtime.process.unwritten import UnwrittenFiles
 from services.runtime.signatures import make_key
 
 
@@ -23,7 +24,7 @@ def test_a_board_is_updated_over_mqtt_disarmed_only_and_is_armed_again_after_it(
     make_key(key, key.with_suffix(".pub"))
     file.write_bytes(an_image())
     (tmp_path / "run").mkdir()
-    flash = Flash(tmp_path / "run/virtual_esp32_flash.json", "rm1")
+    flash = Flash(tmp_path / "run/virtual_esp32_flash.json", "rm1", UnwrittenFiles(print))
     flash.keep_credentials(NetworkCredentials(update_key=key.with_suffix(".pub").read_text()))
     bed.start_device()
     monkeypatch.setenv("GEMELO_MQTT_PORT", str(bed.port))

@@ -32,6 +32,7 @@ from services.cli.update_transfer import SerialWire, UpdateStatus, UpdateWire, a
 from services.mqtt.access import BrokerAccess
 from services.runtime.firmware_update import UpdateAck
 from services.runtime.process.readiness import Readiness
+from services.runtime.process.unwritten import UnwrittenFiles
 from services.runtime.serial_frames import packet
 from services.runtime.signatures import make_key
 
@@ -89,11 +90,12 @@ class UpdateBed:
 
     def start(self, with_key: bool = True, is_spoken_to: bool = True) -> None:
         """Switches the board on, with the slots that it has from before, and disarms it if it is spoken to."""
-        board = Board(load_arm(ROOT / "urdf/rm1"), self.folder, NAME)
+        board = Board(load_arm(ROOT / "urdf/rm1"), self.folder, NAME, UnwrittenFiles(print))
         board.provision({"update_key": self.key.with_suffix(".pub").read_text() if with_key else ""})
-        line = SerialLine(self.folder / f"{NAME}.tty", self.inbox)
+        line = SerialLine(self.folder / f"{NAME}.tty", self.inbox, UnwrittenFiles(print))
         network = Network(BrokerAccess("127.0.0.1", free_port()), self.inbox)
-        process = VirtualEsp32(board, Wires(network, line), self.inbox, Readiness(self.folder, NAME))
+        readiness = Readiness(self.folder, NAME, UnwrittenFiles(print))
+        process = VirtualEsp32(board, Wires(network, line), self.inbox, readiness)
         self._thread = threading.Thread(target=process.run)
         self._thread.start()
         self.port = str(line.path)

@@ -64,7 +64,7 @@ class Lab:
         node = self.gateway = self.node("stepper_gateway")
         parameters = node.parameters(GatewayParameters)
         ledger = self._stack.enter_context(
-            closing(LedgerFile(self._folder / f"run{self._gateways}", "rm1", node.log.warning))
+            closing(LedgerFile(self._folder / f"run{self._gateways}", "rm1", node.unwritten))
         )
         core = GatewayCore(self.description, self._gateways, parameters.value)
         self.shell = Shell(node, core, BeganInput(self._gateways, parameters.value), parameters, ledger)

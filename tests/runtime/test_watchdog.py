@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from services.runtime.process.readiness import Readiness, notify
+from services.runtime.process.unwritten import UnwrittenFiles
 from tests.runtime.support import ROOT, free_port
 
 BEAT = 1.0  # [s]
@@ -68,7 +69,7 @@ def require_silence_of_a_frozen(process: subprocess.Popen[bytes], systemd: socke
 
 
 def test_a_process_that_is_not_ready_any_more_still_feeds_the_watchdog(systemd, tmp_path):
-    readiness = Readiness(tmp_path, "gateway")
+    readiness = Readiness(tmp_path, "gateway", UnwrittenFiles(print))
     readiness.beat()
     readiness.ready()
     readiness.not_ready()

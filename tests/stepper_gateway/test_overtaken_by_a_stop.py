@@ -47,7 +47,7 @@ def client(tmp_path: Path) -> Iterator[MemoryBus]:
         node = Node(GATEWAY, deployment, robot="rm1", bus=MemoryBus(network), stop=ShutdownRequest())
         stack.callback(node.close)
         parameters = node.parameters(GatewayParameters)
-        file = stack.enter_context(closing(LedgerFile(tmp_path / "run", "rm1", node.log.warning)))
+        file = stack.enter_context(closing(LedgerFile(tmp_path / "run", "rm1", node.unwritten)))
         core = GatewayCore(load_arm(ROOT / "urdf/rm1"), 1, parameters.value)
         shell = Shell(node, core, BeganInput(1, parameters.value), parameters, file)
         stack.enter_context(spinning(node, shell.step))

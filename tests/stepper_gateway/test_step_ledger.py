@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from schemas.ledger import StepLedger, VerifiedBy
 from schemas.topics import STEP_LEDGER
 from services.arm.model.description import load_arm
 from services.bench.stopping import smooth_move
+from services.runtime.process.unwritten import UnwrittenFiles
 from services.stepper_gateway.ledger.confidence import REBOOT
 from services.stepper_gateway.ledger.ledger_file import LedgerFile, read_ledger, write_ledger
 from services.stepper_gateway.ledger.record import LedgerRecord
@@ -20,6 +22,7 @@ from services.stepper_gateway.ledger.step_ledger import KEEP_EVERY, KEEP_SOON
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.sketch_arm import SketchArm
 from services.virtual_arm.virtual_arm import BOOTED, VirtualArm, rm1
+from tests.runtime.support import until
 from tests.stepper_gateway.harness import ROOT, move
 from tests.stepper_gateway.test_ra_sketch import HOME as AT_HOME
 
@@ -250,7 +253,7 @@ def test_of_a_board_with_another_dialect_nothing_is_sure() -> None:
 
 def test_the_file_is_replaced_as_a_whole_and_read_back(tmp_path: Path, rig: VirtualArm) -> None:
     complaints: list[str] = []
-    file = LedgerFile(tmp_path / "run", "rm1", complaints.append)
+    file = LedgerFile(tmp_path / "run", "rm1", UnwrittenFiles(complaints.append))
     file.keep(rig.core.ledger_record())
     file.close()
     assert read_ledger(file.path) == (rig.core.ledger_record(), "")
@@ -267,10 +270,22 @@ def test_a_file_that_cannot_be_read_or_written_is_said_and_costs_no_more(tmp_pat
     assert "gemelo verify" in trouble
     (tmp_path / "full").write_text("no folder")
     complaints: list[str] = []
-    file = LedgerFile(tmp_path / "full", "rm1", complaints.append)
+    file = LedgerFile(tmp_path / "full", "rm1", UnwrittenFiles(complaints.append))
     file.keep(LedgerRecord())
     file.close()
     assert len(complaints) == 1
-    assert "make room" in complaints[0]
+    assert "no joint counts as verified after a restart" in complaints[0]
     with pytest.raises(OSError, match="full"):
         write_ledger(tmp_path / "full" / "x.json", LedgerRecord())
+
+
+def test_what_the_disk_has_refused_is_written_when_it_takes_it(tmp_path: Path) -> None:
+    complaints: list[str] = []
+    (tmp_path / "run").write_text("no folder")
+    with closing(LedgerFile(tmp_path / "run", "rm1", UnwrittenFiles(complaints.append))) as file:
+        file.keep(LedgerRecord())
+        assert until(lambda: complaints)
+        (tmp_path / "run").unlink()
+        assert until(file.path.exists)
+        assert until(lambda: len(complaints) == 2), complaints
+    assert "can be written again" in complaints[1]

@@ -18,6 +18,7 @@ from schemas.device_config import config_text
 from services.arm.device.device_config import device_config, reference_steps
 from services.arm.model.description import ArmDescription
 from services.arm.model.gripper import gripper_unit
+from services.runtime.process.unwritten import UnwrittenFiles, remedy_of
 
 
 class DeviceClock:
@@ -51,16 +52,17 @@ class Board:
     It leaves the factory with the configuration that robot.toml asks for, and the arm in its reference pose.
     """
 
-    def __init__(self, arm: ArmDescription, folder: Path, name: str) -> None:
+    def __init__(self, arm: ArmDescription, folder: Path, name: str, unwritten: UnwrittenFiles) -> None:
+        """`unwritten` gets what the disk refuses; the board runs on without."""
         self._factory = config_text(device_config(arm))
         self._reference = reference_steps(arm)
         self._gripper = arm.gripper
         self._gripper_unit = gripper_unit(arm)
         self._motors = tuple(joint.drive.motor for joint in arm.joints)
         self.name = arm.device.name
-        self._flash = Flash(folder / f"{name}_flash.json", self.name)
-        self._memory = PositionStore(folder / f"{name}.json", self.name)
-        self.firmware = FirmwareSlots(folder, name, lambda: self.credentials.update_key)
+        self._flash = Flash(folder / f"{name}_flash.json", self.name, unwritten)
+        self._memory = PositionStore(folder / f"{name}.json", self.name, unwritten)
+        self.firmware = FirmwareSlots(folder, name, lambda: self.credentials.update_key, unwritten)
         self._shaft: tuple[int, ...] = ()  # [steps] where the arm truly is; empty: as the memory has it
         self._crc32 = 0  # of the configuration that the flash has
         self.is_on_trial = False  # the firmware that runs, until it has said status to somebody
@@ -92,11 +94,12 @@ class Board:
 
         A firmware on trial is not asked: it may say anything.
         """
+        self.firmware.remember()
         if self.is_on_trial:
             return
-        if device.config_crc32 != self._crc32:
-            self._crc32 = device.config_crc32
-            self._flash.keep_configuration(device.kept_config.decode())
+        crc32 = device.config_crc32
+        if crc32 != self._crc32 and self._flash.keep_configuration(device.kept_config.decode()):
+            self._crc32 = crc32
         if not device.config.joints:
             return
         self._shaft = device.shaft
@@ -111,11 +114,14 @@ class Board:
         )
 
     def provision(self, said: dict[str, str]) -> None:
-        """Keep these fields of the credentials, and the others as they were; they count from the next boot on."""
+        """Keep these fields of the credentials, and the others as they were; they count from the next boot on.
+
+        Raises OSError.
+        """
         self._flash.keep_credentials(msgspec.structs.replace(self._flash.credentials, **said))
 
     def factory_reset(self) -> None:
-        """Forget configuration, credentials and position; the arm stays where it is."""
+        """Forget configuration, credentials and position; the arm stays where it is. Raises OSError."""
         self._flash.forget()
         nowhere = (0,) * len(self._reference)
         self._memory.keep(
@@ -156,13 +162,16 @@ def provision(board: Board, device: CoreDevice, text: bytes) -> str:
     is_reset = asks_for_factory_reset(text)
     if not device.still:
         raise ProvisionRefused("the device moves: stop it first")
-    if is_reset:
-        board.factory_reset()
-        return "factory_reset"
-    said = msgspec.json.decode(text, type=dict[str, str | bool])
-    said.pop("factory_reset", None)
-    board.provision({key: str(value) for key, value in said.items()})
-    return "provisioned"
+    try:
+        if is_reset:
+            board.factory_reset()
+            return "factory_reset"
+        said = msgspec.json.decode(text, type=dict[str, str | bool])
+        said.pop("factory_reset", None)
+        board.provision({key: str(value) for key, value in said.items()})
+        return "provisioned"
+    except OSError as error:
+        raise ProvisionRefused(f"its flash cannot be written ({error.strerror}): {remedy_of(error)}") from error
 
 
 def provision_answer(refusal: str = "") -> bytes:

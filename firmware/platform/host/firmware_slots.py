@@ -10,7 +10,8 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +21,7 @@ import msgspec
 from firmware.bindings.firmware_slot import SlotRefused
 from firmware.bindings.library import LIBRARY, LibraryMissing, load_library
 from services.runtime.firmware_update import HEADER, NoImage, read_header
+from services.runtime.process.unwritten import Attempts, UnwrittenFiles
 from services.runtime.signatures import SignatureError, is_signed
 
 log = logging.getLogger("virtual_esp32")
@@ -55,11 +57,12 @@ class Booted(NamedTuple):
 class FirmwareSlots:
     """The slots of one board; `key` gives the public key (PEM) that was provisioned, empty for none."""
 
-    def __init__(self, folder: Path, name: str, key: Callable[[], str]) -> None:
+    def __init__(self, folder: Path, name: str, key: Callable[[], str], unwritten: UnwrittenFiles) -> None:
         self._folder, self._name, self._key = folder, name, key
         self._images = tuple(folder / f"{name}_ota_{slot}.bin" for slot in (0, 1))
         self._file = folder / f"{name}_ota.json"
-        self._record = _read(self._file)
+        self._record = self._written = _read(self._file)
+        self._attempts = Attempts(f"which firmware starts next, in {self._file},", unwritten)
         self._writing: Path | None = None
         self.is_ready = False  # to restart into a new image
 
@@ -110,22 +113,21 @@ class FirmwareSlots:
         if size > SLOT_SIZE:
             raise SlotRefused(f"it has {size} bytes, the slot {SLOT_SIZE}")
         self._writing = self._images[1 - self._record.slot].with_suffix(".part")
-        self._writing.write_bytes(b"")
+        with _refused():
+            self._writing.write_bytes(b"")
 
     def write(self, data: bytes) -> None:
         """Appends; raises SlotRefused."""
         assert self._writing is not None
-        try:
-            with self._writing.open("ab") as file:
-                file.write(data)
-        except OSError as error:
-            raise SlotRefused(f"the flash memory cannot be written: {error.strerror}") from error
+        with _refused(), self._writing.open("ab") as file:
+            file.write(data)
 
     def finish(self, digest: bytes) -> None:
         """Has it started next; raises SlotRefused."""
         assert self._writing is not None
         part, self._writing = self._writing, None
-        image = part.read_bytes()
+        with _refused():
+            image = part.read_bytes()
         if hashlib.sha256(image).digest() != digest:
             raise SlotRefused("its checksum is not that of what was signed: it was damaged on its way")
         try:
@@ -133,14 +135,16 @@ class FirmwareSlots:
         except NoImage as error:
             raise SlotRefused(f"it is damaged: {error}") from error
         other = 1 - self._record.slot
-        os.replace(part, self._images[other])
-        self._keep(BootRecord(slot=other, state=ImageState.NEW))
+        with _refused():
+            os.replace(part, self._images[other])
+            self._write(BootRecord(slot=other, state=ImageState.NEW))
         self.is_ready = True
 
     def abort(self) -> None:
         """Forgets what was written."""
         if self._writing is not None:
-            self._writing.unlink(missing_ok=True)
+            with suppress(OSError):
+                self._writing.unlink()
         self._writing = None
 
     def _library(self, slot: int) -> Path:
@@ -152,17 +156,38 @@ class FirmwareSlots:
             library = self._folder / f"{self._name}_{hashlib.sha256(code).hexdigest()[:16]}.so"
             for old in self._folder.glob(f"{self._name}_*.so"):
                 if old != library:
-                    old.unlink()
+                    with suppress(OSError):
+                        old.unlink()
             if not library.exists():
                 library.write_bytes(code)
         load_library(library)
         return library
 
+    def remember(self) -> None:
+        """Tries again what the disk has refused."""
+        if self._record != self._written:
+            self._attempts.write(lambda: self._write(self._record))
+
     def _keep(self, record: BootRecord) -> None:
+        """It counts at once, and for the next start as soon as the disk takes it."""
+        self._record = record
+        self.remember()
+
+    def _write(self, record: BootRecord) -> None:
+        """Raises OSError."""
         beside = self._file.with_suffix(".tmp")
         beside.write_bytes(msgspec.json.encode(record) + b"\n")
         os.replace(beside, self._file)
-        self._record = record
+        self._record = self._written = record
+
+
+@contextmanager
+def _refused() -> Iterator[None]:
+    """SlotRefused in place of OSError."""
+    try:
+        yield
+    except OSError as error:
+        raise SlotRefused(f"the flash memory cannot be written: {error.strerror}") from error
 
 
 def _code(image: bytes) -> bytes:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import msgspec
 
+from services.runtime.process.unwritten import Attempts, UnwrittenFiles
+
 
 class NetworkCredentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The credentials of the device's network; a virtual device ignores those of the Wi-Fi."""
@@ -41,9 +43,11 @@ class Content(msgspec.Struct, frozen=True, kw_only=True):
 class Flash:
     """The file of one board; one of another board, or one that cannot be read, counts as new."""
 
-    def __init__(self, path: Path, board: str) -> None:
+    def __init__(self, path: Path, board: str, unwritten: UnwrittenFiles) -> None:
+        """`unwritten` gets what the disk refuses of the configuration."""
         self._path = path
         self._content = _read(path, board)
+        self._attempts = Attempts(f"the configuration of {board} in {path}", unwritten)
 
     @property
     def configuration(self) -> str | None:
@@ -53,16 +57,16 @@ class Flash:
     def credentials(self) -> NetworkCredentials:
         return self._content.credentials
 
-    def keep_configuration(self, text: str) -> None:
-        """Keep the configuration over a restart."""
-        self._write(msgspec.structs.replace(self._content, configuration=text))
+    def keep_configuration(self, text: str) -> bool:
+        """Keep the configuration over a restart; False where the disk refuses it, and it is to be tried again."""
+        return self._attempts.write(lambda: self._write(msgspec.structs.replace(self._content, configuration=text)))
 
     def keep_credentials(self, credentials: NetworkCredentials) -> None:
-        """Keep the credentials over a restart."""
+        """Keep the credentials over a restart; raises OSError."""
         self._write(msgspec.structs.replace(self._content, credentials=credentials))
 
     def forget(self) -> None:
-        """Factory reset: neither configuration nor credentials."""
+        """Factory reset: neither configuration nor credentials; raises OSError."""
         self._write(Content(board=self._content.board, configuration=""))
 
     def _write(self, content: Content) -> None:

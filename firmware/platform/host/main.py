@@ -33,6 +33,7 @@ from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.priority import step_ahead
 from services.runtime.process.readiness import Readiness
 from services.runtime.process.shutdown import ShutdownRequest, end_with_any_thread
+from services.runtime.process.unwritten import UnwrittenFiles
 
 NAME = "virtual_esp32"
 BEAT = 1.0  # [s] between two touches of the readiness file
@@ -57,7 +58,7 @@ def run(deployment: Deployment, has_line: bool = False) -> None:
     """Build the board of the deployment's robot and serve it, also over a serial line if that is asked for."""
     arm = load_arm(project_root() / deployment.robot)
     folder = project_root() / deployment.paths.run
-    folder.mkdir(parents=True, exist_ok=True)
+    unwritten = UnwrittenFiles(log.warning)
     inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
     stop = ShutdownRequest()
     stop.on_set(lambda: inbox.put(ShutdownRequested()))
@@ -65,21 +66,21 @@ def run(deployment: Deployment, has_line: bool = False) -> None:
         signal.signal(number, lambda *_: stop.set())
     end_with_any_thread(log, lambda: stop.is_set)
     if deployment.device is DeviceKind.BOARD:
-        return idle(inbox, Readiness(folder, NAME))
+        return idle(inbox, Readiness(folder, NAME, unwritten))
     step_ahead()  # a board has its processor for itself
     access = device_access(deployment.mqtt, arm.device.name)
     if arm.device.dialect is Dialect.RA:
-        return VirtualSketch(arm, access, inbox, Readiness(folder, NAME)).run()
+        return VirtualSketch(arm, access, inbox, Readiness(folder, NAME, unwritten)).run()
     network = Network(access, inbox)
     is_wired = deployment.wire is Wire.SERIAL or arm.device.dialect is Dialect.TEXT
-    line = _serial_line(folder, inbox) if has_line or is_wired else None
-    board, wires = Board(arm, folder, NAME), Wires(network, line)
+    line = _serial_line(folder, inbox, unwritten) if has_line or is_wired else None
+    board, wires = Board(arm, folder, NAME, unwritten), Wires(network, line)
     record = SlotRecord(os.environ[VARIABLE]) if os.environ.get(VARIABLE) else None
-    VirtualEsp32(board, wires, inbox, Readiness(folder, NAME), record).run()
+    VirtualEsp32(board, wires, inbox, Readiness(folder, NAME, unwritten), record).run()
 
 
-def _serial_line(folder: Path, inbox: queue.SimpleQueue[Item]) -> SerialLine:
-    line = SerialLine(folder / f"{NAME}.tty", inbox)
+def _serial_line(folder: Path, inbox: queue.SimpleQueue[Item], unwritten: UnwrittenFiles) -> SerialLine:
+    line = SerialLine(folder / f"{NAME}.tty", inbox, unwritten)
     log.info("serial line at %s", line.path)
     return line
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import queue
 import ssl
-import tempfile
 import time
-from pathlib import Path
 from urllib.parse import urlsplit
 
 from firmware.bindings.device import CoreDevice
@@ -41,7 +40,10 @@ class Network:
         self.is_connected = False
 
     def join(self, device: CoreDevice, name: str, credentials: NetworkCredentials) -> None:
-        """Connect for as long as it takes, with this device's last will; whatever was connected vanishes."""
+        """Connect for as long as it takes, with this device's last will; whatever was connected vanishes.
+
+        Raises OSError where the process has no descriptor for it.
+        """
         self.break_off()
         self._offline_status = offline_status(name, device.boot_id)
         try:
@@ -127,11 +129,11 @@ def _tls(credentials: NetworkCredentials) -> ssl.SSLContext:
 
 
 def _show_ourselves(context: ssl.SSLContext, credentials: NetworkCredentials) -> None:
-    with tempfile.TemporaryDirectory() as folder:  # ssl reads files only; this folder is for its owner alone
-        certificate, key = Path(folder, "certificate"), Path(folder, "key")
-        certificate.write_text(credentials.mqtt_certificate, encoding="ascii")
-        key.write_text(credentials.mqtt_key, encoding="ascii")
+    # ssl reads files only, with the key and its certificate in one if need be; this one is in memory, and no disk's.
+    with open(os.memfd_create("certificate"), "wb") as file:
+        file.write(f"{credentials.mqtt_key}\n{credentials.mqtt_certificate}\n".encode())
+        file.flush()
         try:
-            context.load_cert_chain(certificate, key, password=lambda: "")
+            context.load_cert_chain(f"/proc/self/fd/{file.fileno()}", password=lambda: "")
         except ssl.SSLError as error:
             raise AddressError(f"the provisioned mqtt_certificate and mqtt_key cannot be used: {error}") from error

@@ -12,6 +12,7 @@ import tty
 from pathlib import Path
 
 from firmware.platform.host.link import Item, SerialBytes
+from services.runtime.process.unwritten import Attempts, UnwrittenFiles
 
 MAX_READ = 4096  # [bytes] read at once
 
@@ -19,15 +20,17 @@ MAX_READ = 4096  # [bytes] read at once
 class SerialLine:
     """The device's end of the line; whoever opens `path` has the other one."""
 
-    def __init__(self, path: Path, inbox: queue.SimpleQueue[Item]) -> None:
+    def __init__(self, path: Path, inbox: queue.SimpleQueue[Item], unwritten: UnwrittenFiles) -> None:
+        """`unwritten` gets that the disk refuses the path, which `beat` tries again."""
         self.path = path
+        self._attempts, self._is_linked = Attempts(f"the serial line's path {path}", unwritten), False
         self._inbox = inbox
         # The other end stays open here too, or reading would fail whenever nobody else has it open.
         self._device_end, self._host_end = os.openpty()
         tty.setraw(self._host_end)
         os.set_blocking(self._device_end, False)
         self._wake, self._asleep = os.pipe()
-        self._link()
+        self.beat()
         self._reader = threading.Thread(target=self._read, name="serial", daemon=True)
 
     def start(self) -> None:
@@ -40,6 +43,10 @@ class SerialLine:
             with contextlib.suppress(BlockingIOError):
                 os.write(self._device_end, data)
 
+    def beat(self) -> None:
+        """Makes the path, where that was not possible before."""
+        self._is_linked = self._is_linked or self._attempts.write(self._link)
+
     def close(self) -> None:
         """Take the path away and end the thread."""
         os.close(self._asleep)
@@ -51,6 +58,7 @@ class SerialLine:
             os.close(descriptor)
 
     def _link(self) -> None:
+        self.path.parent.mkdir(parents=True, exist_ok=True)
         beside = self.path.with_suffix(".new")
         beside.unlink(missing_ok=True)
         beside.symlink_to(os.ttyname(self._host_end))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import struct
+from contextlib import suppress
 
 from firmware.bindings.device import CoreDevice
 
@@ -24,6 +25,7 @@ class SlotRecord:
     def __init__(self, path: str) -> None:
         self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
         self._last: tuple[int, ...] = ()
+        self._waiting = b""  # what the disk has not taken yet
 
     def advance(self, device: CoreDevice, until_us: int) -> None:
         """As the device's own, slot by slot."""
@@ -33,13 +35,18 @@ class SlotRecord:
             if device.now_us % SLOT == 0 and device.steps != self._last:
                 self._last = device.steps
                 rows += row(device.now_us, device.boot_id, self._last)
-        if rows:
-            os.write(self._file, rows)
+        self._append(rows)
 
     def stand_still(self, device: CoreDevice, until_us: int) -> None:
         """As the device's own, with a row that says so."""
-        os.write(self._file, row(device.now_us, STOOD, device.steps))
+        self._append(row(device.now_us, STOOD, device.steps))
         device.stand_still(until_us)
+
+    def _append(self, rows: bytes) -> None:
+        self._waiting += rows
+        with suppress(OSError):
+            while self._waiting:
+                self._waiting = self._waiting[os.write(self._file, self._waiting) :]
 
 
 def row(time_us: int, boot_id: int, steps: tuple[int, ...]) -> bytes:

@@ -26,6 +26,7 @@ from firmware.platform.host.slot_record import SlotRecord
 from firmware.platform.host.wires import Wires, say_event
 from schemas.device import InjectKind, InjectRequest
 from services.runtime.process.readiness import Readiness
+from services.runtime.process.unwritten import remedy_of
 from services.runtime.serial_frames import JsonFrame
 
 log = logging.getLogger("virtual_esp32")
@@ -38,6 +39,7 @@ LONGEST_STOP = 5.0  # [s] when the process is asked to end while the arm moves
 BEAT = 1.0  # [s] of the readiness file
 TRIAL = 30.0  # [s] that a new firmware has to say status to somebody
 REPLY_TIME = 0.1  # [s] that an answer has to leave, before the wire is lost
+REJOIN = 1.0  # [s] between two attempts where the process has no descriptor for it
 LARGEST_DRIFT = 10_000.0  # [ppm]
 LONGEST_OFFLINE = 3600.0  # [s]
 Passing = Callable[[CoreDevice, int], None]  # lets the device's time pass, up to then [us]
@@ -223,7 +225,11 @@ class VirtualEsp32:
         return device
 
     def _join(self) -> None:
-        self._wires.network.join(self._device, self._board.device_name, self._board.credentials)
+        try:
+            self._wires.network.join(self._device, self._board.device_name, self._board.credentials)
+        except OSError as error:
+            log.warning("the network cannot be joined (%s): %s; it is tried again", error, remedy_of(error))
+            self._later.append((time.monotonic() + REJOIN, self._join))
 
     def _announce(self) -> None:
         self._board.remember(self._device)
@@ -256,3 +262,4 @@ class VirtualEsp32:
         else:
             self._readiness.not_ready("no connection to the broker")
         self._readiness.beat()
+        self._wires.beat()

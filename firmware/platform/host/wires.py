@@ -41,6 +41,11 @@ class Wires:
         if self._line is not None:
             self._line.start()
 
+    def beat(self) -> None:
+        """To be called now and then: what could not be made is tried again."""
+        if self._line is not None:
+            self._line.beat()
+
     def close(self) -> None:
         """Say goodbye and end."""
         self.network.leave()

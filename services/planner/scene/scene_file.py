@@ -38,7 +38,10 @@ def load_scene(path: Path) -> PlanningScene | None:
 
 
 def put_aside(path: Path) -> Path:
-    """Renames the file, so that nothing overwrites it; returns where it lies now."""
+    """Renames the file, so that nothing overwrites it; returns where it lies now: where it did if the disk refuses."""
     aside = path.with_name(f"{path.name}.damaged")
-    os.replace(path, aside)
+    try:
+        os.replace(path, aside)
+    except OSError:
+        return path
     return aside

@@ -25,6 +25,7 @@ from services.planner.scene.scene_store import SceneStore, changed, drawn_epoch
 from services.planner.scene.standing import link_poses, standing, version_of
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
+from services.runtime.process.unwritten import RETRY
 from services.runtime.topics import Latest
 
 SETTLING = 0.003  # [m] chosen: by less the jaws settle, and plans stay those of the present scene
@@ -49,6 +50,7 @@ class SceneKeeper:
         self._node, self._arm, self._states, self._on_world = node, arm, states, on_world
         self._kinematics = Kinematics(arm)  # its own: the planner's is in use in another thread
         self._file, self._log = folder / FILE, log
+        self._what, self._is_unsaved = f"the scene in {self._file}, which a restart forgets otherwise,", False
         self._folders = (project_root(), arm.folder)
         self._scene, self._contacts = node.publisher(SCENE), node.publisher(CONTACTS)
         self._store = SceneStore(arm, self._folders, self._restored())
@@ -57,6 +59,7 @@ class SceneKeeper:
         self.world = self._built(self._store.scene)
         self._show()
         node.serve(SCENE_EDIT, self._edit)
+        node.every(RETRY, self._save_again)
         if jaw_objects(arm, 0.0):
             node.subscribe(GRIPPER_STATE, self._on_gripper)
 
@@ -143,14 +146,20 @@ class SceneKeeper:
         return standing(self._arm, self._states.message, self._states.age())
 
     def _save(self, scene: PlanningScene) -> str:
-        """What went wrong; the scene is changed nevertheless."""
+        """What went wrong; the scene is changed nevertheless, and saved as soon as that is possible."""
         try:
             save_scene(self._file, scene)
         except OSError as error:
-            said = f"the scene is changed, but {self._file} cannot be written ({error.strerror}): a restart forgets it"
-            self._node.log.error(said)
-            return said
+            self._is_unsaved = True
+            self._node.unwritten.failed(self._what, error)
+            return f"the scene is changed, but {self._file} cannot be written ({error.strerror}): a restart forgets it"
+        self._is_unsaved = False
+        self._node.unwritten.written(self._what)
         return ""
+
+    def _save_again(self) -> None:
+        if self._is_unsaved:
+            self._save(self._store.scene)
 
     def _restored(self) -> PlanningScene:
         """The scene of the file as far as it can be; what cannot is said, and its file kept."""

@@ -148,15 +148,19 @@ class PlannerProcess:
             else:
                 on_tick()
 
-    def _replace(self) -> int | None:
-        """Another process in place of this one, whose exit code is returned."""
+    def _replace(self) -> str:
+        """Another process in place of this one; returns how that has ended. Where none can be started (no memory, no
+        descriptor), `be_ready` tries again."""
         self._process.kill()
-        code = self._process.wait()
+        ended = f"exit code {self._process.wait()}"
         self.close()
+        self._told, self._is_ready, self._has_toppra = None, False, False
         if not self._is_over:
-            self._process, self._told = self._started(), None
-            self._is_ready = self._has_toppra = False
-        return code
+            try:
+                self._process = self._started()
+            except OSError as error:
+                ended += f", and no other can be started now: {error.strerror}"
+        return ended
 
     def _started(self) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", CHILD, *self._folders]
@@ -175,7 +179,7 @@ class PlannerProcess:
             self._replace()
             raise
         except (OSError, EOFError, ValueError) as error:
-            raise WorkerDied(f"exit code {self._replace()}") from error
+            raise WorkerDied(self._replace()) from error
 
 
 def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:

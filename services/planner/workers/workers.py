@@ -84,7 +84,8 @@ class Workers:
                 self._pending_plans[request_id] = pending_plan
                 self._tasks.put(pending_plan)
                 if len(self._pending_plans) > len(self._processes) < MOST:
-                    self._start_one()
+                    with suppress(OSError):  # no memory, or no descriptor: the plan waits for the process that there is
+                        self._start_one()
         if objection is not None:
             answer(PlanResponse(code=PlanCode.INVALID_GOAL_CONSTRAINTS, refusal=objection))
 

@@ -56,7 +56,11 @@ def limit(link: zenoh.Link) -> int:
 
 def tcp_sockets() -> Iterator[socket.socket]:
     """A copy of every TCP socket of this process, to be closed; Zenoh tells nobody which are its own."""
-    for name in os.listdir(OWN_FILES):
+    try:
+        names = os.listdir(OWN_FILES)
+    except OSError:  # no descriptor left: the link ends by its lease then
+        return
+    for name in names:
         with suppress(OSError):
             if not os.readlink(f"{OWN_FILES}/{name}").startswith("socket:"):
                 continue

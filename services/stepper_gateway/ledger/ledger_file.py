@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
 
+from services.runtime.process.unwritten import RETRY, UnwrittenFiles
 from services.stepper_gateway.ledger.record import LedgerRecord
 
 LAST_WRITE = 2.0  # [s] that the end of the process waits for the disk; chosen: process-compose waits longer
-UNKEPT = "the step ledger cannot be kept ({}): after a restart no joint counts as verified; make room on the disk"
+UNKEPT = "the step ledger, without which no joint counts as verified after a restart,"
 
 
 def read_ledger(path: Path) -> tuple[LedgerRecord | None, str]:
@@ -42,10 +42,10 @@ def write_ledger(path: Path, record: LedgerRecord) -> None:
 class LedgerFile:
     """Writes the newest record that it was given; of two that come while the disk is busy only the second."""
 
-    def __init__(self, run: Path, robot: str, complain: Callable[[str], object]) -> None:
-        """`complain` is called from the thread, once for each reason for which it cannot be written."""
+    def __init__(self, run: Path, robot: str, unwritten: UnwrittenFiles) -> None:
+        """`unwritten` gets what the disk refuses, which is tried again every RETRY until there is a newer record."""
         self.path = run / f"{robot}.ledger.json"
-        self._complain, self._trouble = complain, ""
+        self._unwritten = unwritten
         self._news = threading.Condition()
         self._record: LedgerRecord | None = None
         self._is_open = True
@@ -59,26 +59,31 @@ class LedgerFile:
             self._news.notify()
 
     def close(self) -> None:
-        """Returns when the last record is written, at the latest after LAST_WRITE."""
+        """Returns when the last record is written or refused, at the latest after LAST_WRITE."""
         with self._news:
             self._is_open = False
             self._news.notify()
         self._thread.join(LAST_WRITE)
 
     def _run(self) -> None:
+        refused: LedgerRecord | None = None
         while True:
             with self._news:
-                self._news.wait_for(lambda: self._record is not None or not self._is_open)
-                record, self._record = self._record, None
-            if record is None:
+                self._news.wait_for(
+                    lambda: self._record is not None or not self._is_open, None if refused is None else RETRY
+                )
+                record, self._record = self._record or refused, None
+                is_last = not self._is_open
+            if record is not None:
+                refused = None if self._write(record) else record
+            if is_last:
                 return
-            self._write(record)
 
-    def _write(self, record: LedgerRecord) -> None:
+    def _write(self, record: LedgerRecord) -> bool:
         try:
             write_ledger(self.path, record)
-            self._trouble = ""
         except OSError as error:
-            if str(error) != self._trouble:
-                self._trouble = str(error)
-                self._complain(UNKEPT.format(error))
+            self._unwritten.failed(UNKEPT, error)
+            return False
+        self._unwritten.written(UNKEPT)
+        return True

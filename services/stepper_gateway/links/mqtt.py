@@ -103,11 +103,11 @@ class MqttLink:
         client = self._new_client()
         try:
             client.connect(self._access.host, self._access.port, keepalive=KEEP_ALIVE)
+            client.loop_start()
         except OSError as error:
             self._refusals += needs_a_person(error)
             self._lose(failure(error, self._access))
             return self._after(refusals, False)
-        client.loop_start()
         self._lost.wait()
         was_connected = self._client is not None
         self._client = None

@@ -74,10 +74,10 @@ class RaLink:
         client.on_message = self._on_message
         try:
             client.connect(self._access.host, self._access.port, keepalive=KEEP_ALIVE)
+            client.loop_start()
         except OSError as error:
             self._lose(failure(error, self._access))
             return False
-        client.loop_start()
         self._lost.wait()
         was_connected, self._client = self._client is not None, None
         with contextlib.suppress(OSError, ValueError):
