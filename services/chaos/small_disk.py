@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-SIZE = 1 << 20  # [bytes] chosen: more than the files of a run have, and full at once
+SIZE = 16 << 20  # [bytes] chosen: more than the files of a run have, and full at once
 BALLAST = "ballast"
 
 

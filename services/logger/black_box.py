@@ -113,7 +113,7 @@ class BlackBoxWriter:
         metadata = {**self._metadata, **layout_metadata(layout_of(entries, self._cameras))}
         try:
             path = write_black_box(folder, self._robot, metadata, incident, entries)
-            prune(folder, self._robot, keep)
+            prune(folder, self._robot, keep, (path.stem,))
         except OSError as error:
             self._tell(f"{BLACK_BOX}{incident.sentence}; it cannot be written to {folder}: {error.strerror or error}")
         else:

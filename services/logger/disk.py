@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -17,12 +19,16 @@ from services.logger.recording import Recording
 
 
 class LoggerParameters(msgspec.Struct, frozen=True, kw_only=True):
-    """Folder, size, age and number of the recordings."""
+    """Folder, size, age and number of the recordings, and the room that they leave."""
 
     enable_logging: Annotated[bool, Meta(description="record at all")] = True
     log_dir: Annotated[str, Meta(description="folder of the recordings; empty: <paths.out>/recordings")] = ""
     max_file_mb: Annotated[float, Meta(description="[MB] a larger file is followed by a new one", gt=0)] = 256.0
     max_age_minutes: Annotated[float, Meta(description="[min] an older file is followed by a new one", gt=0)] = 60.0
+    reserve_mb: Annotated[
+        float,
+        Meta(description="[MB] that stay free on their disk, at most a twentieth of it", ge=0),
+    ] = 500.0
     image_rate: Annotated[
         float, Meta(description="images of each camera that are recorded [Hz]; 0: none", ge=0, le=60)
     ] = 2.0
@@ -30,7 +36,12 @@ class LoggerParameters(msgspec.Struct, frozen=True, kw_only=True):
     keep_black_boxes: Annotated[int, Meta(description="how many black boxes are kept; 0: none is saved", ge=0)] = 20
 
 
-RETRY = 2_000_000_000  # [ns] between two attempts on a disk that refuses
+RETRY = 2.0  # [s] between two attempts on a disk that refuses
+SHARE = 20  # of a disk, one of so many parts at most is left free; chosen: a small one is of use too
+
+
+class NoReserve(OSError):
+    """What is free on the disk is for others."""
 
 
 @dataclass
@@ -43,19 +54,28 @@ class RecordingWriter:
     recording: Recording | None = field(default=None, init=False)
     problem: str = field(default="", init=False)  # why nothing can be written at present
     files: list[Path] = field(default_factory=list, init=False)  # begun since the start
-    _retry_at: int = field(default=0, init=False)
+    _retry_at: float = field(default=0.0, init=False)  # [s] monotonic
+    _opened_at: float = field(default=0.0, init=False)  # [s] monotonic, of the present recording
 
-    def write(self, logger: Logger, batch: Batch, folder: Path, parameters: LoggerParameters, now: int) -> None:
-        """Write `batch`, or give it back to the logger where the disk refuses; `now` in ns UNIX."""
-        if now < self._retry_at:
+    def write(
+        self, logger: Logger, batch: Batch, folder: Path, parameters: LoggerParameters, now: int, monotonic: float
+    ) -> None:
+        """Write `batch`, or give it back to the logger where the disk refuses.
+
+        `now` in ns UNIX names files; ages and pauses are of `monotonic` [s], as a clock may be set back.
+        """
+        if monotonic < self._retry_at:
             logger.give_back(batch)
             return
         try:
-            recording = self._open_recording(logger, batch, folder, parameters, now)
+            recording = self._open_recording(logger, batch, folder, parameters, now, monotonic)
+            require_reserve(folder, parameters.reserve_mb)
             self._write(recording, batch)
         except OSError as error:
             logger.give_back(batch)
-            self._give_up(error, folder, now)
+            if isinstance(error, NoReserve):
+                self.close()  # for which there is room
+            self._give_up(error, folder, monotonic)
         else:
             self._recovered(recording)
 
@@ -69,20 +89,24 @@ class RecordingWriter:
                 self.warn(f"{recording.path} could not be finished ({error}); a streaming reader still reads it")
 
     def _open_recording(
-        self, logger: Logger, batch: Batch, folder: Path, parameters: LoggerParameters, now: int
+        self, logger: Logger, batch: Batch, folder: Path, parameters: LoggerParameters, now: int, monotonic: float
     ) -> Recording:
-        if self.recording is not None and self._is_over(self.recording, folder, parameters, now):
+        if self.recording is not None and self._is_over(self.recording, folder, parameters, monotonic):
             self.close()
         if self.recording is None:
             folder.mkdir(parents=True, exist_ok=True)
-            self.recording = Recording(folder, stem_of(self.robot, now), now, self.metadata)
+            stem = stem_of(self.robot, now)
+            prune(
+                folder, self.robot, parameters.keep_files, (*(path.stem for path in self.files), stem)
+            )  # which makes room, perhaps
+            require_reserve(folder, parameters.reserve_mb)
+            self.recording, self._opened_at = Recording(folder, stem, self.metadata), monotonic
             self.recording.write(logger.first_entries(batch, now))
             self.files.append(self.recording.path)
-            prune(folder, self.robot, parameters.keep_files)
         return self.recording
 
-    def _is_over(self, recording: Recording, folder: Path, parameters: LoggerParameters, now: int) -> bool:
-        age = (now - recording.started) / 1e9
+    def _is_over(self, recording: Recording, folder: Path, parameters: LoggerParameters, monotonic: float) -> bool:
+        age = monotonic - self._opened_at
         moved = recording.path.parent != folder or not recording.path.exists()
         return moved or is_due(recording.size, age, parameters.max_file_mb, parameters.max_age_minutes)
 
@@ -93,12 +117,12 @@ class RecordingWriter:
         if batch.lines:
             recording.write_lines(batch.lines)
 
-    def _give_up(self, error: OSError, folder: Path, now: int) -> None:
+    def _give_up(self, error: OSError, folder: Path, monotonic: float) -> None:
         if self.recording is not None:
             self.recording.abandon()
             self._forget_if_empty(self.recording)
             self.recording = None
-        self._retry_at = now + RETRY
+        self._retry_at = monotonic + RETRY
         problem = f"cannot write to {folder}: {error.strerror or error}"
         if problem != self.problem:
             remedy = "free space or set the parameter `log_dir`; tried again every 2 s, messages wait in memory"
@@ -115,4 +139,13 @@ class RecordingWriter:
         if self.problem:
             self.warn(f"writing again, to {recording.path}")
         self.problem = ""
-        self._retry_at = 0
+        self._retry_at = 0.0
+
+
+def require_reserve(folder: Path, reserve_mb: float) -> None:
+    """Raises NoReserve where less than the reserve is free: ledger, positions and logs mostly lie on the same disk."""
+    disk = os.statvfs(folder)
+    reserve = min(reserve_mb * 1e6, disk.f_blocks * disk.f_frsize / SHARE)
+    if disk.f_bavail * disk.f_frsize < reserve:
+        reason = f"less than {reserve / 1e6:.3g} MB are free, which recordings leave (parameter `reserve_mb`)"
+        raise NoReserve(errno.ENOSPC, reason)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -21,18 +22,22 @@ def is_due(size: int, age: float, max_file_mb: float, max_age_minutes: float) ->
     return size >= max_file_mb * 1e6 or age >= max_age_minutes * 60.0
 
 
-def surplus(names: list[str], robot: str, keep: int) -> list[str]:
-    """The files of all but the newest `keep` recordings of this robot; none where `keep` is 0."""
+def surplus(names: list[str], robot: str, keep: int, ours: Sequence[str] = ()) -> list[str]:
+    """The files of all but the newest `keep` recordings of this robot; none where `keep` is 0.
+
+    `ours` are the stems of those that the process has begun, which are the newest in this order, whatever their names
+    say: a clock may have been set back.
+    """
     matches = [re.fullmatch(_NAME % re.escape(robot), name) for name in sorted(names)]
-    stems = sorted({match[1] for match in matches if match})
+    stems = [*sorted({match[1] for match in matches if match} - set(ours)), *ours]
     old = set(stems[:-keep]) if keep else set()
     return [match[0] for match in matches if match and match[1] in old]
 
 
-def prune(folder: Path, robot: str, keep: int) -> list[str]:
-    """Delete the surplus in `folder`; returns what was deleted. What cannot be deleted stays."""
+def prune(folder: Path, robot: str, keep: int, ours: Sequence[str] = ()) -> list[str]:
+    """Delete the surplus in `folder`, as `surplus` has it; returns what was deleted. What cannot be deleted stays."""
     deleted = []
-    for name in surplus([path.name for path in folder.iterdir()], robot, keep):
+    for name in surplus([path.name for path in folder.iterdir()], robot, keep, ours):
         try:
             (folder / name).unlink()
         except OSError:

@@ -47,7 +47,7 @@ def run(node: Node, deployment: Deployment) -> None:
         nonlocal said
         present = parameters.value
         if present.enable_logging:
-            disk.write(logger, batch, _folder(deployment, present), present, now)
+            disk.write(logger, batch, _folder(deployment, present), present, now, node.monotonic())
         else:
             disk.close()
         if logger.losses.sentence != said:

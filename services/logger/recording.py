@@ -20,11 +20,10 @@ from services.recordings.table import recorded_topics
 class Recording:
     """The open files; every method raises OSError when the disk refuses, and the recording is then spent."""
 
-    def __init__(self, folder: Path, stem: str, started: int, metadata: dict[str, dict[str, str]]) -> None:
+    def __init__(self, folder: Path, stem: str, metadata: dict[str, dict[str, str]]) -> None:
         """`metadata` by the name of its record."""
         self.path = folder / (stem + MCAP)
         self.csv_path = folder / (stem + CSV)
-        self.started = started  # [ns] UNIX time
         self._tables: dict[tuple[str, ...], IO[str]] = {}
         self._mcap = McapFile(self.path, metadata, recorded_topics())
 

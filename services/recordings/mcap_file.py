@@ -50,12 +50,22 @@ class McapFile:
         self._twin = foxglove.FoxgloveTwin()
         self._file: IO[bytes] = path.open("xb")
         self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=compression)
+        try:
+            self._derived = self._begin(metadata, topics)
+        except OSError:
+            self.abandon()
+            with suppress(OSError):
+                path.unlink()
+            raise
+
+    def _begin(self, metadata: dict[str, dict[str, str]], topics: Iterable[Topic[Any]]) -> dict[str, int]:
+        """The channels of what Foxglove shows, by key."""
         self._writer.start(profile=PROFILE)
         for name, values in metadata.items():
             self._writer.add_metadata(name, values)
         for topic in topics:
             self._channel(topic)
-        self._derived = {channel.key: self._register(channel) for channel in foxglove.channels()}
+        return {channel.key: self._register(channel) for channel in foxglove.channels()}
 
     @property
     def size(self) -> int:

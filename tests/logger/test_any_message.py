@@ -54,7 +54,7 @@ def messages(kind):
 @pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.key)
 def test_the_logger_records_any_message_of_a_topic(topic, tmp_path_factory):
     folder = tmp_path_factory.mktemp("log")
-    logger, recording = Logger(), Recording(folder, "any", START, {})
+    logger, recording = Logger(), Recording(folder, "any", {})
 
     @settings(max_examples=25, suppress_health_check=list(HealthCheck))
     @given(messages(topic.message))

@@ -1,5 +1,6 @@
 """Rotation by size and age, and a disk that refuses: nothing dies, everything waits, losses are counted."""
 
+import os
 import resource
 import signal
 
@@ -10,9 +11,11 @@ from schemas.frames import RobotDescription
 from schemas.joints import JointState
 from schemas.system import LogRecord
 from schemas.topics import COMMAND_ACKS, COMMANDS, DESCRIPTION, JOINT_STATES, LOG
+from services.chaos.small_disk import BALLAST, SIZE
 from services.logger.core import Logger
-from services.logger.disk import RETRY, LoggerParameters, RecordingWriter
+from services.logger.disk import RETRY, SHARE, LoggerParameters, RecordingWriter
 from services.logger.files import is_due, stem_of, surplus
+from tests.disks import refusing_disk
 
 START = 1_795_000_000_000_000_000
 SECOND = 1_000_000_000
@@ -31,8 +34,10 @@ class Rig:
             state = JointState(stamp=now + index, name=("j" * size,), position=(0.5,))
             self.logger.on_message(JOINT_STATES, state, now + index)
 
-    def write(self, now):
-        self.disk.write(self.logger, self.logger.step(now), self.folder, self.parameters, now)
+    def write(self, now, monotonic=None):
+        """`monotonic` [s] is that of `now` where no clock was set."""
+        monotonic = now / 1e9 if monotonic is None else monotonic
+        self.disk.write(self.logger, self.logger.step(now), self.folder, self.parameters, now, monotonic)
 
     def topics(self, path):
         with path.open("rb") as file:
@@ -65,6 +70,9 @@ def test_only_the_oldest_recordings_of_this_robot_are_surplus():
              (".mcap", ".csv")] + ["notes.txt"]  # fmt: skip
     assert surplus(names, "rm1", 2) == ["20261121T000000.000Z_rm1.csv", "20261121T000000.000Z_rm1.mcap"]
     assert surplus(names, "rm1", 0) == []
+    assert surplus(names, "rm1", 1, ("20261121T000000.000Z_rm1",)) == [
+        f"2026112{day}T000000.000Z_rm1{kind}" for day in (2, 3) for kind in (".csv", ".mcap")
+    ]
 
 
 def test_age_rotates_both_files_and_each_begins_with_the_latched_messages(rig, chunk, ack):
@@ -97,12 +105,12 @@ def test_an_unwritable_folder_is_said_once_and_nothing_is_lost(rig):
     rig.write(START)
     rig.put(10, START + SECOND)
     rig.write(START + SECOND)
-    rig.write(START + RETRY)
+    rig.write(START + SECOND)
     assert len(rig.warnings) == 1
     assert "log_dir" in rig.warnings[0]
     assert rig.disk.problem
     rig.folder.unlink()
-    rig.write(START + 2 * RETRY)
+    rig.write(START + round(2 * RETRY * SECOND))
     rig.disk.close()
     assert rig.topics(rig.recordings()[0]) == ["joint_states"] * 20
     assert not rig.disk.problem
@@ -137,6 +145,47 @@ def test_a_full_disk_loses_nothing_and_leaves_no_empty_files(rig, full_disk):
     _, second = rig.recordings()
     assert len(rig.topics(second)) == 80
     assert len(rig.warnings) == 2, rig.warnings
+
+
+def test_a_clock_that_is_set_back_by_an_hour_stops_no_recording(rig, full_disk):
+    rig.parameters = LoggerParameters(max_age_minutes=1.0, keep_files=3)
+    for minute in range(4):
+        rig.put(10, START + minute * 60 * SECOND)
+        rig.write(START + minute * 60 * SECOND, 60.0 * minute)
+    back = START - 3600 * SECOND
+    full_disk(True)
+    rig.put(10, back)
+    rig.write(back, 240.0)
+    full_disk(False)
+    rig.write(back + 2 * SECOND, 240.0 + RETRY)
+    (now,) = [path for path in rig.recordings() if path.stem == stem_of("rm1", back + 2 * SECOND)]
+    assert len(rig.recordings()) == 3
+    rig.put(10, back + 63 * SECOND)
+    rig.write(back + 63 * SECOND, 303.0)
+    rig.disk.close()
+    assert rig.topics(now) == ["joint_states"] * 10
+    assert rig.topics(rig.folder / f"{stem_of('rm1', back + 63 * SECOND)}.mcap") == ["joint_states"] * 10
+
+
+def test_recordings_leave_room_on_their_disk_and_go_on_when_there_is_more(tmp_path):
+    with refusing_disk("full", tmp_path / "log") as small:
+        rig = Rig(small.folder)
+        rig.put(10, START)
+        rig.write(START)
+        assert rig.disk.problem == ""
+        small.refuse()
+        with (small.folder / BALLAST).open("r+b") as ballast:
+            ballast.truncate(ballast.seek(0, os.SEEK_END) - SIZE // SHARE // 2)  # half of the reserve is free
+        rig.put(10, START + SECOND)
+        rig.write(START + SECOND)
+        assert "reserve_mb" in rig.disk.problem
+        assert (small.folder / "the_rest").write_bytes(bytes(16 * 1024)) == 16 * 1024
+        small.take()
+        rig.write(START + 4 * SECOND)
+        rig.disk.close()
+        assert rig.disk.problem == ""
+        assert [each for path in rig.recordings() for each in rig.topics(path)] == ["joint_states"] * 20
+        assert rig.logger.losses.sentence == ""
 
 
 def test_a_folder_that_is_deleted_is_made_again(rig):

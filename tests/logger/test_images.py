@@ -56,7 +56,7 @@ def test_a_recording_has_them_under_foxgloves_names_and_fields(tmp_path: Path) -
         parent_from_camera=Transform(translation=(0.3, 0.0, 0.5), rotation=(1.0, 0.0, 0.0, 0.0)),
     )  # fmt: skip
     said = [*recorder.on_info(info, START), *recorder.on_image(image(0.5), 2.0)]
-    recording = Recording(tmp_path, "images", START, {})
+    recording = Recording(tmp_path, "images", {})
     recording.write([Entry(topic, message, START) for topic, message in said])
     recording.close()
     with recording.path.open("rb") as file:

@@ -33,7 +33,7 @@ def joint_state(index):
 
 @pytest.fixture
 def recording(tmp_path):
-    recording = Recording(tmp_path, "test", START, {"gemelo": {"robot": "rm1"}})
+    recording = Recording(tmp_path, "test", {"gemelo": {"robot": "rm1"}})
     yield recording
     recording.abandon()
 
@@ -108,7 +108,7 @@ from schemas.topics import JOINT_STATES
 from services.logger.command_log import CommandRow
 from services.logger.recording import Recording
 from services.recordings.channels import Entry
-recording = Recording(Path(sys.argv[1]), "killed", 1, {})
+recording = Recording(Path(sys.argv[1]), "killed", {})
 count = 0
 while True:
     batch = [Entry(JOINT_STATES, JointState(stamp=count + k + 1, name=("a",)), count + k + 1) for k in range(100)]
