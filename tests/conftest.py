@@ -10,12 +10,18 @@ import gc
 import os
 import signal
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 
-from services.arm.model.description import ArmDescription, load_arm
+from services.runtime.process.arithmetic import use_one_kernel
+
+if TYPE_CHECKING:
+    from services.arm.model.description import ArmDescription
+
+use_one_kernel()  # as the planner's process does: what it computes is compared with recordings of other machines
 
 pytest_plugins = ["tests.cost", "pytester"]
 
@@ -51,6 +57,8 @@ def rm1_folder() -> Path:
 
 @pytest.fixture(scope="session")
 def rm1(rm1_folder: Path) -> ArmDescription:
+    from services.arm.model.description import load_arm  # imports numpy, which has chosen its kernel then
+
     return load_arm(rm1_folder)
 
 
