@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from services.arm.checks.check import check
@@ -76,7 +77,7 @@ def import_robot(options: ImportOptions) -> Path:
 def _mended(options: ImportOptions, questions: Questions) -> Mended:
     """The source, mended and with limits; nothing is asked where it has errors."""
     with step("reading the source and its meshes"):
-        source = find_source(options.source, questions.given_below(XACRO))
+        source = find_source(options.source, questions.given_below(XACRO), partial(_ask_before_expanding, questions))
         trial = mend(source)
         ask_limits(trial, Questions({}, takes_defaults=True))
         _require_importable([*shapeless(trial), *trial.findings()])
@@ -84,6 +85,13 @@ def _mended(options: ImportOptions, questions: Questions) -> Mended:
     ask_limits(mended, questions)
     _show(mended.findings())
     return mended
+
+
+def _ask_before_expanding(questions: Questions, xacro: Path) -> None:
+    """Raises `DescriptionError` where the person does not want a xacro file to be expanded."""
+    question = f"{xacro.name} is a xacro file, which is a program: expand it, in a sandbox?"
+    if not questions.ask_somebody("expand_xacro", question, "yes", yes_or_no):
+        raise DescriptionError(f"{xacro}: it was not expanded, and nothing was imported")
 
 
 def _described(name: str, mended: Mended, options: ImportOptions, questions: Questions) -> Description:

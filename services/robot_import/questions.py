@@ -42,6 +42,10 @@ class Questions:
             except DescriptionError as error:
                 print(f"  {error}")
 
+    def ask_somebody(self, key: str, question: str, default: str, parse: Callable[[str], T]) -> T:
+        """As `ask`; the default where it was not given and nobody is there to be asked."""
+        return self.ask(key, question, default, parse) if key in self._given or sys.stdin.isatty() else parse(default)
+
     def given_below(self, prefix: str) -> dict[str, str]:
         """The given answers whose keys begin with `prefix`, by what follows it; they count as asked for."""
         below = {key: value for key, value in self._given.items() if key.startswith(prefix)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
@@ -67,13 +67,24 @@ class RobotSource:
             yield from (folder / reference for folder in above)
 
 
-def find_source(given: Path, arguments: Mapping[str, str] | None = None) -> RobotSource:
-    """The source at a URDF, a xacro file with `arguments`, or an export's folder; raises `DescriptionError`."""
-    if given.is_file():
-        return _source(given, _root_of(given), arguments or {})
-    if not given.is_dir():
+def find_source(
+    given: Path, arguments: Mapping[str, str] | None = None, ask: Callable[[Path], None] = lambda urdf: None
+) -> RobotSource:
+    """The source at a URDF, a xacro file with `arguments`, or an export's folder; raises `DescriptionError`.
+
+    `ask` is called before a xacro file is expanded, and raises it where that is not wanted.
+    """
+    if not given.exists():
         raise DescriptionError(f"{given}: there is no such file or folder")
-    return _source(_urdf_in(given), given, arguments or {})
+    urdf, root = (_urdf_in(given), given) if given.is_dir() else (given, _root_of(given))
+    text = _decoded(urdf)
+    if urdf.suffix.lower() == SUFFIX or "<xacro:" in text:
+        ask(urdf)
+        expansion = expanded(urdf, root, arguments or {}, lambda package: _found_package(package, urdf))
+        return RobotSource(urdf, root, expansion, is_expanded=True)
+    if arguments:
+        raise DescriptionError(f"{urdf}: it is no xacro file, and has no argument {', '.join(arguments)}")
+    return RobotSource(urdf, root, text)
 
 
 def _root_of(urdf: Path) -> Path:
@@ -102,16 +113,6 @@ def _is_robot(path: Path) -> bool:
     """True if it is a robot's own file, and not one with macros for others."""
     text = path.read_text(encoding="utf-8", errors="replace")
     return re.search(r"<robot\b[^>]*\bname\s*=", text) is not None and ("<link" in text or "<xacro:" in text)
-
-
-def _source(urdf: Path, root: Path, arguments: Mapping[str, str]) -> RobotSource:
-    text = _decoded(urdf)
-    if urdf.suffix.lower() == SUFFIX or "<xacro:" in text:
-        expansion = expanded(urdf, arguments, lambda package: _found_package(package, urdf))
-        return RobotSource(urdf, root, expansion, is_expanded=True)
-    if arguments:
-        raise DescriptionError(f"{urdf}: it is no xacro file, and has no argument {', '.join(arguments)}")
-    return RobotSource(urdf, root, text)
 
 
 def _decoded(urdf: Path) -> str:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 
 from services.arm.errors import DescriptionError, suggestion
+from services.robot_import.xacro_sandbox.keeper import Confined, Failed, expand
 
 SUFFIX = ".xacro"
 NO_XACRO = (
@@ -16,63 +18,32 @@ NO_XACRO = (
 UNDEFINED = re.compile(r"Undefined substitution argument (\S+)")
 
 
-class _Arguments(dict[str, str]):
-    """Values by name; remembers each name that the file declares or uses."""
-
-    def __init__(self, given: Mapping[str, str]) -> None:
-        super().__init__(given)
-        self.known: set[str] = set()
-
-    def __contains__(self, name: object) -> bool:
-        self.known.add(str(name))
-        return super().__contains__(name)
-
-    def __getitem__(self, name: str) -> str:
-        self.known.add(name)
-        return super().__getitem__(name)
-
-
-def expanded(path: Path, arguments: Mapping[str, str], find: Callable[[str], Path]) -> str:
-    """The URDF's text, in the lines that `xacro` prints; `find` gives a package's folder or raises `DescriptionError`,
-    as this does for a file that is refused, for an argument that it does not have, and without the package `xacro`.
+def expanded(path: Path, root: Path, arguments: Mapping[str, str], find: Callable[[str], Path]) -> str:
+    """The URDF's text, in the lines that `xacro` prints; it is given files of the folder `root`, and of the packages
+    for which `find` gives a folder or raises `DescriptionError`, as this does for a file that is refused, for an
+    argument that it does not have, and without the package `xacro`.
     """
+    if find_spec("xacro") is None:
+        raise DescriptionError(f"{path}: {NO_XACRO}")
     try:
-        import xacro  # slow to load, for xacro files alone
-        from xacro import substitution_args
-    except ImportError:
-        raise DescriptionError(f"{path}: {NO_XACRO}") from None
-    installed, given = substitution_args._eval_find, _Arguments(arguments)
-    refused: list[DescriptionError] = []  # xacro wraps what is raised in it, and says it twice
-
-    def found(package: str) -> str:
-        try:
-            return str(find(package))
-        except DescriptionError as error:
-            refused.append(error)
-            raise
-
-    substitution_args._eval_find = found  # else it asks ROS where it is
-    try:
-        text = str(xacro.process_file(str(path), mappings=given).toprettyxml(indent="  "))
-    except DescriptionError:
-        raise
-    except Exception as error:  # xacro's own, and those of Python expressions in it
-        if refused:
-            raise refused[0] from error
-        raise DescriptionError(f"{path}: {_said(error)}") from error
-    finally:
-        substitution_args._eval_find = installed
+        expansion = expand(path, arguments, Confined(path, root, find))
+    except Failed as failed:
+        raise DescriptionError(f"{path}: {_said(failed)}") from failed
+    for note in expansion.notes:
+        print(f"  {path.name} says: {note}")
     for name in arguments:
-        if name not in given.known:
-            raise DescriptionError(f'{path}: it has no xacro argument "{name}"{suggestion(name, given.known)}')
-    return text
+        if name not in expansion.known:
+            raise DescriptionError(f'{path}: it has no xacro argument "{name}"{suggestion(name, expansion.known)}')
+    return expansion.text
 
 
-def _said(error: Exception) -> str:
-    undefined = UNDEFINED.search(str(error))
+def _said(failed: Failed) -> str:
+    undefined = UNDEFINED.search(failed.text)
     if undefined:
         return f"its xacro argument {undefined[1]} has no default: give `gemelo import` --xacro {undefined[1]}:=VALUE"
-    return f"xacro cannot expand it: {type(error).__name__}: {error}"
+    if failed.kind == "RecursionError":
+        return "its macros or values are nested too deep for xacro: one of them holds itself"
+    return f"xacro cannot expand it: {failed}"
 
 
 def outermost(files: Iterable[Path]) -> list[Path]:
