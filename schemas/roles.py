@@ -126,7 +126,8 @@ ROLES: tuple[Role, ...] = (
     ),
 )  # fmt: skip
 
-SERVICES = tuple(sorted({role.node for role in ROLES if role.node}))  # names that only their role may bear
+ROLE_OF_NODE = {role.node: role.name for role in ROLES if role.node}  # names that only their role may bear
+SERVICES = tuple(sorted(ROLE_OF_NODE))
 
 
 def role(name: str) -> Role:

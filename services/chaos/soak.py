@@ -22,12 +22,12 @@ import psutil
 
 import gemelo
 from schemas.deployment import DeviceKind
-from schemas.system import Parameter, SetParameter
-from schemas.topics import Request
+from schemas.system import SetParameter
 from services.chaos.options import add_soak_options
 from services.chaos.person import Person
 from services.chaos.site import ChaosSite, installed_broker
 from services.runtime.deployment import load_deployment
+from services.runtime.endpoints import parameter_request
 from services.runtime.errors import NoAnswer
 from services.runtime.process.ending import ended_by_signals
 from services.stack.results import new_results
@@ -123,7 +123,7 @@ def run(seconds: float, seed: int, broker: str, out: Path) -> bool:
 def change_files_often(arm: gemelo.Arm, seconds: float) -> None:
     """A soak of `seconds` [s] sees several files of a recording: the index of an open one is kept until it ends, some
     13 MB an hour, which is no growth."""
-    request = Request("@node/logger/parameters/set", SetParameter, Parameter, "logger", "")
+    request = parameter_request("logger")
     arm.node.call(request, SetParameter(name="max_age_minutes", value=seconds / 60.0 / FILES), timeout=TO_SET)
 
 

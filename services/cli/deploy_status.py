@@ -10,16 +10,18 @@ import msgspec
 import gemelo
 from schemas.deployment import Deployment
 from schemas.errors import ConfigurationError
+from schemas.roles import ROLE_OF_NODE
 from schemas.site import Site
 from schemas.topics import DEVICE_STATUS
 from services.cli.deploy import made_here, said_folder, site_named, site_option
 from services.cli.errors import CommandError, ExitCode, usage
+from services.cli.node import is_command
 from services.cli.parser import Options, Parser, json_option
 from services.cli.session import own_name, require_router
 from services.cli.text_table import table
 from services.credentials.expiry import expiry
 from services.hosts.certificates import Certificate, days_by_host, endings, in_days, older, renewal, shown_at
-from services.hosts.layout import BROKER, ROLE_OF, ROUTER
+from services.hosts.layout import BROKER, ROUTER
 from services.hosts.status import SeenNode, SeenRobot, ServiceState, ServiceStatus, is_well, site_status
 from services.runtime.clock_offset import ClockOffset
 from services.runtime.deployment import load_deployment
@@ -86,7 +88,7 @@ def certificates_told(site: Site, found: Iterable[ServiceStatus], deployment: De
         return
     rows = [each for each in found if each.host]
     running = dict.fromkeys(
-        Certificate(each.host, ROLE_OF.get(each.service, each.service), each.certificate_ends)
+        Certificate(each.host, ROLE_OF_NODE.get(each.service, each.service), each.certificate_ends)
         for each in rows if each.certificate_ends is not None
     )  # fmt: skip
     own = Path(deployment.router.certificate)
@@ -119,7 +121,7 @@ def seen_robot(deployment: Deployment, robot: str) -> SeenRobot:
 def seen_nodes(node: Node) -> dict[str, SeenNode]:
     """Every living node but commands', each asked about itself and its clock."""
     found = {}
-    for name in sorted(each for each in node.alive() if not each.startswith("cli-")):
+    for name in sorted(each for each in node.alive() if not is_command(each)):
         try:
             found[name] = SeenNode(*ask_about(node, name, TO_ANSWER))
         except (NoAnswer, RequestRefused):

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import msgspec
 
 from schemas.system import Empty, NodeInfo
-from schemas.topics import Request
 from services.cli.errors import CommandError, ExitCode, unknown
 from services.cli.forms import print_value
 from services.cli.messages import dump
@@ -47,8 +46,10 @@ def run_info(options: Options) -> ExitCode:
 
 def information_of(session: CommandSession, name: str) -> NodeInfo:
     """The keys that a node publishes, subscribes to and serves; raises `CommandError` if no such node is alive."""
+    from services.runtime.endpoints import info_request  # slow to load: all that a node has on the bus
+
     require_alive(session, name)
-    return session.node.call(Request(f"@node/{name}/info", Empty, NodeInfo, name, ""), Empty(), timeout=TIMEOUT)
+    return session.node.call(info_request(name), Empty(), timeout=TIMEOUT)
 
 
 def told_information_of(session: CommandSession, name: str) -> NodeInfo | None:
@@ -71,7 +72,12 @@ def require_alive(session: CommandSession, name: str) -> None:
 
 def living(session: CommandSession) -> list[str]:
     """The nodes that are alive, other than this command's own."""
-    return [name for name in sorted(session.node.alive()) if not name.startswith("cli-")]
+    return [address for address in sorted(session.node.alive()) if not is_command(address)]
+
+
+def is_command(address: str) -> bool:
+    """True for a command's own node."""
+    return address.rpartition("/")[2].startswith("cli-")
 
 
 class NodeState(msgspec.Struct, frozen=True, kw_only=True):

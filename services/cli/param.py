@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from schemas.system import Empty, Parameter, Parameters, ParameterValue, SetParameter
-from schemas.topics import Request
+from schemas.system import Empty, Parameter, ParameterValue, SetParameter
 from services.cli.errors import CommandError, ExitCode, nearest, usage
 from services.cli.forms import print_value
 from services.cli.messages import dump
@@ -74,9 +73,10 @@ def run_set(options: Options) -> ExitCode:
 
 def parameters_of(session: CommandSession, name: str) -> tuple[Parameter, ...]:
     """The declared parameters of a node."""
+    from services.runtime.endpoints import parameters_request  # 0.1 s, for a command that connects
+
     require_alive(session, name)
-    request = Request(f"@node/{name}/parameters/list", Empty, Parameters, name, "")
-    return session.node.call(request, Empty(), timeout=TIMEOUT).parameters
+    return session.node.call(parameters_request(name), Empty(), timeout=TIMEOUT).parameters
 
 
 class NodeParameters(NamedTuple):
@@ -128,9 +128,10 @@ def change_parameter(
     session: CommandSession, node: str, parameter: Parameter, value: ParameterValue, save: bool = False
 ) -> str:
     """Sets `parameter` of `node` to `value`, also for later starts if `save`, and returns a line about it."""
-    request = Request(f"@node/{node}/parameters/set", SetParameter, Parameter, node, "")
+    from services.runtime.endpoints import parameter_request  # 0.1 s, for a command that connects
+
     question = SetParameter(name=parameter.name, value=value, save=save)
-    after = session.node.call(request, question, timeout=TIMEOUT)
+    after = session.node.call(parameter_request(node), question, timeout=TIMEOUT)
     if save and not after.saved_in:  # an older node knows of no `save`
         raise CommandError(f"{node} {after.name} is {written(after.value)} now, and not saved: {node} cannot save")
     kept = f", saved in {after.saved_in}" if save else ""

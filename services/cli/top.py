@@ -12,7 +12,7 @@ from schemas.system import NodeInfo, NodeStatistics
 from schemas.topics import STATISTICS, TOPICS
 from services.cli.errors import ExitCode
 from services.cli.forms import Form, count_options, csv_rows, form_options, json_line
-from services.cli.node import told_information_of
+from services.cli.node import is_command, told_information_of
 from services.cli.parser import Options, Parser
 from services.cli.session import CommandSession, connect
 from services.cli.text_table import table
@@ -78,19 +78,19 @@ class Figures(NamedTuple):
 
 
 def figures_by_node(session: CommandSession) -> dict[str, Figures]:
-    """Fills, as the nodes speak, with those that have spoken twice; one that was started again begins anew."""
+    """Fills, by address, with those that have spoken twice; one that was started again begins anew."""
     newest: dict[str, NodeStatistics] = {}
     figures: dict[str, Figures] = {}
 
-    def on_statistics(message: NodeStatistics) -> None:
-        before = newest.get(message.node)
-        newest[message.node] = message
+    def on_statistics(message: NodeStatistics, address: str) -> None:
+        before = newest.get(address)
+        newest[address] = message
         if before is not None and before.started == message.started:
-            figures[message.node] = Figures(before, message)
+            figures[address] = Figures(before, message)
         else:
-            figures.pop(message.node, None)
+            figures.pop(address, None)
 
-    session.node.subscribe(STATISTICS, on_statistics)
+    session.node.subscribe_signed(STATISTICS, on_statistics)
     return figures
 
 
@@ -126,7 +126,7 @@ def watch(session: CommandSession, count: int | None, form: Form = str) -> ExitC
         if node.monotonic() - last < EVERY:
             return
         last = node.monotonic()
-        alive = {name for name in node.alive() if not name.startswith("cli-")}
+        alive = {name for name in node.alive() if not is_command(name)}
         figures = {name: each for name, each in sorted(heard.items()) if name in alive}
         for name, each in figures.items():
             if asked.get(name) != each.now.started:

@@ -17,6 +17,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
+from services.credentials.common_name import common_name
 from services.credentials.expiry import CERTIFICATE, days_left, expiry
 from services.credentials.private_files import AccessError
 
@@ -101,11 +102,13 @@ class Authority:
         """Makes a key and a certificate by which a client shows who it is; `unit` is the host that it is for."""
         self._issue(name, EXTENSIONS.format(use="clientAuth", names=""), certificate, key, days, unit)
 
-    def has_signed(self, certificate: Path, key: Path, hosts: Iterable[str] = ()) -> bool:
-        """True if both files are there, signed by this authority, as it stands now, and for all `hosts`."""
+    def has_signed(self, certificate: Path, key: Path, hosts: Iterable[str] = (), name: str = "") -> bool:
+        """True if both files are there, signed by this authority, as it stands now, for all `hosts` and for `name`."""
         if not (certificate.exists() and key.exists()):
             return False
         if CERTIFICATE.findall(certificate.read_text())[1:] != CERTIFICATE.findall(self._vouched):
+            return False
+        if name and common_name(certificate) != name:
             return False
         try:
             openssl("verify", "-no_check_time", "-CAfile", str(self._certificate), str(certificate))

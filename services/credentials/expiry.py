@@ -42,9 +42,9 @@ def expiries(file: Path) -> tuple[float, ...]:
 def not_after(der: bytes) -> float:
     """[s] UNIX time after which a certificate is not valid; raises `ValueError` for what is none."""
     try:
-        (_, signed), *_ = _elements(next(_elements(der))[1])
-        _, _, _, (_, validity), *_ = (each for each in _elements(signed) if each[0] != VERSION)
-        _, (tag, text) = _elements(validity)
+        (_, signed), *_ = elements(next(elements(der))[1])
+        _, _, _, (_, validity), *_ = (each for each in elements(signed) if each[0] != VERSION)
+        _, (tag, text) = elements(validity)
     except (IndexError, StopIteration) as error:
         raise ValueError("no certificate") from error
     said = text.decode("ascii")
@@ -70,7 +70,7 @@ def _expiry_of_pem(text: str) -> float:
     return not_after(ssl.PEM_cert_to_DER_cert(text))
 
 
-def _elements(data: bytes) -> Iterator[tuple[int, bytes]]:
+def elements(data: bytes) -> Iterator[tuple[int, bytes]]:
     """Tag and content of each element in a row; raises `IndexError` or `ValueError` where it is cut off."""
     at = 0
     while at < len(data):

@@ -16,7 +16,7 @@ from services.credentials.authority import Authority
 from services.credentials.expiry import WARN_WITHIN, days_left, expiry
 from services.credentials.private_files import write
 from services.hosts.certificates import AUTHORITY_FOLDER, Certificate
-from services.hosts.layout import listening, processes, roles
+from services.hosts.layout import listening, principal, processes, roles
 from services.mqtt import secure_folder
 from services.mqtt.access import AUTHORITY, GATEWAY
 
@@ -48,13 +48,14 @@ def _of_host(
     days = site.certificate_days
     names = tuple(addresses(site, host)) if site.router.host == host else ()
     wanted: dict[str, Callable[[Path, Path], None]] = {
-        role: partial(authority.sign_client, role, days=days, unit=host) for role in roles(site, host)
+        role: partial(authority.sign_client, principal(role, host), days=days, unit=host) for role in roles(site, host)
     }
     if names:
         wanted["router"] = partial(authority.sign, names, days=days)
     for name, sign in wanted.items():
         certificate, key = folder / f"{name}.pem", folder / f"{name}.key"
-        is_new = _is_due(authority, certificate, key, names if name == "router" else (), renew_within)
+        shown = "" if name == "router" else principal(name, host)
+        is_new = _is_due(authority, certificate, key, names if name == "router" else (), renew_within, shown)
         if is_new:
             sign(certificate, key)
         yield Certificate(host, name, expiry(certificate), is_new)
@@ -63,9 +64,11 @@ def _of_host(
             (folder / f"{stray}{end}").unlink(missing_ok=True)
 
 
-def _is_due(authority: Authority, certificate: Path, key: Path, names: tuple[str, ...], renew_within: float) -> bool:
-    """True if it is missing, wrong, or ends within `renew_within` [days]."""
-    return not authority.has_signed(certificate, key, names) or days_left(expiry(certificate)) < renew_within
+def _is_due(
+    authority: Authority, certificate: Path, key: Path, names: tuple[str, ...], renew_within: float, shown: str = ""
+) -> bool:
+    """True if it is missing, wrong, for another common name than `shown`, or ends within `renew_within` [days]."""
+    return not authority.has_signed(certificate, key, names, shown) or days_left(expiry(certificate)) < renew_within
 
 
 def _broker(site: Site, folder: Path, project: Path, authority: Authority, renew_within: float) -> Certificate:

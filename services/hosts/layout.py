@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from schemas.roles import ROLES
+from schemas.roles import ROLE_OF_NODE
 from schemas.site import Site
 
-ROLE_OF = {role.node: role.name for role in ROLES if role.node}
 ROUTER, BROKER = "router", "broker"
 TASKS, FILES = 256, 4096  # that one process may have, beside its memory: what leaks ends itself, and not the host
 
@@ -64,7 +63,7 @@ class Process:
     @property
     def role(self) -> str:
         """The certificate that it shows to the router; empty where it does not join."""
-        return ROLE_OF.get(self.service.name, "")
+        return ROLE_OF_NODE.get(self.service.name, "")
 
 
 def processes(site: Site, host: str) -> Iterator[Process]:
@@ -86,6 +85,17 @@ def roles(site: Site, host: str) -> tuple[str, ...]:
     """The roles that need a certificate on a host."""
     of_services = {process.role for process in processes(site, host)} - {""}
     return tuple(sorted(of_services | set(site.hosts[host].roles)))
+
+
+def principal(role: str, host: str) -> str:
+    """The common name of a role's certificate on a host: whoever works there has a name of his own on the bus."""
+    return role if role in ROLE_OF_NODE.values() else f"{role}.{host}"
+
+
+def principals(site: Site) -> dict[str, tuple[str, ...]]:
+    """The common names of all certificates of the site, by role."""
+    named = [(role, principal(role, host)) for host in site.hosts for role in roles(site, host)]
+    return {role: tuple(dict.fromkeys(name for each, name in named if each == role)) for role, _ in named}
 
 
 def robots(site: Site, host: str) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from schemas.site import Site
 from services.hosts import deployments
 from services.hosts.containers import compose, containerfile, process_compose
-from services.hosts.layout import listening, robots
+from services.hosts.layout import listening, principals, robots
 from services.hosts.units import units
 from services.mqtt.secure_folder import lines, mosquitto_conf
 from services.runtime.bus.zenoh_config import locked_router
@@ -67,7 +67,12 @@ def router(site: Site) -> str:
     folder = deployments.keys(site)
     files = (f"{folder}/ca.pem", f"{folder}/router.pem", f"{folder}/router.key")
     address = listening(site, site.router.host)
-    return json.dumps(locked_router(address, site.router.port, *files, access_control(site.robots)), indent=1) + "\n"
+    return (
+        json.dumps(
+            locked_router(address, site.router.port, *files, access_control(site.robots, principals(site))), indent=1
+        )
+        + "\n"
+    )
 
 
 def mosquitto(site: Site) -> str:

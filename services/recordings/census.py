@@ -12,10 +12,9 @@ from schemas.message import Message
 from schemas.system import Empty, Interfaces, NodeInfo, NodeRecord, NodeStatistics, Parameters
 from schemas.topics import STATISTICS, Request
 from services.runtime.clock_offset import ClockOffset, measured
-from services.runtime.endpoints import info_request, interfaces_request
+from services.runtime.endpoints import info_request, interfaces_request, parameters_request
 from services.runtime.errors import NoAnswer, RequestRefused
 from services.runtime.node import Node
-from services.runtime.parameters import parameters_request
 from services.runtime.requests.client import PendingCall
 
 PERIOD = 5.0  # [s] between two questions to a node: it may have got a new topic
@@ -28,7 +27,7 @@ MAX_NODES = 256  # that are asked; more would be no robot's
 class Asked:
     """One node that is being asked, until all three answers are there."""
 
-    name: str
+    name: str  # its address
     at: int  # [ns] when the first of them left
     answers: dict[str, Message] = field(default_factory=dict)
     clock: ClockOffset | None = None
@@ -53,16 +52,16 @@ class Census:
         self._asked_at: dict[str, float] = {}  # [s] monotonic
         self._started: dict[str, int] = {}  # [ns] UNIX start of the process that was asked
         self._known: dict[str, NodeRecord] = {}
-        node.subscribe(STATISTICS, self._on_statistics)
+        node.subscribe_signed(STATISTICS, self._on_statistics)
 
-    def _on_statistics(self, message: NodeStatistics) -> None:
+    def _on_statistics(self, message: NodeStatistics, address: str) -> None:
         now = self._node.monotonic()
-        is_new = self._started.get(message.node) != message.started
-        if message.node not in self._asked_at and not self._has_place(now):
+        is_new = self._started.get(address) != message.started
+        if address not in self._asked_at and not self._has_place(now):
             return
-        if is_new or now - self._asked_at[message.node] > PERIOD:
-            self._asked_at[message.node], self._started[message.node] = now, message.started
-            self.ask(Asked(message.node, self._node.now()))
+        if is_new or now - self._asked_at[address] > PERIOD:
+            self._asked_at[address], self._started[address] = now, message.started
+            self.ask(Asked(address, self._node.now()))
 
     def _has_place(self, now: float) -> bool:
         """True if one more node can be asked; those of commands that have ended long ago make place."""

@@ -16,10 +16,17 @@ from schemas.topics import ANY, Delivery
 from services.recordings.reader import RecordingReader, Row
 from services.recordings.table import NODES, recorded_topics
 from services.runtime.bus import identity
+from services.runtime.bus.branches import NAME, is_by_every_node
 from services.runtime.bus.interface import Bus, Publication
 
 NODE = "player"
 NOT_PLAYED = {NODES.key}  # what the logger itself has written
+
+
+class OfNode(msgspec.Struct):
+    """What a message of a key of every node says of its writer."""
+
+    node: str = ""
 
 
 @dataclass
@@ -35,25 +42,33 @@ class Roles:
 
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
-        self._publications: dict[tuple[str, str], Publication] = {}
+        self._publications: dict[tuple[str, str, str], Publication] = {}
         self._claimed: set[str] = set()
 
     def claim(self, writers: set[str]) -> None:
         """Takes the names; raises `NodeNameTaken` where a living node has one of them."""
         for name in sorted(writers - self._claimed):
-            identity.claim(self._bus, identity.identify(name))
+            identity.claim(self._bus, identity.identify(name, self._bus.common_name))
             self._claimed.add(name)
 
     def put(self, row: Row) -> None:
         """Publishes one message as it was said."""
-        key, schema, metadata = row.channel.topic, row.schema.name, row.channel.metadata
-        publication = self._publications.get((key, schema))
+        key, schema = row.channel.topic, row.schema.name
+        writer = writer_of(row)
+        publication = self._publications.get((key, schema, writer))
         if publication is None:
-            writer = metadata.get("writer", "")
-            delivery = delivery_of(row)
-            publication = self._bus.publish(key, schema, delivery, NODE if writer == ANY else writer)
-            self._publications[key, schema] = publication
+            publication = self._bus.publish(key, schema, delivery_of(row), writer)
+            self._publications[key, schema, writer] = publication
         publication.put(payload_of(row))
+
+
+def writer_of(row: Row) -> str:
+    """The node that has written it: of a key of every node as the message says, of one of many the player."""
+    if is_by_every_node(row.channel.topic):
+        said = msgspec.json.decode(row.message.data, type=OfNode).node
+        return said if NAME.fullmatch(said) else NODE
+    writer = row.channel.metadata.get("writer", "")
+    return NODE if writer == ANY else writer
 
 
 def delivery_of(row: Row) -> Delivery:
@@ -99,7 +114,7 @@ class Player:
         """The nodes whose messages are played; reads the file once."""
         rows = self.reader.rows(self.is_chosen)
         said = {row.channel.metadata.get("writer", "") for row in rows if _is_played(row)}
-        return {name for name in said if name and name != ANY and identity.NAME.fullmatch(name)}
+        return {name for name in said if name and name != ANY and NAME.fullmatch(name)}
 
     @property
     def is_over(self) -> bool:

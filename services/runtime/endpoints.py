@@ -11,9 +11,20 @@ from typing import Any
 
 import msgspec
 
-from schemas.system import Empty, Interfaces, NodeInfo, NodeStatistics, TopicInterface, TopicStatistics
+from schemas.system import (
+    Empty,
+    Interfaces,
+    NodeInfo,
+    NodeStatistics,
+    Parameter,
+    Parameters,
+    SetParameter,
+    TopicInterface,
+    TopicStatistics,
+)
 from schemas.topics import Request, Topic
 from services.runtime.actions.server import ActionServer
+from services.runtime.bus.branches import branch_of
 from services.runtime.bus.identity import Identity
 from services.runtime.loop.loop import LoopFigures
 from services.runtime.requests.server import RequestServer
@@ -21,12 +32,23 @@ from services.runtime.topics import Publisher, Subscription
 
 
 def info_request(node: str) -> Request[Empty, NodeInfo]:
-    return Request(f"@node/{node}/info", Empty, NodeInfo, node, "who this node is", recorded=False)
+    """`node` is an address (branches.py), as of all requests to a node."""
+    return Request(f"@node/{branch_of(node)}/info", Empty, NodeInfo, node, "who this node is", recorded=False)
 
 
 def interfaces_request(node: str) -> Request[Empty, Interfaces]:
     about = "the messages of its topics"
-    return Request(f"@node/{node}/interfaces", Empty, Interfaces, node, about, recorded=False)
+    return Request(f"@node/{branch_of(node)}/interfaces", Empty, Interfaces, node, about, recorded=False)
+
+
+def parameters_request(node: str) -> Request[Empty, Parameters]:
+    about = "all parameters of the node"
+    return Request(f"@node/{branch_of(node)}/parameters/list", Empty, Parameters, node, about, recorded=False)
+
+
+def parameter_request(node: str) -> Request[SetParameter, Parameter]:
+    about = "a new value for one of them"
+    return Request(f"@node/{branch_of(node)}/parameters/set", SetParameter, Parameter, node, about, recorded=False)
 
 
 @dataclass

@@ -6,6 +6,7 @@ import gc
 import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
+from dataclasses import replace
 from types import TracebackType
 from typing import Self, TypeVar
 
@@ -25,12 +26,20 @@ from schemas.topics import LOG, PARAMETER_CHANGES, STATISTICS, Action, Request, 
 from services.runtime.actions.client import ActionClient
 from services.runtime.actions.server import ActionServer, OnCancel, OnGoal
 from services.runtime.bus import identity
+from services.runtime.bus.branches import principal_of
 from services.runtime.bus.connection import connect
 from services.runtime.bus.interface import Bus, Declaration
 from services.runtime.certificate_watch import CertificateWatch
 from services.runtime.client_watch import Absences, ClientWatch
 from services.runtime.deployment import load_deployment, project_root, robot_name
-from services.runtime.endpoints import LoopStatistics, NodeEndpoints, info_request, interfaces_request
+from services.runtime.endpoints import (
+    LoopStatistics,
+    NodeEndpoints,
+    info_request,
+    interfaces_request,
+    parameter_request,
+    parameters_request,
+)
 from services.runtime.loop.loop import Loop
 from services.runtime.loop.task_queue import Worker
 from services.runtime.parameters import ParameterRegistry, ParameterSet
@@ -53,6 +62,7 @@ F = TypeVar("F", bound=Message)
 P = TypeVar("P", bound=msgspec.Struct)
 
 BEAT = 1.0  # [s] between two touches of the readiness file
+MOST_IGNORED = 16  # tokens of nobody that the log names
 
 
 class Node:
@@ -92,12 +102,14 @@ class Node:
         saved = SavedParameters(project_root() / self.deployment.paths.run, name)
         self._parameters = ParameterRegistry(name, from_file, overrides or {}, saved, self.log)
         self._is_closed = False
+        self._ignored_tokens: set[str] = set()
         self._certificate = CertificateWatch(self.deployment.router.certificate, self.log.warning)
         self._certificate.beat()
         with stop_on_signals(self._stop) if self._signals else nullcontext():
             self._bus = bus or connect(self.deployment.router, self.robot, self.log, self._stop)
         try:
-            identity.claim(self._bus, self._identity)
+            self._identity = replace(self._identity, principal=principal_of(name, self._bus.common_name))
+            identity.claim(self._bus, self._identity, self._warn_of_token)
             self._serve_about_itself()
         except BaseException:
             self._bus.close()
@@ -272,8 +284,8 @@ class Node:
         return self._bus.router
 
     def alive(self) -> set[str]:
-        """The names of all living nodes of the robot, this one too."""
-        return identity.alive(self._bus)
+        """The addresses of all living nodes of the robot, this one too: names, behind a person's certificate's."""
+        return identity.alive(self._bus, self._warn_of_token)
 
     def now(self) -> int:
         """[ns] UNIX time: for stamps."""
@@ -356,10 +368,17 @@ class Node:
         return self._bus.watch_alive(key, lambda is_there: self.post(lambda: on_change(is_there)))
 
     def _serve_about_itself(self) -> None:
-        self.serve(info_request(self.name), lambda question: self.info())
-        self.serve(interfaces_request(self.name), lambda question: self._endpoints.interfaces())
-        self.serve(self._parameters.list_request, self._parameters.listed)
-        self.serve(self._parameters.set_request, self._set_parameter)
+        address = self._identity.address
+        self.serve(info_request(address), lambda question: self.info())
+        self.serve(interfaces_request(address), lambda question: self._endpoints.interfaces())
+        self.serve(parameters_request(address), self._parameters.listed)
+        self.serve(parameter_request(address), self._set_parameter)
+
+    def _warn_of_token(self, text: str) -> None:
+        """Once of each token, and of so many."""
+        if text not in self._ignored_tokens and len(self._ignored_tokens) < MOST_IGNORED:
+            self._ignored_tokens.add(text)
+            self.log.warning("%s", text)
 
     def _set_parameter(self, wanted: SetParameter) -> Parameter:
         parameter = self._parameters.set(wanted)

@@ -11,7 +11,6 @@ from typing import Any, Generic, TypeVar, cast
 import msgspec
 
 from schemas.system import Empty, Parameter, Parameters, ParameterValue, SetParameter
-from schemas.topics import Request
 from services.runtime.errors import RequestRefused
 from services.runtime.saved_parameters import SavedParameters
 
@@ -113,11 +112,6 @@ def _python_type(described: Any) -> type:
     return kinds.get(type(described), object)
 
 
-def parameters_request(node: str) -> Request[Empty, Parameters]:
-    key = f"@node/{node}/parameters/list"
-    return Request(key, Empty, Parameters, node, "all parameters of the node", recorded=False)
-
-
 class ParameterRegistry:
     """All parameters of a node.
 
@@ -136,9 +130,6 @@ class ParameterRegistry:
         self._saved = saved
         self._log = log
         self._sets: list[ParameterSet[Any]] = []
-        self.list_request = parameters_request(node)
-        key, about = f"@node/{node}/parameters/set", "a new value for one of them"
-        self.set_request = Request(key, SetParameter, Parameter, node, about, recorded=False)
 
     def declare(self, kind: type[P]) -> ParameterSet[P]:
         """Raises `RequestRefused` where a value given cannot be."""

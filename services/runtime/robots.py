@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from schemas.deployment import RouterSection
-from services.runtime.bus.identity import ALIVE
+from services.runtime.bus.branches import branch_of
+from services.runtime.bus.identity import ALIVE, addresses
 
 TO_ANSWER = 1.0  # [s] for the router to list the liveliness tokens
 
@@ -17,10 +18,11 @@ def robots_on(router: RouterSection, node: str = "*") -> tuple[str, ...]:
 
     from services.runtime.bus.zenoh_config import client_config
 
+    tokens = f"{ALIVE}/{'*/*' if node == '*' else branch_of(node)}"
     try:
         with zenoh.open(client_config(router)) as session:
-            replies = session.liveliness().get(f"*/{ALIVE}/{node}", timeout=TO_ANSWER)
+            replies = session.liveliness().get(f"*/{tokens}", timeout=TO_ANSWER)
             keys = [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
     except zenoh.ZError:
         return ()
-    return tuple(sorted({key.split("/", 1)[0] for key in keys}))
+    return tuple(sorted({robot for robot, _, token in (key.partition("/") for key in keys) if any(addresses([token]))}))

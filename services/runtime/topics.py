@@ -10,6 +10,7 @@ from typing import Generic, Protocol, TypeVar
 from schemas.message import BadMessage, Message
 from schemas.system import TopicStatistics
 from schemas.topics import ANY, Delivery, Topic
+from services.runtime.bus.branches import is_by_every_node, name_in
 from services.runtime.bus.interface import Arrival, Bus
 from services.runtime.bus.wire import from_arrival, schema_of, to_payload
 from services.runtime.loop.loop import Loop
@@ -109,6 +110,7 @@ class Subscription(Generic[M]):
         try:
             self._require_writer(arrival)
             message = from_arrival(self.topic.message, arrival)
+            _require_own_name(self.topic.key, message, arrival.writer)
         except BadMessage as error:
             self._bad += 1
             if self._bad == 1:
@@ -129,6 +131,14 @@ class Subscription(Generic[M]):
         if self.topic.delivery is Delivery.LATCHED and wanted != ANY and arrival.writer != wanted:
             who = f'node "{arrival.writer}"' if arrival.writer else "a stranger without a node's name"
             raise BadMessage(f'it comes from {who}, and only "{wanted}" writes this key')
+
+
+def _require_own_name(key: str, message: Message, writer: str) -> None:
+    """Raises `BadMessage` for a message of a key of every node that speaks of another node than its writer."""
+    said = getattr(message, "node", "") if is_by_every_node(key) else ""
+    if said and said != name_in(writer):
+        who = f'"{writer}"' if writer else "nobody's branch (services/runtime/bus/branches.py)"
+        raise BadMessage(f'it speaks of node "{said[:64]}", and comes from {who}')
 
 
 class Latest(Generic[M]):

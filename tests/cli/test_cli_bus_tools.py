@@ -444,7 +444,7 @@ def test_top_says_what_was_lost_what_was_bad_and_how_late_a_loop_is(session, sta
     ):
         # [s] five periods: the step comes late, and newer states replace those that wait
         node.subscribe(JOINT_STATES, lambda state: threading.Event().wait(0.1))
-        words = stranger.publish("log", "Nonsense", Delivery.EVERY)
+        words = stranger.publish("log", "Nonsense", Delivery.EVERY, "stranger")
         node.subscribe(LOG, lambda record: None)
         with spinning(node, lambda now: words.put(b"not a record")):
             assert top.watch(session, 2, lambda report: reports.append(report) or "") is ExitCode.OK

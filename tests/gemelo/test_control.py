@@ -339,7 +339,7 @@ def test_a_stranger_that_writes_the_topic_changes_nothing(lab: Lab) -> None:
 
 
 def test_a_holder_whose_token_was_never_there_loses_control_by_itself(lab: Lab) -> None:
-    question = ControlTake(name="ghost", client=f"@id/ghost/{1:020d}.1.nowhere", secret="g" * 64)
+    question = ControlTake(name="ghost", client=f"@id/local/ghost/{1:020d}.1.nowhere", secret="g" * 64)
     answer = raw(lab, CONTROL_TAKE.key, "ControlTake", encode(question))
     assert answer is not None
     assert answer.ok

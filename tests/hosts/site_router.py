@@ -9,6 +9,7 @@ from pathlib import Path
 from schemas.deployment import RouterSection
 from services.hosts.checks import load_site
 from services.hosts.keys import make_keys
+from services.hosts.layout import principals
 from services.runtime.bus.zenoh_config import locked_router
 from services.runtime.deployment import project_root
 from services.runtime.permissions import access_control
@@ -55,7 +56,7 @@ class SiteRouter(RouterProcess):
         else:
             shutil.copytree(self._given, self.home)
         files = (str(self.keys / name) for name in ("ca.pem", "router.pem", "router.key"))
-        configuration = locked_router(HOST, self.port, *files, access_control(self.site.robots))
+        configuration = locked_router(HOST, self.port, *files, access_control(self.site.robots, principals(self.site)))
         self._configuration.write_text(json.dumps(configuration))
         self.environ["GEMELO_ROUTER_CONFIGURATION"] = str(self._configuration)
         super().start()

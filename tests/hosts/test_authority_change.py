@@ -70,8 +70,9 @@ def test_a_certificate_that_the_old_authority_vouches_for_still_says_its_role(ro
     """Of a router that knows only the old authority: what is no role may say nothing there."""
     old, keys = routers[BEFORE], routers[CHANGING].keys
     buses = [ZenohBus(old.section("operator", keys), "rm1"), ZenohBus(old.section("viewer", keys), "rm1")]
-    tokens = [bus.declare_alive(f"@alive/{name}") for bus, name in zip(buses, ("cli-1", "cli-2"), strict=True)]
-    assert until(lambda: all({"@alive/cli-1", "@alive/cli-2"} <= bus.alive("@alive/*") for bus in buses))
+    keys_of = {f"@alive/{bus.common_name}/cli-1": bus for bus in buses}
+    tokens = [bus.declare_alive(key) for key, bus in keys_of.items()]
+    assert until(lambda: all(keys_of.keys() <= bus.alive("@alive/*/*") for bus in buses))
     for each in (*tokens, *buses):
         each.close()
 

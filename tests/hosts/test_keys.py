@@ -6,11 +6,12 @@ import time
 
 import pytest
 
-from schemas.roles import ROLES
+from schemas.roles import ROLE_OF_NODE, ROLES
 from services.credentials.authority import Authority, openssl
+from services.credentials.common_name import common_name
 from services.credentials.expiry import expiry
 from services.hosts.checks import load_site
-from services.hosts.keys import make_keys
+from services.hosts.keys import authority_in, make_keys
 from services.runtime.deployment import project_root
 from tests.hosts.sites import EXAMPLE, site
 
@@ -63,12 +64,25 @@ def test_keys_and_passwords_are_their_owners_alone_and_the_whole_folder_is(made)
     assert out.stat().st_mode & 0o777 == 0o700
 
 
-def test_a_certificates_name_is_the_role_and_its_unit_the_host(made):
+def test_a_certificates_name_is_the_role_a_persons_with_the_host_and_its_unit_the_host(made):
     _, out = made
     for file in out.glob("*/keys/*.pem"):
         if file.stem in {role.name for role in ROLES}:
             said = openssl("x509", "-in", str(file), "-noout", "-subject").replace(" ", "")
-            assert said.strip() == f"subject=OU={file.parent.parent.name},CN={file.stem}"
+            host, is_service = file.parent.parent.name, file.stem in ROLE_OF_NODE.values()
+            name = file.stem if is_service else f"{file.stem}.{host}"
+            assert said.strip() == f"subject=OU={host},CN={name}"
+            assert common_name(file) == name
+
+
+def test_a_certificate_of_another_name_is_made_anew(tmp_path):
+    lab = site(tmp_path)
+    make_keys(lab, tmp_path / "out", project_root())
+    authority = authority_in(tmp_path / "out")
+    files = next((tmp_path / "out").glob("*/keys/operator.pem")), next((tmp_path / "out").glob("*/keys/operator.key"))
+    authority.sign_client("operator", *files)
+    renewed = {(each.host, each.name) for each in make_keys(lab, tmp_path / "out", project_root()) if each.is_new}
+    assert renewed == {(files[0].parent.parent.name, "operator")}
 
 
 def test_what_is_sound_is_kept_and_what_ends_soon_or_has_another_address_is_renewed(tmp_path):

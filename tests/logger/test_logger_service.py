@@ -37,7 +37,7 @@ from schemas.joints import JointState
 from schemas.message import Message
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
 from schemas.scene import CylinderShape, SceneAdd, SceneObject, SceneRemove, SceneRequest
-from schemas.system import LogRecord, Parameter, SetParameter
+from schemas.system import LogRecord, SetParameter
 from schemas.topics import (
     COMMAND_ACKS,
     COMMANDS,
@@ -60,6 +60,7 @@ from services.planner.scene.scene_store import SceneStore
 from services.runtime.actions import accept
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.deployment import load_deployment
+from services.runtime.endpoints import parameter_request
 from services.runtime.errors import RequestRefused
 from services.runtime.node import Node
 from services.visualizer.render.outputs import VisualizerParameters
@@ -390,7 +391,7 @@ def test_a_folder_that_no_disk_can_have_is_refused_and_the_logger_goes_on(deploy
     with Node("client", deployment, bus=MemoryBus(network)) as client, running(deployment, network) as logger:
         with pytest.raises(RequestRefused, match="NUL"):
             client.call(
-                Request("@node/logger/parameters/set", SetParameter, Parameter, "logger", ""),
+                parameter_request("logger"),
                 SetParameter(name="log_dir", value="a\0b"),
             )
         client.publisher(LOG).put(LogRecord(text="after"))

@@ -28,8 +28,8 @@ def main(own: str, other: str) -> None:
 
     for index in range(KEYS):
         bus.subscribe(f"{other}{index}", Delivery.LATEST, on_arrival, lambda missed: None)
-    bus.declare_alive(f"@alive/{own}")
-    bus.watch_alive(f"@alive/{other}", lambda is_there: known.update(other=is_there))
+    bus.declare_alive(f"@alive/local/{own}")
+    bus.watch_alive(f"@alive/local/{other}", lambda is_there: known.update(other=is_there))
     said = [(f"{own}{index}".encode(), bus.publish(f"{own}{index}", "Text", Delivery.LATEST)) for index in range(KEYS)]
     for count in range(sys.maxsize):
         for key, publication in said:

@@ -28,8 +28,11 @@ class Lock:
         self.folder, self.days = folder, days
         self.authority = Authority(folder / "ca.pem", folder / "ca.key")
         self.authority.sign([HOST], *self.files("router"), days)
-        for role in roles:
-            self.issue(role)
+        self.people: dict[str, list[str]] = {}  # by role, the common names `<role>.<host>`
+        for name in roles:
+            self.issue(name)
+            if "." in name:
+                self.people.setdefault(name.partition(".")[0], []).append(name)
 
     def issue(self, name: str) -> None:
         self.authority.sign_client(name, *self.files(name), self.days)
@@ -42,7 +45,7 @@ class Lock:
         certificate, key = map(str, self.files("router"))
         ca = str(self.folder / "ca.pem")
         file = self.folder / "router.json5"
-        settings: dict[str, Any] = locked_router(HOST, port, ca, certificate, key, access_control(robots))
+        settings: dict[str, Any] = locked_router(HOST, port, ca, certificate, key, access_control(robots, self.people))
         settings["transport"]["link"]["tls"]["enable_mtls"] = asks
         file.write_text(json.dumps(settings | ({} if asks else {"access_control": {"enabled": False}})))
         return file

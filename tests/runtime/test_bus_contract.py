@@ -83,8 +83,8 @@ def test_own_publications_are_heard_only_where_asked_for(buses: Buses) -> None:
 
 def test_a_closed_subscription_hears_nothing_more(buses: Buses) -> None:
     heard: list[bytes] = []
-    subscription = buses.open().subscribe("log", EVERY, lambda arrival: heard.append(arrival.payload), ignore)
-    publication = buses.open().publish("log", "LogRecord", EVERY)
+    subscription = buses.open().subscribe("events", EVERY, lambda arrival: heard.append(arrival.payload), ignore)
+    publication = buses.open().publish("events", "DeviceEvent", EVERY)
     buses.settle()
     publication.put(b"1")
     assert until(lambda: heard)
@@ -96,8 +96,8 @@ def test_a_closed_subscription_hears_nothing_more(buses: Buses) -> None:
 
 def test_robots_do_not_hear_one_another(buses: Buses) -> None:
     heard: list[bytes] = []
-    buses.open("parol6").subscribe("log", EVERY, lambda arrival: heard.append(arrival.payload), ignore)
-    buses.open("rm1").publish("log", "LogRecord", EVERY).put(b"1")
+    buses.open("parol6").subscribe("events", EVERY, lambda arrival: heard.append(arrival.payload), ignore)
+    buses.open("rm1").publish("events", "DeviceEvent", EVERY).put(b"1")
     buses.open("rm1").declare_alive("@alive/planner")
     time.sleep(0.1)
     assert heard == []

@@ -17,6 +17,7 @@ from schemas.topics import FOLLOW_JOINT_TRAJECTORY, PLAN, TOPICS
 from services.runtime.actions import accept
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.endpoints import info_request, parameter_request, parameters_request
 from services.runtime.errors import NoAnswer, RequestRefused
 from services.runtime.node import Node
 from services.runtime.requests.client import response_in
@@ -24,7 +25,7 @@ from tests.runtime.support import hear
 
 KEYS = st.sampled_from([topic.key for topic in TOPICS])
 ASKED = st.sampled_from(
-    [PLAN.key, "@node/victim/parameters/set", "@node/victim/parameters/list", "@node/victim/info"]
+    [PLAN.key, *(make("victim").key for make in (parameter_request, parameters_request, info_request))]
     + [f"{FOLLOW_JOINT_TRAJECTORY.key}/{part}" for part in ("goal", "cancel", "result")]
 )
 SCHEMAS = st.sampled_from(

@@ -102,9 +102,9 @@ def test_a_name_that_is_no_role_may_nothing(router):
     stranger, viewer = ZenohBus(router.section("stranger"), "rm1"), ZenohBus(router.section("viewer"), "rm1")
     stranger.serve(PLAN.key, lambda query: query.drop())
     for bus, name in ((stranger, "stranger"), (viewer, "viewer")):
-        bus.declare_alive(f"@alive/{name}")
-    assert until(lambda: viewer.alive("@alive/*") == {"@alive/viewer"})
-    assert stranger.alive("@alive/*") <= {"@alive/stranger"}
+        bus.declare_alive(f"@alive/viewer/{name}")
+    assert until(lambda: viewer.alive("@alive/*/*") == {"@alive/viewer/viewer"})
+    assert stranger.alive("@alive/*/*") <= {"@alive/viewer/stranger"}
     assert not viewer.wait_served(PLAN.key, 0.2)
     stranger.close()
     viewer.close()

@@ -15,12 +15,13 @@ from schemas.frames import RobotDescription
 from schemas.joints import JointState, JointTargets
 from schemas.message import BadMessage, encode
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
-from schemas.system import Empty, LogRecord, NodeStatistics, Parameter, Parameters, SetParameter, TopicStatistics
+from schemas.system import Empty, LogRecord, NodeStatistics, SetParameter, TopicStatistics
 from schemas.topics import COMMAND_ACKS, DESCRIPTION, JOINT_STATES, LOG, PLAN, STATISTICS, Request
 from services.runtime import topics
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.bus.zenoh_bus import ZenohBus
+from services.runtime.endpoints import info_request, parameter_request, parameters_request
 from services.runtime.errors import NoAnswer, NodeNameTaken, RequestRefused
 from services.runtime.node import Node
 from services.runtime.requests.client import call
@@ -376,8 +377,7 @@ def test_a_slow_handler_in_the_worker_does_not_hold_up_the_loop(buses: Buses) ->
 def test_parameters_are_listed_set_and_checked_at_run_time(buses: Buses) -> None:
     node, client = buses.node("gateway", overrides={"chunk": "12"}), buses.node("client")
     parameters = node.parameters(GatewayParameters)
-    list_all = Request("@node/gateway/parameters/list", Empty, Parameters, "gateway", "")
-    set_one = Request("@node/gateway/parameters/set", SetParameter, Parameter, "gateway", "")
+    list_all, set_one = parameters_request("gateway"), parameter_request("gateway")
     with spinning(node):
         listed = {each.name: each for each in client.call(list_all, Empty()).parameters}
         assert listed["chunk"].value == 12
@@ -425,10 +425,8 @@ def test_nodes_know_one_another(buses: Buses) -> None:
     planner.publisher(LOG)
     planner.serve(PLAN, lambda request: PlanResponse())
     assert until(lambda: client.alive() == {"planner", "client"})
-    from schemas.system import NodeInfo
-
     with spinning(planner):
-        info = client.call(Request("@node/planner/info", Empty, NodeInfo, "planner", ""), Empty())
+        info = client.call(info_request("planner"), Empty())
     assert (info.node, info.robot, info.serves) == ("planner", "rm1", ("plan",))
     planner.close()
     assert until(lambda: client.alive() == {"client"})

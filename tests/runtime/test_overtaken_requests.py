@@ -19,7 +19,7 @@ from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
 from services.runtime.actions import keys
 from services.runtime.actions.server import accept
 from services.runtime.bus.interface import Bus, BusReply
-from services.runtime.bus.zenoh_declarations import MAX_CLIENT_NAME, asked_by, asker
+from services.runtime.bus.zenoh_declarations import CLIENT_BYTES, MAX_SECRET, asked_by, asker
 from services.runtime.errors import NoAnswer, RequestRefused
 from services.runtime.node import Node
 from services.runtime.requests.limits import RequestRates
@@ -58,15 +58,25 @@ def test_the_newest_stop_of_the_last_clients_is_kept() -> None:
     assert kept + 1 == MOST_CLIENTS  # with the operator
 
 
-@given(st.text("0123456789abcdef", max_size=MAX_CLIENT_NAME), st.integers(0, 10**18 - 1))
-def test_who_asks_says_its_name_and_number(name: str, number: int) -> None:
-    assert asker(asked_by(name, number)) == (name.encode().hex(), number)
+SECRETS = st.text("0123456789abcdef", min_size=1, max_size=MAX_SECRET)
+
+
+@given(SECRETS, SECRETS, st.integers(0, 10**18 - 1))
+def test_a_client_is_named_by_its_secret_and_certificate_together_and_neither_can_be_read_in_its_name(
+    secret: str, other: str, number: int
+) -> None:
+    client, said = asker(asked_by(secret, number), "operator.desk")
+    assert said == number
+    assert asker(asked_by(secret, 1), "operator.desk")[0] == client
+    assert asker(asked_by(secret, 1), "viewer.desk")[0] != client
+    assert (asker(asked_by(other, 1), "operator.desk")[0] == client) == (other == secret)
+    assert asker(asked_by(client, 1), "operator.desk")[0] != client  # what is published of it is of no use
 
 
 @given(st.binary(max_size=200))
 def test_what_others_attach_is_a_short_name_and_some_number(attached: bytes) -> None:
-    name, number = asker(attached)
-    assert len(name) <= 2 * MAX_CLIENT_NAME
+    name, number = asker(attached, "viewer")
+    assert len(name) in (0, 2 * CLIENT_BYTES)
     assert number >= 0
 
 

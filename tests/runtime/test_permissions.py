@@ -19,10 +19,12 @@ import zenoh
 from schemas.deployment import Deployment, PathsSection, RouterSection
 from schemas.message import Message
 from schemas.roles import ROLES, role
-from schemas.system import Parameter, SetParameter
-from schemas.topics import DEVICE_EVENTS, DEVICE_STATUS, TOPICS, Delivery, Request, Topic
+from schemas.system import SetParameter
+from schemas.topics import DEVICE_EVENTS, DEVICE_STATUS, TOPICS, Delivery, Topic
+from services.runtime.bus.branches import asked_under, read_under, served_under, written_under
 from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.bus.zenoh_config import client_config
+from services.runtime.endpoints import parameter_request
 from services.runtime.errors import NoAnswer
 from services.runtime.node import Node
 from services.runtime.permissions import ABOUT, SET, Permissions, permissions
@@ -73,7 +75,7 @@ def heard(opened: Sessions) -> Pairs:
     pairs: Pairs = defaultdict(set)
     declared = [
         session.declare_subscriber(
-            key, lambda sample, key=key, name=name: pairs[key].add((sample.payload.to_string(), name)),
+            read_under(key), lambda sample, key=key, name=name: pairs[key].add((sample.payload.to_string(), name)),
             allowed_origin=zenoh.Locality.REMOTE,
         )
         for name, session in opened.items() for key in SPOKEN
@@ -81,7 +83,7 @@ def heard(opened: Sessions) -> Pairs:
     exchange(opened)
     for name, session in opened.items():
         for key in SPOKEN:
-            session.put(key, name, congestion_control=zenoh.CongestionControl.BLOCK)
+            session.put(spoken(key, name), name, congestion_control=zenoh.CongestionControl.BLOCK)
     exchange(opened)
     for each in declared:
         each.undeclare()
@@ -90,11 +92,11 @@ def heard(opened: Sessions) -> Pairs:
 
 def exchange(opened: Sessions) -> None:
     """Every session has a question answered by every other: what was sent before has then arrived, or never will."""
-    keys = {name: f"@node/{own_node(name)}/info" for name in opened}
-    served = [opened[name].declare_queryable(key, answer(key, "here")) for name, key in keys.items()]
+    keys = {name: f"@node/{name}/{own_node(name)}/info" for name in opened}
+    served = [opened[name].declare_queryable(served_under(key), answer("here")) for name, key in keys.items()]
     for name, session in opened.items():
         for key in (key for other, key in keys.items() if other != name):
-            assert until(partial(is_answered, session, key)), f"{name} has no answer to {key}"
+            assert until(partial(is_answered, session, asked_under(key, name))), f"{name} has no answer to {key}"
     for each in served:
         each.undeclare()
 
@@ -103,25 +105,49 @@ def is_answered(session: zenoh.Session, key: str) -> bool:
     return any(reply.ok is not None for reply in session.get(key, timeout=2.0))
 
 
-def answer(key: str, text: str) -> Callable[[zenoh.Query], None]:
+def answer(text: str, key: str = "") -> Callable[[zenoh.Query], None]:
+    """Under `key`, else under that which is asked for."""
+
     def reply(query: zenoh.Query) -> None:
         with query:
-            query.reply(key, text)
+            query.reply(key or query.key_expr, text)
 
     return reply
 
 
-def answered(opened: Sessions, keys: tuple[str, ...] = ASKED) -> Pairs:
+def spoken(key: str, name: str) -> str:
+    """The key under which a role's own node writes."""
+    return written_under(key, name, own_node(name))
+
+
+def kept(key: str, name: str) -> str:
+    """The key under which a role's own node keeps what it wrote."""
+    return spoken(key, name) + CACHE
+
+
+Named = Callable[[str, str], str]  # the key of an application's key for a role
+
+
+def answered(
+    opened: Sessions,
+    keys: tuple[str, ...] = ASKED,
+    served_as: Named = lambda key, name: served_under(key),
+    asked_as: Named = asked_under,
+) -> Pairs:
     """By key, the pairs (server, client) of which the client got the server's answer: every role serves and asks."""
     pairs: Pairs = defaultdict(set)
     served = [
-        session.declare_queryable(key, answer(key, name)) for name, session in opened.items() for key in keys
+        session.declare_queryable(served_as(key, name), answer(name, served_as(key, name) if served_as is kept else ""))
+        for name, session in opened.items() for key in keys
     ]  # fmt: skip
     exchange(opened)
     waiting = threading.Semaphore(0)
     for name, session in opened.items():
         for key in keys:
-            ask(session, key, lambda said, key=key, name=name: pairs[key].add((said, name)), waiting.release)
+            ask(
+                session, asked_as(key, name), lambda said, key=key, name=name: pairs[key].add((said, name)),
+                waiting.release,
+            )  # fmt: skip
     for _ in product(opened, keys):
         assert waiting.acquire(timeout=2 * TO_ANSWER)
     for each in served:
@@ -170,13 +196,13 @@ def test_behind_the_lock_a_request_passes_only_from_who_may_ask_to_its_server(lo
     assert answered(locked) == {key: pairs for key, pairs in may.items() if pairs}
 
 
-@pytest.mark.parametrize("wider", ["**", "**/log", "l$*"])
+@pytest.mark.parametrize("wider", ["log/@by/**", "*/@by/**", "l$*/@by/*/*"])
 def test_a_wider_key_than_ones_own_hears_what_is_secret_only_where_the_lock_is_open(locked, unlocked, wider):
     def heard_of_others(opened: Sessions) -> list[zenoh.Sample]:
         heard: list[zenoh.Sample] = []
         subscriber = opened["planner"].declare_subscriber(wider, heard.append)
         exchange(opened)
-        opened["operator"].put("log", "secret", congestion_control=zenoh.CongestionControl.BLOCK)
+        opened["operator"].put(spoken("log", "operator"), "secret", congestion_control=zenoh.CongestionControl.BLOCK)
         exchange(opened)
         subscriber.undeclare()
         return heard
@@ -200,51 +226,6 @@ def test_a_robot_that_is_not_the_routers_is_nobodys(lock, tmp_path):
     open_router.stop()
 
 
-SERVICES = [each.node for each in ROLES if each.node]
-
-
-def bearers(opened: Sessions) -> dict[str, set[str]]:
-    """By service, the roles whose token under its name others see."""
-    tokens = [
-        session.liveliness().declare_token(f"@id/{service}/{name}")
-        for name, session in opened.items() for service in SERVICES
-    ]  # fmt: skip
-    exchange(opened)
-    seen: dict[str, set[str]] = {service: set() for service in SERVICES}
-    for looker in ("viewer", "operator"):
-        replies = opened[looker].liveliness().get("@id/*/*", timeout=2.0)
-        for _, service, name in (str(reply.ok.key_expr).split("/") for reply in replies if reply.ok):
-            seen[service] |= {name} - {looker}  # its own token needs no router
-    for each in tokens:
-        each.undeclare()
-    return seen
-
-
-def test_a_name_of_a_service_is_borne_by_its_role_alone(locked, unlocked):
-    assert bearers(unlocked) == {each.node: set(NAMES) for each in ROLES if each.node}
-    assert bearers(locked) == {each.node: {each.name} for each in ROLES if each.node}
-
-
-def test_a_service_is_said_alive_by_its_role_alone(locked, unlocked):
-    def sayers(opened: Sessions) -> dict[str, set[str]]:
-        """By service, the roles whose word that it is alive is heard."""
-        said: dict[str, set[str]] = {service: set() for service in SERVICES}
-        for name, session in opened.items():
-            tokens = [session.liveliness().declare_token(f"@alive/{service}") for service in SERVICES]
-            exchange(opened)
-            looker = opened["viewer" if name != "viewer" else "operator"]
-            for reply in looker.liveliness().get("@alive/*", timeout=2.0):
-                if reply.ok:
-                    said[str(reply.ok.key_expr).removeprefix("@alive/")].add(name)
-            for each in tokens:
-                each.undeclare()
-            exchange(opened)
-        return said
-
-    assert sayers(unlocked) == {service: set(NAMES) for service in SERVICES}
-    assert sayers(locked) == {each.node: {each.name} for each in ROLES if each.node}
-
-
 KEPT = tuple(topic.key for topic in TOPICS if topic.delivery is not Delivery.LATEST)
 
 
@@ -252,10 +233,7 @@ def test_what_was_written_before_is_told_by_its_writers_alone_to_its_readers(loc
     """The caches of EVERY and LATCHED keys: a forged one would speak to every late joiner."""
 
     def cached(opened: Sessions) -> Pairs:
-        return {
-            key.removesuffix(CACHE): pairs
-            for key, pairs in answered(opened, tuple(f"{key}{CACHE}" for key in KEPT)).items()
-        }
+        return answered(opened, KEPT, kept, lambda key, name: read_under(key) + CACHE)
 
     may = {
         key: {(one, other) for one, other in all_pairs()
@@ -283,9 +261,10 @@ def test_the_id_of_a_session_that_is_there_is_not_taken_and_that_of_one_that_was
             opened["gateway"].close()
             opened["gateway"] = thief = zenoh.open(under(sections["viewer"], own))
             assert str(thief.zid()) == own
-            # `log` is everybody's: where that has come, what was sent before it has come too, or never will.
-            logged = opened["operator"].declare_subscriber("log", zenoh.handlers.FifoChannel(100))
-            assert until(lambda: [thief.put(key, "forged") for key in ("joint_states", "log")] and logged.try_recv())
+            # Its own log passes: where that has come, what was sent before it has come too, or never will.
+            logged = opened["operator"].declare_subscriber(read_under("log"), zenoh.handlers.FifoChannel(100))
+            both = ("joint_states", spoken("log", "viewer"))
+            assert until(lambda: [thief.put(key, "forged") for key in both] and logged.try_recv())
             for each in (reader, logged):
                 each.undeclare()
         router.stop()
@@ -304,13 +283,13 @@ def under(section: RouterSection, identity: str) -> zenoh.Config:
 
 
 def test_parameters_are_set_by_everybody_where_the_lock_is_open_and_behind_it_by_the_operator(locked, unlocked):
-    keys = tuple(f"@node/planner/{each}" for each in (*ABOUT, SET))
+    keys = tuple(f"@node/planner/planner/{each}" for each in (*ABOUT, SET))
     assert answered(unlocked, keys) == dict.fromkeys(keys, all_pairs())
     pairs = answered(locked, keys)
-    assert {client for server, client in pairs[f"@node/planner/{SET}"]} == {"operator"}
+    assert {client for server, client in pairs[f"@node/planner/planner/{SET}"]} == {"operator"}
     assert all({server for server, _ in pairs[key]} == {"planner"} for key in keys)
     for each in ABOUT:
-        assert {client for _, client in pairs[f"@node/planner/{each}"]} == set(NAMES) - {"planner"}
+        assert {client for _, client in pairs[f"@node/planner/planner/{each}"]} == set(NAMES) - {"planner"}
 
 
 class Planning(msgspec.Struct, frozen=True, kw_only=True):
@@ -320,12 +299,13 @@ class Planning(msgspec.Struct, frozen=True, kw_only=True):
 def test_a_viewer_changes_a_running_nodes_parameter_only_where_the_lock_is_open(lock, tmp_path):
     def changed_by(router: RouterProcess, sections: dict[str, RouterSection], who: str) -> bool:
         deployment = Deployment(paths=PathsSection(run=str(tmp_path), out=str(tmp_path)))
-        set_one = Request(f"@node/planner/{SET}", SetParameter, Parameter, "planner", "")
         planner = Node("planner", deployment, robot="rm1", bus=ZenohBus(sections["planner"], "rm1"))
         client = ZenohBus(sections[who], "rm1")
         parameters = planner.parameters(Planning)
         with planner, closing(client), spinning(planner), suppress(NoAnswer):
-            requests.call(client, set_one, SetParameter(name="planning_time", value=0.1), timeout=2.0)
+            requests.call(
+                client, parameter_request("planner"), SetParameter(name="planning_time", value=0.1), timeout=2.0
+            )
         return parameters.value.planning_time == 0.1
 
     locked, unlocked = LockedRouter(tmp_path / "locked", lock), RouterProcess(tmp_path / "open")
@@ -348,11 +328,12 @@ def test_a_viewers_flood_reaches_keys_of_others_only_where_the_lock_is_open(lock
         counts: Counter[str] = Counter()
         with sessions({name: sections[name] for name in ("gateway", "planner", "operator")}) as opened:
             declared: list[object] = [
-                opened[name].declare_subscriber(key, lambda sample, key=key: counts.update((key,)))
+                opened[name].declare_subscriber(read_under(key), lambda sample, key=key: counts.update((key,)))
                 for name, key in (("operator", hostile.OWN), ("gateway", FOREIGN[0]), ("operator", FOREIGN[1]))
             ]
             for name, key in zip(("planner", "planner", "gateway"), hostile.ASKED, strict=True):
-                declared.append(opened[name].declare_queryable(key, lambda query, key=key: counts.update((key,))))
+                wire = served_under(key)
+                declared.append(opened[name].declare_queryable(wire, lambda query, key=key: counts.update((key,))))
             flood = subprocess.Popen(
                 [sys.executable, "-m", "tests.stack.hostile", "flood"], cwd=ROOT, stdout=subprocess.DEVNULL,
                 env=os.environ | environ,
@@ -398,7 +379,7 @@ def test_a_late_joiner_gets_what_is_latched_behind_the_lock_and_what_it_missed_o
     router.start()
     assert until(lambda: arrived[-1][1] == b"while the router was away", 10.0), arrived
     assert not any(payload == b"forged" for _, payload in arrived)
-    gateway.declare_alive("@alive/stepper_gateway")
+    gateway.declare_alive("@alive/gateway/stepper_gateway")
     assert until(lambda: robots_on(router.section("viewer"), "stepper_gateway") == ("rm1",))
     for bus in (gateway, viewer, planner):
         bus.close()

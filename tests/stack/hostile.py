@@ -19,6 +19,7 @@ from schemas.roles import role
 from schemas.topics import FK, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, JOINT_TARGETS, LOG, PLAN, TOPICS
 from services.bench.traffic import GOAL
 from services.runtime.actions.keys import goal_request
+from services.runtime.bus.branches import asked_under, read_under, written_under
 from services.runtime.bus.zenoh_config import client_config
 from services.runtime.deployment import load_deployment
 from services.runtime.permissions import permissions
@@ -33,9 +34,10 @@ NOTHING = zenoh.handlers.Callback(lambda reply: None, lambda: None, indirect=Fal
 
 def flood(session: zenoh.Session) -> None:
     payload = b"x" * SIZE + str(GOAL.goal_id).encode()
-    puts: list[Callable[[], object]] = [partial(session.put, key, payload) for key in (OWN, *FOREIGN, OWN)]
+    own = written_under(OWN, "viewer", "hostile")
+    puts: list[Callable[[], object]] = [partial(session.put, key, payload) for key in (own, *FOREIGN, own)]
     asks: list[Callable[[], object]] = [
-        partial(session.get, key, NOTHING, payload=payload, timeout=0.5) for key in ASKED
+        partial(session.get, asked_under(key, "viewer"), NOTHING, payload=payload, timeout=0.5) for key in ASKED
     ]
     sends = cycle([*puts, *puts, *asks])
     began, sent, said = time.monotonic(), 0, 0
@@ -60,7 +62,7 @@ def stalled(session: zenoh.Session) -> None:
 
     # Direct: else a thread of Zenoh's own reads on, until a queue for each key is full.
     reads = zenoh.handlers.Callback(on_sample, lambda: None, indirect=False)
-    declared = [session.declare_subscriber(topic.key, reads) for topic in TOPICS if topic.key in may]
+    declared = [session.declare_subscriber(read_under(topic.key), reads) for topic in TOPICS if topic.key in may]
     has_heard.wait()
     print(len(declared), flush=True)
     never.wait()

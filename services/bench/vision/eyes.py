@@ -20,8 +20,8 @@ from msgspec.structs import replace
 from schemas.camera import CameraImage
 from schemas.cell import VirtualSource
 from schemas.joints import JointState
-from schemas.system import Parameter, SetParameter
-from schemas.topics import Request, camera_detections, camera_image
+from schemas.system import SetParameter
+from schemas.topics import camera_detections, camera_image
 from services.arm.cell.camera_model import exact_info
 from services.arm.cell.cell_file import load_cell
 from services.bench.figures import Figure, NotMeasured, of_samples, quantile
@@ -30,10 +30,11 @@ from services.bench.stack import Stacks, cpu_seconds, families
 from services.camera.virtual.virtual_camera import VirtualCamera
 from services.camera.virtual.world import CameraWorld
 from services.runtime.deployment import load_deployment
+from services.runtime.endpoints import parameter_request
 from services.runtime.node import Node
 from services.stack.stack import Stack
 
-SET_RATE = Request("@node/detector/parameters/set", SetParameter, Parameter, "detector", "", recorded=False)
+SET_RATE = parameter_request("detector")
 PROCESSES = ("router", "camera", "detector")
 RATE, USUAL = 15.0, 4.0  # [Hz] of the camera, and of the images that the detector looks at unless it is told
 IMAGES = 30  # that are stored

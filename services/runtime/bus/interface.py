@@ -17,7 +17,10 @@ ENCODING = "application/msgpack"  # the schema's name follows after a semicolon
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """One message as it came: `schema` and `writer` (a node's name) are empty where the sender named none."""
+    """One message as it came: `schema` and `writer` (a node's name) are empty where the sender named none.
+
+    Of a key that every node writes, `writer` is the node's address as the key has it (branches.py), else as it says.
+    """
 
     key: str
     schema: str
@@ -47,7 +50,12 @@ class Query(Protocol):
 
     @property
     def client(self) -> str:
-        """The session that asks, as it says itself; empty where it does not say."""
+        """The session that asks, by a name that it alone can give; empty where it does not say."""
+        ...
+
+    @property
+    def principal(self) -> str:
+        """Who asks by the certificate, as the router has verified it (branches.py)."""
         ...
 
     @property
@@ -92,6 +100,11 @@ class Bus(Protocol):
     @property
     def certificate(self) -> str:
         """The file that tells the router the role of this process; empty where it asks for none."""
+        ...
+
+    @property
+    def common_name(self) -> str:
+        """The common name of that certificate; empty without one."""
         ...
 
     def require_reconnection(self) -> None:
@@ -151,7 +164,10 @@ class Bus(Protocol):
         ...
 
     def watch_alive(self, key: str, on_change: Callable[[bool], None]) -> Declaration:
-        """`on_change(True)` when the token `key` is there or comes, `on_change(False)` when it vanishes."""
+        """`on_change(True)` when the token `key` is there or comes, `on_change(False)` when it vanishes.
+
+        A token with a wildcard in its key is none of them.
+        """
         ...
 
     def alive(self, pattern: str) -> set[str]:

@@ -40,6 +40,10 @@ class MemoryBus:
     def certificate(self) -> str:
         return ""
 
+    @property
+    def common_name(self) -> str:
+        return ""
+
     def require_reconnection(self) -> None:
         pass
 

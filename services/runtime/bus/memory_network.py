@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from schemas.topics import Delivery
+from services.runtime.bus.branches import LOCAL
 from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Query
 
 KEPT = 1024  # messages that wait for the network to come back, as in Zenoh's publishers' cache
@@ -116,6 +117,8 @@ class MemoryWatch:
 
 class MemoryQuery:
     """A request on its way; the first answer counts, and after the time-out none does."""
+
+    principal = LOCAL
 
     def __init__(
         self, arrival: Arrival, client: str, number: int, timeout: float, on_answer: Callable[[BusReply | None], None]

@@ -8,10 +8,12 @@ writer, and recovery by the reader, so that a router that restarts costs nothing
 from __future__ import annotations
 
 import itertools
+import secrets
 import socket
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import zenoh
 import zenoh.ext as zx
@@ -23,11 +25,22 @@ from schemas.device import DeviceEvent, GatewayInputs
 from schemas.planning import AnswerInputs, PlanInputs
 from schemas.system import Exchange, LogRecord, NodeStatistics
 from schemas.topics import Delivery
+from services.credentials.common_name import common_name
+from services.runtime.bus.branches import (
+    LOCAL,
+    asked_under,
+    is_by_every_node,
+    principal_of,
+    read_under,
+    writer_at,
+    written_under,
+)
 from services.runtime.bus.dead_links import end_dead_links
 from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Query
 from services.runtime.bus.pace import Pace
 from services.runtime.bus.zenoh_config import client_config
 from services.runtime.bus.zenoh_declarations import (
+    MAX_SECRET,
     ServerMonitor,
     ZenohDeclaration,
     ZenohPublication,
@@ -72,7 +85,8 @@ class ZenohBus:
         self._watches: list[object] = []
         self._session = self._open()
         self._urgent_session: zenoh.Session | None = None
-        self._name = str(self._session.zid())
+        self._common_name = common_name(Path(router.certificate)) if router.tls else ""
+        self._secret = secrets.token_hex(MAX_SECRET // 2)
         self._numbers = itertools.count(1)
         self._disconnected_since: float | None = None  # [s] monotonic
         self._tokens: list[ZenohDeclaration] = []
@@ -105,6 +119,10 @@ class ZenohBus:
     def certificate(self) -> str:
         return self._router.certificate if self._router.tls else ""
 
+    @property
+    def common_name(self) -> str:
+        return self._common_name
+
     def require_reconnection(self) -> None:
         if self.is_connected or not router_answers(self._router.host, self._router.port, timeout=0.1):
             self._disconnected_since = None
@@ -115,6 +133,7 @@ class ZenohBus:
 
     def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> ZenohPublication:
         encoding = encoding_of(schema)
+        key = written_under(key, principal_of(writer, self._common_name), writer)
         if delivery is Delivery.LATEST:
             drop = zenoh.CongestionControl.DROP
             plain = self._session.declare_publisher(key, encoding=encoding, congestion_control=drop)
@@ -140,14 +159,17 @@ class ZenohBus:
         on_miss: Callable[[int], None],
         own: bool = False,
     ) -> ZenohDeclaration:
+        is_branched, read = is_by_every_node(key), read_under(key)
+
         def on_sample(sample: zenoh.Sample) -> None:
-            on_arrival(Arrival(key, schema_in(sample.encoding), bytes(sample.payload), writer_in(sample)))
+            writer = (writer_at(str(sample.key_expr)) or "") if is_branched else writer_in(sample)
+            on_arrival(Arrival(key, schema_in(sample.encoding), bytes(sample.payload), writer))
 
         origin = zenoh.Locality.ANY if own else zenoh.Locality.REMOTE
         if delivery is Delivery.LATEST:
-            return ZenohDeclaration(self._session.declare_subscriber(key, on_sample, allowed_origin=origin))
+            return ZenohDeclaration(self._session.declare_subscriber(read, on_sample, allowed_origin=origin))
         latched = delivery is Delivery.LATCHED
-        said_before = {} if latched else self._newest(key)
+        said_before = {} if latched else self._newest(read)
 
         def on_news(sample: zenoh.Sample) -> None:
             # Recovery would hand a late joiner the writer's whole cache, which was never meant for it.
@@ -157,7 +179,7 @@ class ZenohBus:
 
         subscriber = zx.declare_advanced_subscriber(
             self._session,
-            key,
+            read,
             on_sample if latched else on_news,
             allowed_origin=origin,
             history=zx.HistoryConfig(detect_late_publishers=True, max_samples=1) if latched else None,
@@ -194,7 +216,7 @@ class ZenohBus:
         with self._lock:
             monitor = self._monitors.get(key)
             if monitor is None:
-                monitor = self._monitors[key] = ServerMonitor(self._session, key)
+                monitor = self._monitors[key] = ServerMonitor(self._session, self._asked_under(key))
         return monitor.wait(timeout)
 
     def take_number(self) -> int:
@@ -231,7 +253,7 @@ class ZenohBus:
             self._pace.wait_for_turn()
         asked = time.monotonic()
         self._session.get(
-            key,
+            self._asked_under(key),
             # Direct: else Zenoh starts a thread for each request, which costs ten times as much as the request itself.
             Callback(on_reply, on_end, indirect=False),
             payload=payload,
@@ -241,8 +263,11 @@ class ZenohBus:
             consolidation=zenoh.ConsolidationMode.NONE,
             priority=zenoh.Priority.REAL_TIME if urgent else zenoh.Priority.DATA,
             express=urgent,
-            attachment=asked_by(self._name, number),
+            attachment=asked_by(self._secret, number),
         )
+
+    def _asked_under(self, key: str) -> str:
+        return asked_under(key, self._common_name or LOCAL)
 
     def declare_alive(self, key: str) -> ZenohDeclaration:
         token = ZenohDeclaration(self._session.liveliness().declare_token(key))
@@ -251,7 +276,8 @@ class ZenohBus:
 
     def watch_alive(self, key: str, on_change: Callable[[bool], None]) -> ZenohDeclaration:
         def on_sample(sample: zenoh.Sample) -> None:
-            on_change(sample.kind == zenoh.SampleKind.PUT)
+            if str(sample.key_expr) == key:  # a wildcard token stands for this one too, and says nothing of it
+                on_change(sample.kind == zenoh.SampleKind.PUT)
 
         return ZenohDeclaration(self._session.liveliness().declare_subscriber(key, on_sample, history=True))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import threading
 import traceback
 from collections.abc import Callable
@@ -12,9 +13,11 @@ from typing import Any, Protocol
 import zenoh
 from zenoh.handlers import FifoChannel, Handler, RingChannel
 
+from services.runtime.bus.branches import asker_at, served_under
 from services.runtime.bus.interface import ENCODING, Arrival
 
-MAX_CLIENT_NAME = 32  # [bytes] of what a client says of itself
+MAX_SECRET = 32  # [bytes] of what a session says of itself
+CLIENT_BYTES = 16  # of a client's name; chosen: as unguessable as the secret
 MAX_DIGITS = 18  # of the number of a request
 QUERIES = 1024  # of one key that wait for Python; chosen: a client's burst (requests/limits.py) fits
 
@@ -47,9 +50,10 @@ class ZenohDeclaration:
 class ZenohQuery:
     """A query that is finalised by its one reply."""
 
-    def __init__(self, query: zenoh.Query, key: str) -> None:
-        self._query, self._key = query, key
-        self.client, self.number = asker(bytes(query.attachment or b""))
+    def __init__(self, query: zenoh.Query, key: str, principal: str) -> None:
+        """`key` is what is served, `principal` who asks."""
+        self._query, self._key, self.principal = query, key, principal
+        self.client, self.number = asker(bytes(query.attachment or b""), principal)
 
     @cached_property
     def arrival(self) -> Arrival:
@@ -57,7 +61,7 @@ class ZenohQuery:
 
     def reply(self, schema: str, payload: bytes) -> None:
         with self._query as query:
-            query.reply(self._key, payload, encoding=encoding_of(schema))
+            query.reply(query.key_expr, payload, encoding=encoding_of(schema))
 
     def fail(self, schema: str, payload: bytes) -> None:
         with self._query as query:
@@ -78,7 +82,7 @@ class ZenohQueryable:
     def __init__(self, session: zenoh.Session, key: str, on_query: Callable[[ZenohQuery], None], urgent: bool) -> None:
         self._key, self._on_query = key, on_query
         channel: Any = FifoChannel(QUERIES) if urgent else RingChannel(QUERIES)
-        self._queryable: Any = session.declare_queryable(key, channel, complete=True)
+        self._queryable: Any = session.declare_queryable(served_under(key), channel, complete=True)
         self._thread = threading.Thread(target=self._run, args=(self._queryable.handler,), daemon=True, name=key)
         self._thread.start()
 
@@ -100,13 +104,16 @@ class ZenohQueryable:
 
     def _hand_over(self, query: zenoh.Query) -> None:
         try:
-            self._on_query(ZenohQuery(query, self._key))
+            if (principal := asker_at(str(query.key_expr))) is None:  # it asks in the name of many
+                with query:
+                    return
+            self._on_query(ZenohQuery(query, self._key, principal))
         except Exception:
             traceback.print_exc()
 
 
 class ServerMonitor:
-    """Monitors whether a node serves a key."""
+    """Monitors whether a node serves what is asked for under `key`."""
 
     def __init__(self, session: zenoh.Session, key: str) -> None:
         self._served = threading.Event()
@@ -126,15 +133,22 @@ class ServerMonitor:
         return self._served.wait(timeout)
 
 
-def asked_by(client: str, number: int) -> bytes:
-    """What goes with a request: the session that asks, and the number of the request."""
-    return f"{client}:{number}".encode()
+def asked_by(secret: str, number: int) -> bytes:
+    """What goes with a request: the secret of the session that asks, and the number of the request."""
+    return f"{secret}:{number}".encode()
 
 
-def asker(attached: bytes) -> tuple[str, int]:
-    """The client that asks, by a name that any bytes give, and the number of its request, 0 where there is none."""
-    name, _, number = attached[: MAX_CLIENT_NAME + 1 + MAX_DIGITS].partition(b":")
-    return name[:MAX_CLIENT_NAME].hex(), int(number) if number.isdigit() else 0
+def asker(attached: bytes, principal: str) -> tuple[str, int]:
+    """The client that asks, empty where it names none, and the number of its request, 0 where there is none.
+
+    The client is a hash of the session's secret: who reads it in a recording or an answer cannot ask in its name, and
+    a server that has read the secret can do so with its own certificate alone, which makes it another client.
+    """
+    secret, _, number = attached[: MAX_SECRET + 1 + MAX_DIGITS].partition(b":")
+    if not secret:
+        return "", 0
+    digest = hashlib.blake2b(secret[:MAX_SECRET], digest_size=CLIENT_BYTES, key=principal.encode()[:64]).hexdigest()
+    return digest, int(number) if number.isdigit() else 0
 
 
 def encoding_of(schema: str) -> zenoh.Encoding:

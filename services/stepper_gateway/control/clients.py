@@ -8,8 +8,11 @@ from typing import NamedTuple
 
 from services.stepper_gateway.goals.rejections import invalid
 
-# `@id/<node>/<start [ns]>.<pid>.<host>` (services/runtime/bus/identity.py); nothing in it that a key gives a meaning.
-TOKEN = re.compile(r"@id/([a-z0-9][a-z0-9_-]{0,63})/[0-9]{20}\.[0-9]{1,10}\.([A-Za-z0-9_-]{1,64})")
+# `@id/<principal>/<node>/<start [ns]>.<pid>.<host>` (services/runtime/bus/identity.py); nothing that a key
+# gives a meaning. Recordings of before have no principal.
+TOKEN = re.compile(
+    r"@id/(?:[a-z0-9][a-z0-9_.-]{0,95}/)?([a-z0-9][a-z0-9_-]{0,63})/[0-9]{20}\.[0-9]{1,10}\.([A-Za-z0-9_-]{1,64})"
+)
 
 
 class MotionCaller(NamedTuple):

@@ -1,0 +1,33 @@
+"""The common name of a certificate, read from its own bytes (DER; RFC 5280, 4.1.2.6)."""
+
+from __future__ import annotations
+
+import ssl
+from pathlib import Path
+
+from services.credentials.expiry import CERTIFICATE, VERSION, elements
+from services.credentials.private_files import AccessError
+
+COMMON_NAME = b"\x55\x04\x03"  # 2.5.4.3
+
+
+def common_name(file: Path) -> str:
+    """Of the first certificate in a PEM file, empty if it has none; raises `AccessError`."""
+    try:
+        found = CERTIFICATE.search(file.read_text(encoding="ascii"))
+        return _common_name(ssl.PEM_cert_to_DER_cert(found[0])) if found else ""
+    except OSError as error:
+        raise AccessError(f"cannot read {file}: {error.strerror}") from None
+    except (ValueError, IndexError, StopIteration):
+        raise AccessError(f"{file} holds no certificate in PEM: `gemelo deploy keys` makes it") from None
+
+
+def _common_name(der: bytes) -> str:
+    (_, signed), *_ = elements(next(elements(der))[1])
+    _, _, _, _, (_, subject), *_ = (each for each in elements(signed) if each[0] != VERSION)
+    for _, named in elements(subject):
+        for _, pair in elements(named):
+            (_, kind), (_, text) = elements(pair)
+            if kind == COMMON_NAME:
+                return text.decode()
+    return ""
