@@ -102,7 +102,7 @@ def test_what_is_no_name_and_no_wildcard_has_an_address(principal: str, node: st
     if address is not None:
         assert not set("*$?#/ ") & set(principal + node)
     assert address_of("*", "planner") is address_of("viewer", "*") is address_of("**", "cli-1") is None
-    assert writer_at("rm1/log/@by/*/planner") is None
+    assert writer_at("rm1/log/by/*/planner") is None
 
 
 def borne(opened: Sessions) -> dict[str, set[str]]:
@@ -242,7 +242,7 @@ def test_forged_statistics_and_logs_are_nobodys_behind_the_lock(
         ):
             logger.subscribe(STATISTICS, lambda message: heard.append(message.node))
             session = opened["viewer.desk"]
-            branched = {f"statistics/@by/{branch}": node for branch, node in (
+            branched = {f"statistics/by/{branch}": node for branch, node in (
                 ("gateway/stepper_gateway", "stepper_gateway"), ("viewer.desk/stepper_gateway", "stepper_gateway"),
                 ("viewer.desk/cli-1", "stepper_gateway"), ("operator.desk/cli-2", "cli-2"), ("viewer.desk/*", "cli-3"),
                 ("viewer.desk/cli-4", "cli-4"),
@@ -260,7 +260,7 @@ def test_forged_statistics_and_logs_are_nobodys_behind_the_lock(
 
     assert believed(unlocked) == {"stepper_gateway", "cli-2", "cli-4"}
     assert believed(locked) == {"cli-4"}
-    assert read_under("statistics") == "statistics/@by/*/*"
+    assert read_under("statistics") == "statistics/by/*/*"
 
 
 def test_people_of_one_role_find_one_another_by_their_certificates(locked: Sections, tmp_path: Path) -> None:

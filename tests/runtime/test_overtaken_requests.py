@@ -23,13 +23,13 @@ from services.runtime.bus.zenoh_declarations import CLIENT_BYTES, MAX_SECRET, as
 from services.runtime.errors import NoAnswer, RequestRefused
 from services.runtime.node import Node
 from services.runtime.requests.limits import RequestRates
-from services.runtime.requests.overtaken import MOST_CLIENTS, OvertakenRequests
+from services.runtime.requests.overtaken import MOST_CLIENTS, MOST_JUMP, OvertakenRequests
 from services.runtime.requests.server import Pending
 from tests.runtime.support import Buses, spinning, until
 
 GOAL = keys.goal_request(FOLLOW).key
 NO_GOAL = msgspec.Raw(encode(FollowJointTrajectoryGoal()))
-numbers = st.integers(1, 10**12)
+numbers = st.integers(1, MOST_JUMP)
 
 
 @given(st.lists(numbers, min_size=1), numbers)
@@ -56,6 +56,17 @@ def test_the_newest_stop_of_the_last_clients_is_kept() -> None:
     assert not requests.refusal("client 0", 9, 1.0)
     kept = sum(bool(requests.refusal(f"client {name}", 9, 1.0)) for name in range(10 * MOST_CLIENTS))
     assert kept + 1 == MOST_CLIENTS  # with the operator
+
+
+@given(st.integers(MOST_JUMP + 1, 10**18 - 1), st.integers(1, 1000))
+def test_a_number_far_above_all_before_refuses_nothing_for_good(number: int, own: int) -> None:
+    requests = OvertakenRequests("goal")
+    assert not requests.refusal("a", own, 0.0)
+    requests.stop("stop", {"a": own + number}, 1.0)
+    assert requests.refusal("a", own + 1, 0.5)  # it had arrived by then
+    assert not requests.refusal("a", own + 1, 2.0)
+    requests.stop("stop", {"a": own + 3}, 3.0)
+    assert requests.refusal("a", own + 2, 4.0)
 
 
 SECRETS = st.text("0123456789abcdef", min_size=1, max_size=MAX_SECRET)
@@ -85,7 +96,7 @@ class SoMany(RequestRates):
 
     left = 1000
 
-    def permit_request(self, client: str, urgent: bool = False) -> bool:
+    def permit_request(self, principal: str, client: str, urgent: bool = False) -> bool:
         """Urgent ones are counted with the others."""
         self.left -= 1
         return self.left >= 0

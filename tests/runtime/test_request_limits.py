@@ -21,12 +21,20 @@ from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.bus.zenoh_declarations import QUERIES
 from services.runtime.errors import NoAnswer
 from services.runtime.node import Node
+from services.runtime.requests import limits
 from services.runtime.requests.limits import (
+    KNOWN_AFTER,
     MAX_CLIENTS,
+    MAX_PRINCIPALS,
+    MAX_WAITING,
     MAX_WAITING_OF_A_CLIENT,
+    MAX_WAITING_OF_A_PRINCIPAL,
     OF_A_CLIENT,
+    OF_A_PRINCIPAL,
+    OF_NEWCOMERS,
     OF_REFUSALS,
     RequestRates,
+    WaitingRequests,
 )
 from services.runtime.requests.server import REPEAT
 from tests.runtime.support import Buses, RouterProcess, hear, spinning, until
@@ -34,12 +42,68 @@ from tests.runtime.support import Buses, RouterProcess, hear, spinning, until
 Answers = list[BusReply | None]
 
 
-def test_clients_that_change_their_names_share_one_rate() -> None:
-    rates = RequestRates(Rate(0.0, 10))
-    for number in range(MAX_CLIENTS):
-        assert rates.permit_request(f"client {number}")
-    assert sum(rates.permit_request(f"another {number}") for number in range(100)) == 10
-    assert rates.permit_request("client 0")
+class Clock:
+    """[s] monotonic, as a test sets it."""
+
+    now = 100.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(limits, "time", clock)
+    return clock
+
+
+@pytest.mark.parametrize("urgent", [False, True])
+def test_a_flood_under_ever_new_names_gets_what_one_client_gets(clock: Clock, urgent: bool) -> None:
+    rates, seconds = RequestRates(), 10
+    for _ in range(2):  # known from the second time on
+        assert rates.permit_request("viewer.desk", "known", urgent)
+        clock.now += KNOWN_AFTER
+    permitted = 0
+    for number in range(seconds * 5000):
+        clock.now += 1 / 5000
+        permitted += rates.permit_request("viewer.desk", f"forged {number}", urgent)
+        if number % 5000 == 0:  # whoever was there before is not touched, nor those of other certificates
+            assert rates.permit_request("viewer.desk", "known", urgent)
+            assert rates.permit_request("operator.desk", f"gemelo stop {number}", urgent)
+    assert permitted <= OF_NEWCOMERS.burst / (1 - OF_NEWCOMERS.per_second / 5000) + (
+        OF_NEWCOMERS.per_second * seconds if urgent else 0
+    )
+
+
+def test_clients_that_were_known_before_they_flood_get_three_times_what_one_gets(clock: Clock) -> None:
+    rates, seconds, names = RequestRates(), 10, 2 * MAX_CLIENTS
+    for number in range(names):
+        clock.now += 1 / OF_NEWCOMERS.per_second
+        rates.permit_request("viewer.desk", f"client {number}")
+    clock.now += KNOWN_AFTER
+    permitted = 0
+    for number in range(seconds * 5000):
+        clock.now += 1 / 5000
+        permitted += rates.permit_request("viewer.desk", f"client {number % names}")
+    assert permitted <= OF_A_PRINCIPAL.burst + OF_A_PRINCIPAL.per_second * seconds + 1
+    assert rates.permit_request("operator.desk", "gemelo move")
+
+
+def test_principals_without_end_share_one_place(clock: Clock) -> None:
+    rates = RequestRates()
+    permitted = sum(rates.permit_request(f"viewer.host{number}", "a") for number in range(100 * MAX_PRINCIPALS))
+    assert permitted <= 2 * MAX_PRINCIPALS + OF_NEWCOMERS.burst
+
+
+def test_requests_that_wait_under_forged_names_leave_room_for_other_certificates() -> None:
+    waiting = WaitingRequests("plan")
+    refused = [waiting.refusal("viewer.desk", f"forged {number}") for number in range(2 * MAX_WAITING)]
+    assert refused.count("") == MAX_WAITING_OF_A_PRINCIPAL
+    assert 'all of clients with the certificate "viewer.desk"' in refused[-1]
+    assert not waiting.refusal("operator.desk", "a")
+    waiting.leave("viewer.desk", "forged 0")
+    assert not waiting.refusal("viewer.desk", "another")
 
 
 def ask(client: Bus, key: str, question: Message, answers: Answers) -> None:
@@ -86,7 +150,7 @@ def test_what_a_client_asks_above_its_rate_is_dropped_counted_and_said_once(
     assert flood[:20] == [UNREAD] * 20
     assert all(answer is not None and answer.ok for answer in flood[20:] + answers)
     assert dropped(server, PLAN.key) == 20
-    assert capsys.readouterr().err.count("of one client: nothing of it is read until") == 1
+    assert capsys.readouterr().err.count("of one client, or of newcomers (local): nothing of it is read until") == 1
 
 
 def test_a_caller_above_the_rate_hears_at_once_of_how_much_is_taken(buses: Buses) -> None:

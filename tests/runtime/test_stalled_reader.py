@@ -73,8 +73,12 @@ def longest_silences(router: RouterProcess) -> dict[str, float]:
         note = partial(_note, heard[topic.key])
         operator.subscribe(topic.key, topic.delivery, note, lambda missed: None)
     states, much, other = (
-        bus.publish(topic.key, topic.message.__name__, topic.delivery)
-        for bus, topic in ((gateway, JOINT_STATES), (gateway, LOG), (planner, STATISTICS))
+        bus.publish(topic.key, topic.message.__name__, topic.delivery, writer)
+        for bus, topic, writer in (
+            (gateway, JOINT_STATES, "stepper_gateway"),
+            (gateway, LOG, "stepper_gateway"),
+            (planner, STATISTICS, "planner"),
+        )
     )
     with closing(gateway), closing(planner), closing(operator), stalled(router) as has_stopped:
         assert until(lambda: states.put(b"") or (heard[JOINT_STATES.key] and has_stopped.is_set()), 30.0)

@@ -14,7 +14,8 @@ from schemas.roles import BY_EVERY_NODE, ROLE_OF_NODE, ROLES
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")  # of a node
 PRINCIPAL = re.compile(r"[a-z0-9][a-z0-9_-]*(?:\.[a-z0-9][a-z0-9_-]*)?")
 LOCAL = "local"  # the principal of a session without a certificate
-BY, FROM = "@by", "@from"
+# Zenoh recovers what a reader has missed only of keys without a chunk that begins with `@` (1.10.2).
+BY, FROM = "by", "@from"
 
 _OF_SERVICES = frozenset(role.name for role in ROLES if role.node)
 _BY_EVERY_NODE = frozenset(topic.key for topic in BY_EVERY_NODE)

@@ -207,7 +207,7 @@ class ZenohBus:
         if urgent and self._urgent_session is None:
             self._urgent_session = self._open()
         session = self._urgent_session if urgent and self._urgent_session else self._session
-        queryable = ZenohQueryable(session, key, on_query, urgent)
+        queryable = ZenohQueryable(session, key, on_query, urgent, is_verified=bool(self._common_name))
         self._queryables.append(queryable)
         return queryable
 

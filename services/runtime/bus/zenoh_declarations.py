@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import zenoh
 from zenoh.handlers import FifoChannel, Handler, RingChannel
 
-from services.runtime.bus.branches import asker_at, served_under
+from services.runtime.bus.branches import LOCAL, asker_at, served_under
 from services.runtime.bus.interface import ENCODING, Arrival
 
 MAX_SECRET = 32  # [bytes] of what a session says of itself
@@ -79,8 +79,11 @@ class ZenohQueryable:
     that a flood of one key does not delay the others. Of a full channel the oldest query is lost, unless it is urgent.
     """
 
-    def __init__(self, session: zenoh.Session, key: str, on_query: Callable[[ZenohQuery], None], urgent: bool) -> None:
-        self._key, self._on_query = key, on_query
+    def __init__(
+        self, session: zenoh.Session, key: str, on_query: Callable[[ZenohQuery], None], urgent: bool, is_verified: bool
+    ) -> None:
+        """`is_verified`: the router lets everyone ask as its own principal alone; else all are `local`."""
+        self._key, self._on_query, self._is_verified = key, on_query, is_verified
         channel: Any = FifoChannel(QUERIES) if urgent else RingChannel(QUERIES)
         self._queryable: Any = session.declare_queryable(served_under(key), channel, complete=True)
         self._thread = threading.Thread(target=self._run, args=(self._queryable.handler,), daemon=True, name=key)
@@ -107,7 +110,7 @@ class ZenohQueryable:
             if (principal := asker_at(str(query.key_expr))) is None:  # it asks in the name of many
                 with query:
                     return
-            self._on_query(ZenohQuery(query, self._key, principal))
+            self._on_query(ZenohQuery(query, self._key, principal if self._is_verified else LOCAL))
         except Exception:
             traceback.print_exc()
 

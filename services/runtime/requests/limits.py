@@ -1,10 +1,17 @@
-"""The limits of what the clients of one node may ask for: per second, and waiting at a time."""
+"""The limits of what the clients of one node may ask for: per second, and waiting at a time.
+
+A client is what it says of itself, and may give itself another name with each request: so what all clients of one
+principal (bus/branches.py), which the router has verified, may ask together is limited too, and those that were first
+seen a moment ago share one client's limit. A flood under forged names gets no more than one client that floods.
+"""
 
 from __future__ import annotations
 
 import threading
 import time
 from collections import Counter
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from services.runtime.bus.pace import Rate, TokenBucket
 
@@ -13,66 +20,127 @@ from services.runtime.bus.pace import Rate, TokenBucket
 # The burst is what a flood gets before nothing of it is taken, and a plan costs more than its request: of 1,000 plans a
 # second 1,100 were made (1.1 s of processor time, beside any stop), with a burst of 1,000 2,000 of them (1.5 s).
 OF_A_CLIENT = Rate(500.0, 550)  # requests to one node, and as many urgent ones; those above it are dropped unread
+OF_NEWCOMERS = OF_A_CLIENT  # of all clients of one principal together that were first seen less than KNOWN_AFTER ago
+OF_A_PRINCIPAL = Rate(3 * OF_A_CLIENT.per_second, 3 * OF_A_CLIENT.burst)  # of all its clients together
+KNOWN_AFTER = 1.0  # [s] chosen: names that a flood invents do not live so long, and a person's command ends before
 DEBT = 500  # requests above it that count as well: a flood is not carried out in part, which would cost far more
 OF_REFUSALS = Rate(100.0, 1000)  # answers "busy" of one node; the other refusals are dropped without an answer
-MAX_CLIENTS = 256  # whose rates are kept; those that come on top of them share one
+MAX_CLIENTS = 256  # of one principal that are known; those that come on top of them stay newcomers
+MAX_NEWCOMERS = 1024  # chosen: twice as many as OF_NEWCOMERS lets in until they are known
+MAX_PRINCIPALS = 64  # chosen: more than certificates of a site; those that come on top share one place
 
 # Chosen: a script waits for its answers, so few clients ever have more than one request here.
 MAX_WAITING_OF_A_CLIENT = 64  # requests of one client that wait in one server; more are refused
+MAX_WAITING_OF_A_PRINCIPAL = 512  # as well, of all clients of one principal
 MAX_WAITING = 1024  # requests of all clients that wait in one server; more are refused
+
+
+class Newcomer(NamedTuple):
+    """A client that is not known yet."""
+
+    bucket: TokenBucket
+    first_seen: float  # [s] monotonic
+
+
+class PrincipalRates:
+    """The rates of one principal's requests, urgent or not; its clients are told apart by what they say."""
+
+    def __init__(self, of_a_client: Rate, now: float, debt_of_newcomers: int) -> None:
+        """`now` in [s] monotonic; with no debt the newcomers' rate is used to the full, also within a flood."""
+        self._of_a_client = of_a_client
+        self._all = TokenBucket(OF_A_PRINCIPAL, now)
+        self._of_newcomers = TokenBucket(OF_NEWCOMERS, now, debt_of_newcomers)
+        self._known: dict[str, TokenBucket] = {}
+        self._new: dict[str, Newcomer] = {}  # that were permitted; oldest first
+
+    def permit(self, client: str, now: float) -> bool:
+        """True if `client` may ask once more at `now` [s] monotonic."""
+        if client not in self._known:
+            self._promote(client, now)
+        if client in self._known:
+            return self._known[client].take(now) and self._all.take(now)
+        newcomer = self._new.get(client) or Newcomer(TokenBucket(self._of_a_client, now, DEBT), now)
+        if not (newcomer.bucket.take(now) and self._of_newcomers.take(now) and self._all.take(now)):
+            return False
+        self._new[client] = newcomer
+        if len(self._new) > MAX_NEWCOMERS:
+            del self._new[next(iter(self._new))]
+        return True
+
+    def is_idle(self, now: float) -> bool:
+        """True if nothing has been asked for so long that all is as new at `now` [s] monotonic."""
+        return self._all.is_full(now) and self._of_newcomers.is_full(now)
+
+    def _promote(self, client: str, now: float) -> None:
+        """A client that was first seen long enough ago is known from now on, if it has a place."""
+        newcomer = self._new.get(client)
+        if newcomer is None or now - newcomer.first_seen < KNOWN_AFTER:
+            return
+        if len(self._known) >= MAX_CLIENTS:
+            self._known = {each: bucket for each, bucket in self._known.items() if not bucket.is_full(now)}
+        if len(self._known) < MAX_CLIENTS:
+            self._known[client] = self._new.pop(client).bucket
 
 
 class RequestRates:
     """The rates of one node, over all keys that it serves; from any thread."""
 
     def __init__(self, of_a_client: Rate = OF_A_CLIENT, of_refusals: Rate = OF_REFUSALS) -> None:
-        now = time.monotonic()
         self._of_a_client = of_a_client
-        self._refusals = TokenBucket(of_refusals, now)
-        self._others = TokenBucket(of_a_client, now)  # of the clients that have no bucket of their own
-        self._of: dict[tuple[str, bool], TokenBucket] = {}  # by client, and whether of its urgent requests
+        self._refusals = TokenBucket(of_refusals, time.monotonic())
+        self._of: dict[tuple[str, bool], PrincipalRates] = {}  # by principal, and whether of its urgent requests
         self._lock = threading.Lock()
 
-    def permit_request(self, client: str, urgent: bool = False) -> bool:
+    def permit_request(self, principal: str, client: str, urgent: bool = False) -> bool:
         """True if `client` may ask once more now; its urgent requests are counted for themselves."""
-        now, kind = time.monotonic(), (client, urgent)
+        now = time.monotonic()
         with self._lock:
-            bucket = self._of.get(kind) or self._new(kind, now)
-            return bucket.take(now)
+            return self._rates(principal, urgent, now).permit(client, now)
 
     def permit_refusal(self) -> bool:
         """True if one more request may be answered with why it is not carried out."""
         with self._lock:
             return self._refusals.take(time.monotonic())
 
-    def _new(self, kind: tuple[str, bool], now: float) -> TokenBucket:
-        if len(self._of) >= MAX_CLIENTS:
-            self._of = {each: bucket for each, bucket in self._of.items() if not bucket.is_full(now)}
-        if len(self._of) >= MAX_CLIENTS:
-            return self._others
-        return self._of.setdefault(kind, TokenBucket(self._of_a_client, now, DEBT))
+    def _rates(self, principal: str, urgent: bool, now: float) -> PrincipalRates:
+        if (found := self._of.get((principal, urgent))) is not None:
+            return found
+        if len(self._of) >= 2 * MAX_PRINCIPALS:
+            self._of = {each: rates for each, rates in self._of.items() if not rates.is_idle(now)}
+        if len(self._of) >= 2 * MAX_PRINCIPALS:
+            principal = ""
+        # A stop is carried out whatever its rate: a flood of them leaves answers for those who are new in it.
+        return self._of.setdefault((principal, urgent), PrincipalRates(self._of_a_client, now, 0 if urgent else DEBT))
 
 
+@dataclass
 class WaitingRequests:
-    """Counts the waiting requests per client and limits them, so that one client cannot block the others."""
+    """Counts the waiting requests per client and principal and limits them, so that none can block the others."""
 
-    def __init__(self, key: str) -> None:
-        self._key = key
-        self._of: Counter[str] = Counter()
-        self._lock = threading.Lock()
+    key: str
+    _of: Counter[tuple[str, str]] = field(default_factory=Counter, init=False)  # by principal and client
+    _of_principal: Counter[str] = field(default_factory=Counter, init=False)
+    _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
 
-    def refusal(self, client: str) -> str:
+    def refusal(self, principal: str, client: str) -> str:
         """Counts one more request of `client`; returns the reason if its limit is reached, else an empty text."""
         with self._lock:
-            if self._of[client] >= MAX_WAITING_OF_A_CLIENT:
-                return f"{self._key}: {MAX_WAITING_OF_A_CLIENT} requests are waiting already, all of this client"
-            if self._of.total() >= MAX_WAITING:
-                return f"{self._key}: {MAX_WAITING} requests are waiting already"
-            self._of[client] += 1
+            if self._of[principal, client] >= MAX_WAITING_OF_A_CLIENT:
+                return f"{self.key}: {MAX_WAITING_OF_A_CLIENT} requests are waiting already, all of this client"
+            if self._of_principal[principal] >= MAX_WAITING_OF_A_PRINCIPAL:
+                most = f"{MAX_WAITING_OF_A_PRINCIPAL} requests are waiting already"
+                return f'{self.key}: {most}, all of clients with the certificate "{principal}"'
+            if self._of_principal.total() >= MAX_WAITING:
+                return f"{self.key}: {MAX_WAITING} requests are waiting already"
+            self._of[principal, client] += 1
+            self._of_principal[principal] += 1
             return ""
 
-    def leave(self, client: str) -> None:
+    def leave(self, principal: str, client: str) -> None:
         with self._lock:
-            self._of[client] -= 1
-            if self._of[client] <= 0:
-                del self._of[client]
+            self._of[principal, client] -= 1
+            self._of_principal[principal] -= 1
+            if self._of[principal, client] <= 0:
+                del self._of[principal, client]
+            if self._of_principal[principal] <= 0:
+                del self._of_principal[principal]

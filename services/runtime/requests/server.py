@@ -111,8 +111,10 @@ class PendingQuery(Generic[R]):
 class PendingGroup(Generic[R]):
     """Equal requests of any number of callers, answered together."""
 
-    def __init__(self, client: str, on_answered: Callable[[int], None], report: AnswerReport | None) -> None:
-        self.client = client  # the first
+    def __init__(
+        self, client: str, principal: str, on_answered: Callable[[int], None], report: AnswerReport | None
+    ) -> None:
+        self.client, self.principal = client, principal  # of the first
         self._report = report
         self.is_queued = False  # for the event loop
         self.is_new = True  # no timer will queue it
@@ -120,9 +122,10 @@ class PendingGroup(Generic[R]):
         self.asked: dict[str, int] = {}  # also of those that get no answer
         self._on_answered = on_answered
 
-    def note(self, query: Query) -> None:
-        """It asks for the same, whether it will be answered or not."""
-        if len(self.asked) < MAX_ASKERS or query.client in self.asked:
+    def note(self, query: Query, is_answered: bool) -> None:
+        """It asks for the same; those that are above their rate leave room for the others."""
+        most = MAX_ASKERS if is_answered else MAX_ASKERS // 2
+        if len(self.asked) < most or query.client in self.asked:
             self.asked[query.client] = max(query.number, self.asked.get(query.client, 0))
 
     def join(self, query: Query) -> None:
@@ -195,9 +198,9 @@ class RequestServer(Generic[Q, R]):
 
     def _on_query(self, query: Query) -> None:
         """Nothing of a request is read before its client may ask at all."""
-        if not self._rates.permit_request(query.client):
+        if not self._rates.permit_request(query.principal, query.client):
             self._drop(query)
-        elif refusal := self._waiting.refusal(query.client):
+        elif refusal := self._waiting.refusal(query.principal, query.client):
             self._refuse(query, refusal)
         else:
             arrived = time.monotonic()
@@ -209,7 +212,8 @@ class RequestServer(Generic[Q, R]):
         if self._dropped == 1:
             most = f"more than {OF_A_CLIENT.per_second:g} requests a second to this node"
             said = "nothing of it is read until it asks for less (further ones are only counted)"
-            self._warn(f"{self.request.key}: {most} of one client: {said}")
+            whose = f"of one client, or of newcomers ({query.principal})"
+            self._warn(f"{self.request.key}: {most} {whose}: {said}")
 
     def _refuse(self, query: Query, reason: str) -> None:
         self._refused += 1
@@ -219,7 +223,7 @@ class RequestServer(Generic[Q, R]):
             query.drop()
 
     def _take(self, query: Query, arrived: float) -> None:
-        self._waiting.leave(query.client)
+        self._waiting.leave(query.principal, query.client)
         question = self._question(query)
         if question is None:
             return
@@ -285,7 +289,7 @@ class UrgentServer(RequestServer[Q, R]):
         if question is None:
             return
         self._last = (arrival, question)
-        is_answered = self._rates.permit_request(query.client, urgent=True)
+        is_answered = self._rates.permit_request(query.principal, query.client, urgent=True)
         if refusal := self._join(question, query, is_answered):
             self._refuse(query, refusal)
         elif not is_answered:
@@ -296,11 +300,11 @@ class UrgentServer(RequestServer[Q, R]):
         with self._lock:
             group = self._groups.get(question)
             if group is None:
-                if refusal := self._waiting.refusal(query.client):
+                if refusal := self._waiting.refusal(query.principal, query.client):
                     return refusal
                 report = self._report(encode(question), time.monotonic())
-                group = self._groups[question] = PendingGroup(query.client, self._answered, report)
-            group.note(query)
+                group = self._groups[question] = PendingGroup(query.client, query.principal, self._answered, report)
+            group.note(query, is_answered)
             self._queue(question, group, is_answered)
             self._received += 1
             if not is_answered:
@@ -330,7 +334,7 @@ class UrgentServer(RequestServer[Q, R]):
     def _take_group(self, question: Q) -> None:
         with self._lock:
             group = self._groups.pop(question)
-            self._waiting.leave(group.client)
+            self._waiting.leave(group.principal, group.client)
             if len(self._taken) >= MAX_TAKEN:
                 self._taken.clear()
             self._taken[question] = time.monotonic()
