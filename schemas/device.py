@@ -78,6 +78,7 @@ class DeviceState(Message, frozen=True, kw_only=True):
     refused: int = 0  # chunks and commands that the device has refused since boot
     bad_frames: int = 0
     round_trip: float = 0.0  # [s] latest clock synchronisation
+    round_trip_age: float = 0.0  # [s] since that was measured: since the device has answered a question
 
 
 class DeviceEvent(Message, frozen=True, kw_only=True):

@@ -117,6 +117,8 @@ void gemelo_stand_still(VirtualDevice* device, uint64_t until_us) { device->stan
 
 void gemelo_halt(VirtualDevice* device) { device->machine().halt(); }
 
+int gemelo_subscribes_anew(VirtualDevice* device, uint64_t now_us) { return device->machine().subscribes_anew(now_us); }
+
 void gemelo_report_status(VirtualDevice* device) { device->machine().report_status(); }
 
 // The oldest output's size, or -1 for none; taken out of the queue only if `capacity` suffices.

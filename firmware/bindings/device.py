@@ -182,6 +182,10 @@ class CoreDevice:
         """Say `status` again, as after a reconnection."""
         self._library.gemelo_report_status(self._handle)
 
+    def subscribes_anew(self) -> bool:
+        """True where the device has received no heartbeat for so long that its platform is to subscribe anew."""
+        return bool(self._library.gemelo_subscribes_anew(self._handle, self.now_us))
+
     def trace(self, on: bool = True) -> None:
         """Record every change of a pin from now on."""
         self._library.gemelo_trace(self._handle, on)

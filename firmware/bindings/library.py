@@ -119,6 +119,7 @@ def load_library(path: Path = LIBRARY) -> c.CDLL:
         "advance": (None, [device, u64]),
         "halt": (None, [device]),
         "report_status": (None, [device]),
+        "subscribes_anew": (c.c_int, [device, u64]),
         "take": (c.c_int64, [device, u8, u8, size]),
         "snapshot": (None, [device, c.POINTER(SnapshotRecord)]),
         "trace": (None, [device, c.c_int]),

@@ -133,7 +133,8 @@ void Machine::watch_ticks(uint64_t slot_start_us) {
     const bool is_late = slot_start_us > slot_us_ + kLongestGapUs;
     const uint64_t gap_ms = (slot_start_us - slot_us_) / 1000;
     slot_us_ = slot_start_us;
-    if (!is_late || !is_moving()) return;
+    has_stood_ = is_late && is_moving();
+    if (!has_stood_) return;
     path_.pause();
     for (uint8_t j = 0; j < rules_.joints; ++j) ramp_[j].pause();
     char detail[16];

@@ -53,6 +53,9 @@ class Machine {
     // The text of a configuration.
     void receive_config(const Arrival& arrival, uint64_t now_us);
     bool takes_config() const;
+    // True once in every 4 s without a heartbeat: what is sent may not reach the device, though it is connected to its
+    // broker, and the platform is to subscribe anew.
+    bool subscribes_anew(uint64_t now_us);
     // Text mode: every joint to its target, Q24.8 steps, within its own limits. Counts as a heartbeat.
     Code follow(const int32_t* target_q8, uint64_t now_us);
     // At any time, from the slot's task: mV, or us of echo.
@@ -198,6 +201,7 @@ class Machine {
     bool is_following_ = false;  // Run and Hold are text mode's
     bool is_stopping_ = false;
     bool is_dry_ = false;
+    bool has_stood_ = false;  // no tick came before this slot: what the slots before it say of speed is over
     bool awaits_first_pulse_ = false;
     bool is_opening_ = false;       // no slot of the stream has been made yet
     int32_t start_q8_[kMaxJoints];  // where the stream begins
@@ -205,9 +209,10 @@ class Machine {
     uint64_t now_us_ = 0;
     uint64_t slot_us_ = 0;  // the start of the last slot that was looked after
     uint64_t armed_us_ = 0;
-    uint64_t alive_us_ = 0;  // of the last heartbeat, or of the start or resumption if that was later
-    uint64_t beat_us_ = 0;   // of the last heartbeat that counted
-    uint64_t servo_us_ = 0;  // of the last command to the servo
+    uint64_t alive_us_ = 0;       // of the last heartbeat, or of the start or resumption if that was later
+    uint64_t beat_us_ = 0;        // of the last heartbeat that counted
+    uint64_t subscribed_us_ = 0;  // when the platform was last asked to subscribe anew
+    uint64_t servo_us_ = 0;       // of the last command to the servo
     uint64_t status_due_us_ = 0;
     uint32_t session_ = 0;
     uint32_t counter_ = 0;

@@ -8,6 +8,8 @@ namespace {
 constexpr uint32_t kMostMissed = 1024;  // heartbeats in a row; chosen: a minute and a half of them
 // Chosen: after a minute any newer counter counts, as that many may be lost by then.
 constexpr uint64_t kSilenceUs = 60000000;
+// Chosen: forty heartbeats, so that a gateway that starts anew costs no subscription.
+constexpr uint64_t kSubscribeAgainUs = 4000000;
 
 }  // namespace
 
@@ -154,6 +156,13 @@ void Machine::receive_heartbeat(const Frame& frame, const Arrival& arrival) {
     session_ = session;
     counter_ = counter;
     if (arrival.received_us > alive_us_) alive_us_ = arrival.received_us;
+}
+
+bool Machine::subscribes_anew(uint64_t now_us) {
+    const uint64_t since_us = beat_us_ > subscribed_us_ ? beat_us_ : subscribed_us_;
+    if (now_us < since_us + kSubscribeAgainUs) return false;
+    subscribed_us_ = now_us;
+    return true;
 }
 
 void Machine::receive_sync(const Frame& frame, const Arrival& arrival) {

@@ -27,7 +27,8 @@ void Machine::report_state(const Point& point) {
     report.flags = is_armed_ ? kFlagArmed : static_cast<uint8_t>(0);
     report.referenced = referenced_;
     report.speed_permil = speed_permil_;
-    report.scale_q30 = mode_ == Mode::Run || mode_ == Mode::Hold ? point.scale_q30 : 0;
+    const bool has_scale = (mode_ == Mode::Run || mode_ == Mode::Hold) && !has_stood_;
+    report.scale_q30 = has_scale ? point.scale_q30 : 0;
     report.buffered_ms = buffered_ms();
     report.stream = streams_.stream();
     report.next_seq = streams_.next_seq();
@@ -40,7 +41,7 @@ void Machine::report_state(const Point& point) {
         report.steps[j] = stepper_.latched(j);
         // A stream may begin up to a step from where the arm stands: that step is no velocity of its path.
         const int64_t from_q20 = point.is_start ? as_q20(start_q8_[j]) : before.position_q20[j];
-        report.velocity_q8[j] = as_q8((point.position_q20[j] - from_q20) * kSlotHz);
+        if (!has_stood_) report.velocity_q8[j] = as_q8((point.position_q20[j] - from_q20) * kSlotHz);
     }
     report.has_servo = servo_.is_there();
     report.servo_us = servo_.pulse_us();

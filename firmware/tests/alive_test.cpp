@@ -205,6 +205,23 @@ TEST(LateTicks, AreSuchFromTheFifthMissedMillisecondOn) {
     EXPECT_TRUE(is_late_after(39000));
 }
 
+TEST(Silence, AsksForASubscriptionOnceInFourSecondsWithoutAHeartbeat) {
+    Rig rig;
+    const auto asks_after = [&rig](uint64_t us) {
+        rig.device.stand_still(rig.device.now_us() + us);
+        return rig.device.machine().subscribes_anew(rig.device.now_us());
+    };
+    rig.device.receive(build_heartbeat(5, 9));
+    EXPECT_FALSE(asks_after(3999000));
+    EXPECT_TRUE(asks_after(1000));
+    EXPECT_FALSE(asks_after(3999000));
+    EXPECT_TRUE(asks_after(1000));
+    rig.device.receive(build_heartbeat(5, 10));
+    EXPECT_FALSE(asks_after(3999000));
+    rig.device.receive(build_heartbeat(5, 10));  // a repeated one is none
+    EXPECT_TRUE(asks_after(1000));
+}
+
 TEST(LateTicks, AreToldWithTheirNumberOfMilliseconds) {
     Rig rig;
     rig.send(kLong.chunk(0, 100, 0));

@@ -20,6 +20,7 @@ from services.cli.session import CommandSession, connect
 from services.cli.text_table import table
 
 FOR_SENSORS = 0.5  # [s] that `gemelo device status` waits for readings
+OLD = 2.0  # [s] of the age of a round trip, beyond which it says nothing of the link as it is; it is measured 2 Hz
 HINTS = {
     DeviceMode.BOOT: "it has no configuration yet: `gemelo device config --push`",
     DeviceMode.UNREFERENCED: "it does not know where its joints are: `gemelo home` or `gemelo reference`",
@@ -128,8 +129,11 @@ def _named(heading: str, parts: dict[str, bool], yes: str, no: str) -> list[str]
 
 
 def _link(state: DeviceState) -> str:
+    trip = f"round trip {state.round_trip * 1e3:.1f} ms"
+    if state.round_trip_age > OLD:
+        trip = f"no answer for {state.round_trip_age:.0f} s, before that a {trip}"
     return (
-        f"round trip {state.round_trip * 1e3:.1f} ms, {state.buffered:.2f} s of path queued; since boot "
+        f"{trip}, {state.buffered:.2f} s of path queued; since boot "
         f"{state.underruns} under-runs, {state.refused} refused, {state.bad_frames} bad frames"
     )
 

@@ -110,7 +110,8 @@ class Absence:
     def __init__(self, watch: Watch, is_connected: Callable[[], bool], client: str, now: float) -> None:
         """Watches `client`'s token [key] from `now` [s monotonic] on; the client has time to be seen first."""
         self._is_connected, self._was_away = is_connected, False
-        self._counts_from = now + FIRST_SIGHT  # [s] monotonic, before which nothing is concluded
+        self._sight_until = now + FIRST_SIGHT  # [s] monotonic, before which a token that never came is not missed
+        self._counts_from = float("-inf")  # [s] monotonic: what was missing before may have been the router
         self._missing_since: float | None = now
         self._now = now
         self._declaration = watch(client, self._on_token)
@@ -123,7 +124,7 @@ class Absence:
             return 0.0
         if self._was_away:
             self._was_away, self._counts_from = False, now + RETURN
-        if self._missing_since is None:
+        if self._missing_since is None or now < self._sight_until:
             return 0.0
         return max(0.0, now - max(self._missing_since, self._counts_from))
 
@@ -133,7 +134,7 @@ class Absence:
 
     def _on_token(self, is_there: bool) -> None:
         if is_there:
-            self._missing_since = None
+            self._missing_since, self._sight_until = None, float("-inf")
         elif self._missing_since is None:
             self._missing_since = self._now
 

@@ -391,6 +391,20 @@ def test_the_absence_of_a_token_counts_from_its_end_and_ends_when_it_is_back() -
     assert absence.seconds(114.0) == 0.0
 
 
+@pytest.mark.parametrize("was_seen", [True, False])
+def test_a_holder_that_dies_soon_after_it_was_first_watched_is_missed_for_no_longer(was_seen: bool) -> None:
+    """Three seconds are three seconds: the time for a first sight of a token is no time that is added."""
+    tokens = Tokens()
+    absence = Absence(tokens.watch, lambda: tokens.is_connected, "@id/a", 100.0)
+    if was_seen:
+        tokens.on_token(True)
+        tokens.on_token(False)
+        assert absence.seconds(100.5) == pytest.approx(0.5)
+    else:
+        assert absence.seconds(101.9) == 0.0  # it may just not have been seen yet
+    assert absence.seconds(103.0) == pytest.approx(3.0)
+
+
 def test_nothing_counts_while_the_router_is_away_nor_until_its_clients_can_be_back() -> None:
     tokens = Tokens()
     absence = Absence(tokens.watch, lambda: tokens.is_connected, "@id/a", 100.0)

@@ -267,8 +267,7 @@ BEYOND = 'joint "a": 3.2000 rad is beyond the upper limit 2.9497 rad; stay withi
         ("a motion goes to one of point, state: none is given", "Falta adónde va"),
         ('device "x" has not been heard: is it switched on, does it use the same broker, and does the broker\'s ACL '
          "let it write?", "Aún no se oye al equipo «x»"),
-        ('the clock of device "x" is not known yet: try again in a second; if it stays so, the device does not hear us '
-         "(the broker's ACL, or the wire)", "Aún no se conoce el reloj del equipo «x»"),
+        ('the clock of device "x" is not known yet: try again in a second', "Aún no se conoce el reloj del equipo «x»"),
         ("cup: it is seen 2 times: take the others away, or give each a tag of its own", "cup: se ve 2 veces"),
         ('"leg.stl" would be 60 m long: if it is drawn in mm, give scale=0.001', "elija mm"),
         ('no point "a" of rm1; did you mean "b"?', "rm1 no tiene un punto «a». ¿Quiso decir «b»?"),

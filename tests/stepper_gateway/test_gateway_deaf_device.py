@@ -14,15 +14,15 @@ HOME, READY = (0.0, 0.0, 0.0), (0.6, -1.2, 0.08)
 EVERYTHING = set(TO_DEVICE)
 
 
-def test_a_goal_for_a_deaf_device_ends_and_so_does_the_next_one() -> None:
+def test_a_goal_for_a_deaf_device_ends_within_two_seconds_and_the_next_one_is_refused() -> None:
     rig = VirtualArm().ready()
     stood = rig.device.steps
     rig.lost = EVERYTHING
-    for name in ("g", "next"):
-        assert rig.goal(move(HOME, READY), name).accepted
-        status, result = rig.finish(name, 15.0)
-        assert status == GoalStatusCode.ABORTED
-        assert "answers nothing: does it hear this gateway?" in result.error_string
+    assert rig.goal(move(HOME, READY)).accepted
+    status, result = rig.finish("g", 2.0)
+    assert status == GoalStatusCode.ABORTED
+    assert "speaks and does not hear" in result.error_string
+    assert rig.goal(move(HOME, READY), "next").reason == result.error_string
     rig.lost = set()
     rig.run(5.0)
     assert rig.device.steps == stood

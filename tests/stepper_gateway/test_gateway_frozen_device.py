@@ -6,7 +6,7 @@ import pytest
 
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceMode
-from schemas.topics import JOINT_STATES
+from schemas.topics import DEVICE_STATE, JOINT_STATES
 from services.stepper_gateway.links.frames import CommandFrame, decode
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.virtual_arm import VirtualArm
@@ -52,6 +52,20 @@ def test_a_short_freeze_pauses_the_move_on_its_path() -> None:
     assert rig.finish()[0] == GoalStatusCode.SUCCEEDED
     assert "late" in rig.events()
     assert_within_limits(rig, since + 5)
+
+
+@pytest.mark.parametrize("seconds", [0.2, 2.9])
+def test_the_first_state_after_a_stand_reports_no_speed(seconds: float) -> None:
+    rig = VirtualArm().ready()
+    assert rig.goal(move(HOME, READY)).accepted
+    rig.run(1.2)
+    assert max(map(abs, rig.state.velocity)) > 500.0
+    known = len(rig.messages(DEVICE_STATE))
+    rig.freeze(seconds)
+    rig.run(0.1)
+    first = rig.messages(DEVICE_STATE)[known]
+    assert set(first.velocity) == {0.0}
+    assert first.time_scale == 0.0
 
 
 def test_a_goal_that_was_aborted_before_the_frozen_device_read_it_moves_nothing() -> None:

@@ -117,6 +117,10 @@ class DeviceLink:
             self._sent.clear()
         self._sent[sent.mid] = kind
 
+    def subscribe(self) -> None:
+        """To everything that is sent to the device; once more changes nothing where the broker knows of it."""
+        self._client.subscribe([(self._topic + kind, qos) for kind, qos in COMMANDS.items()])
+
     def close(self, offline_status: bytes) -> None:
         """Leave a retained status behind and end; waits at most a second for the broker."""
         if self._client.is_connected():
@@ -149,12 +153,12 @@ class DeviceLink:
             self._pauses = pauses
             self._client.reconnect_delay_set(*pauses)  # type: ignore[arg-type]
 
-    def _on_connect(self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
+    def _on_connect(self, _client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
         self._answer = not is_failure(reason)
         if self._answer:
             self._retry(RETRY)
             self._tried.clear()
-            client.subscribe([(self._topic + kind, qos) for kind, qos in COMMANDS.items()])
+            self.subscribe()
             self._put(Connected())
         elif self._client.speaks_5 and code_of(reason) == OLD_BROKER:
             self._client.speak_older()

@@ -70,6 +70,11 @@ class Network:
         if self._link is not None and self.is_connected and frame.kind in REPORTS:
             self._link.publish(frame.kind, frame.payload)
 
+    def subscribe_anew(self) -> None:
+        """The device is connected and receives nothing: the broker may have lost its subscriptions."""
+        if self._link is not None and self.is_connected:
+            self._link.subscribe()
+
     def on_connected(self) -> None:
         self.is_connected, self._was_refused = True, ""
         log.info("connected to the broker")

@@ -99,6 +99,8 @@ class VirtualEsp32:
         self._advance(time.monotonic())
         self._board.remember(self._device)
         has_told = self._wires.publish(self._device, now)
+        if self._device.subscribes_anew():
+            self._wires.network.subscribe_anew()
         self._look_after_firmware(now, has_told)
         self._beat(now)
         self._do_what_is_due(now)

@@ -20,9 +20,18 @@ _DEVICE: dict[str, str] = {
     "hace más de {time} s: revise su corriente y su red.",
     'device "{name}" has not said yet who it is: wait a second, or restart it': "El equipo «{name}» aún no dijo quién "
     "es: espere un segundo, o reinícielo.",
-    'the clock of device "{name}" is not known yet: try again in a second; if it stays so, the device does not hear us '
-    "(the broker's ACL, or the wire)": "Aún no se conoce el reloj del equipo «{name}»: pruebe otra vez en un segundo; "
-    "si sigue así, el equipo no nos oye (la ACL del broker, o el cable).",
+    'the clock of device "{name}" is not known yet: try again in a second': "Aún no se conoce el reloj del equipo "
+    "«{name}»: pruebe otra vez en un segundo.",
+    'device "{name}" speaks and does not hear: its states arrive, and it answers nothing that is sent to it. Likely '
+    "causes: a loose TX wire, a broker's ACL that denies the device its subscription, or two boards or programs with "
+    "one client id. Without heartbeats it holds by itself": "El equipo «{name}» habla y no oye: sus estados llegan, y "
+    "no responde a nada de lo que se le envía. Causas probables: un cable TX suelto, una ACL del broker que no deja "
+    "suscribirse al equipo, o dos placas o programas con un mismo identificador de cliente. Sin latidos se detiene "
+    "solo.",
+    "{told}; its last state, {age} s old: it moves, in mode {mode}": "{told} Su último estado, de hace {age} s: se "
+    "mueve, en modo «{mode}».",
+    "{told}; its last state, {age} s old: it stands, in mode {mode}": "{told} Su último estado, de hace {age} s: está "
+    "quieto, en modo «{mode}».",
     'device "{name}" has not said yet where its joints stand: wait a second': "El equipo «{name}» aún no dijo dónde "
     "están sus articulaciones: espere un segundo.",
     'device "{name}" looks for its home switches: wait until it has found them, or run `gemelo stop`': "El equipo "

@@ -40,6 +40,7 @@ TRUSTING = (  # commands that would move or mean something else with another con
     DeviceCommandKind.HOME,
     DeviceCommandKind.OUTPUT,
 )
+KNOWN = 3600.0  # [s] of the age of a state that is worth a word; chosen: one before a lost link has no age
 OnAnswer = Callable[[DeviceCommandResponse, Moment], None]
 OnReference = Callable[[int, tuple[int, ...], int, Moment], None]  # mask, [1/256 step], device time [us]
 AT_REST = (DeviceCommandKind.REFERENCE, DeviceCommandKind.DISARM, DeviceCommandKind.HOME)  # steps count anew after them
@@ -169,7 +170,18 @@ class CommandHandler:
         if not command.times_sent:
             return f"{name} could not be sent: {unreachable_reason}; the device holds by itself without heartbeats"
         because = f": {unreachable_reason}" if unreachable_reason else ""
-        return f"the device has not answered {name} in time, which was sent {command.times_sent} times{because}"
+        told = f"the device has not answered {name} in time, which was sent {command.times_sent} times{because}"
+        return self._with_last_state(told, moment) if command.is_stop else told
+
+    def _with_last_state(self, told: str, moment: Moment) -> str:
+        """`told`, and how the arm was by the newest state, where one has come."""
+        session = self._device.session
+        age = moment.monotonic - session.state_arrival
+        if session.latest is None or age > KNOWN:
+            return told
+        if any(session.latest.velocity):
+            return f"{told}; its last state, {age:.1f} s old: it moves, in mode {session.mode.name}"
+        return f"{told}; its last state, {age:.1f} s old: it stands, in mode {session.mode.name}"
 
     def _objection(self, kind: DeviceCommandKind, goal_is_active: bool) -> str:
         if goal_is_active and kind in AT_REST:

@@ -157,7 +157,9 @@ class FrameHandler:
         """The state's stamp [ns]."""
         session = self._device.session
         stamp = moment.unix_at(session.clock.measured(state.t_us, session.state_arrival))
-        self._device.out.publish(DEVICE_STATE, self._device.reporter.device_state(state, stamp, session.clock))
+        self._device.out.publish(
+            DEVICE_STATE, self._device.reporter.device_state(state, stamp, session.clock, session.unanswered_for)
+        )
         return stamp
 
 

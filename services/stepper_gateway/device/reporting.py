@@ -70,8 +70,8 @@ class Reporter:
             max_error=tuple(self._max_error),
         )
 
-    def device_state(self, state: StateFrame, stamp: int, clock: ClockSync) -> DeviceState:
-        """Everything else that the device said."""
+    def device_state(self, state: StateFrame, stamp: int, clock: ClockSync, age: float) -> DeviceState:
+        """Everything else that the device said; its clock was asked for last `age` [s] ago."""
         return DeviceState(
             stamp=stamp,
             device_time=state.t_us,
@@ -96,6 +96,7 @@ class Reporter:
             refused=state.refused,
             bad_frames=state.bad_frames,
             round_trip=clock.round_trip,
+            round_trip_age=age,
         )
 
     def shaft(self, report: ShaftReport, stamp: int) -> ShaftPositions:

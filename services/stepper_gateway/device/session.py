@@ -28,13 +28,23 @@ from services.stepper_gateway.moment import Moment, next_beat
 HEARTBEAT = 0.1  # [s] chosen: a cut of 0.4 s does not stop the arm yet
 SYNC = 0.5  # [s] chosen: a crystal's drift in that time is 50 us at most
 SYNC_AT_FIRST = 0.03  # [s] until the clock is known; chosen: the three that are needed take 0.1 s
+# While answers are missing: so that a wire that loses most frames is told from a device that receives none.
+SYNC_UNANSWERED = 0.1  # [s] chosen: twelve questions are lost before the device counts as deaf
+LATE_ANSWER = 0.25  # [s] after which an answer is missing; chosen: longer than a slow network's round trip
+DEAF_AFTER = 1.4  # [s] of questions without an answer; chosen: with the pause between two of them, below 2 s
+LEAST_UNANSWERED = 4  # questions, so that a pause of this loop is no deafness of the device
 STEADY_BEATS = 0.7  # [s] of heartbeats without a pause, after which a device has heard one; chosen: above its 0.5 s
 ASK_STATUS = 1.0  # [s] between two requests for a status that is missing; chosen: a slow network answers by then
 # Chosen: true states are not taken until they are newer than one from so far ahead, which must not look like silence.
 FARTHEST_AHEAD = 0.2  # [s] that a frame's time may be ahead of the device's clock as it is known
 QUESTIONS = 32  # that may be under way; chosen: 1 s of them at first, beyond which answers are late
 NOT_HEARD = "is it switched on, does it use the same broker, and does the broker's ACL let it write?"
-NO_CLOCK = "try again in a second; if it stays so, the device does not hear us (the broker's ACL, or the wire)"
+NO_CLOCK = "try again in a second"
+DEAF = (
+    "speaks and does not hear: its states arrive, and it answers nothing that is sent to it. Likely causes: a loose TX "
+    "wire, a broker's ACL that denies the device its subscription, or two boards or programs with one client id. "
+    "Without heartbeats it holds by itself"
+)
 OLD_BOOTS = 16  # remembered, so that a late frame of one is no reboot; chosen: more than a broker keeps frames of
 
 
@@ -60,6 +70,9 @@ class DeviceSession:
         self._checks = StateChecks()
         self._offline_boot = 0  # whose last will has come
         self._questions: deque[int] = deque(maxlen=QUESTIONS)  # [us] SYNCs that may be answered
+        self._unanswered = 0  # SYNCs since the last answer
+        self._unanswered_since = 0.0  # [s] monotonic, of the first of them
+        self.answered = -1.0e9  # [s] monotonic, when the device has answered a question last
         self.link_up = False
         self.link_reason = "no connection yet"
         self.latest: StateFrame | None = None  # of any number of joints
@@ -95,6 +108,7 @@ class DeviceSession:
         self.link_up, self.link_reason = connected, reason
         if connected:
             self._heartbeat_due = self._sync_due = 0.0
+            self._unanswered = 0
         else:
             self.state_arrival = -1.0e9
 
@@ -148,6 +162,9 @@ class DeviceSession:
     def question(self, moment: Moment) -> Sync:
         """One more question for the clock, now."""
         self._questions.append(moment.micros)
+        if self._unanswered == 0:
+            self._unanswered_since = moment.monotonic
+        self._unanswered += 1
         return Sync(boot_id=self.boot_id, t0=moment.micros)
 
     def on_sync_reply(self, reply: SyncReply, arrival_us: int) -> None:
@@ -158,6 +175,7 @@ class DeviceSession:
         if not self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us):  # the question stays open for the true answer
             raise BadFrame(f"an answer of {reply.t1} us, which is not the device's clock as it is known")
         self._questions.remove(reply.t0)
+        self._unanswered, self.answered = 0, arrival_us * 1e-6
 
     def require_known(self, frame: Frame) -> None:
         """Raises `BadFrame` for a frame of a boot that has never been heard."""
@@ -201,9 +219,7 @@ class DeviceSession:
             self._beat = moment.monotonic
             frames.append(Heartbeat(boot_id=self.boot_id, session=self._session_id, counter=self._counter))
         if moment.monotonic >= self._sync_due:
-            is_sure = self.clock.is_synchronised and not self.clock.is_contradicted
-            period = SYNC if is_sure else SYNC_AT_FIRST
-            self._sync_due = next_beat(self._sync_due, moment.monotonic, period)
+            self._sync_due = next_beat(self._sync_due, moment.monotonic, self._sync_period(moment))
             frames.append(self.question(moment))
         if self._lacks_status(moment) and moment.monotonic >= self._status_due:
             self._status_due = moment.monotonic + ASK_STATUS
@@ -213,6 +229,23 @@ class DeviceSession:
                 CommandFrame(boot_id=self.boot_id, cmd_id=self._status_id, expires_us=NEVER_EXPIRES, cmd=kind)
             )
         return frames
+
+    def _sync_period(self, moment: Moment) -> float:
+        """[s] until the next question for the clock."""
+        if not self.clock.is_synchronised or self.clock.is_contradicted:
+            return SYNC_AT_FIRST
+        is_missing = self._unanswered > 0 and moment.monotonic - self._unanswered_since > LATE_ANSWER
+        return SYNC_UNANSWERED if is_missing else SYNC
+
+    def is_deaf(self, moment: Moment) -> bool:
+        """True if nothing that is asked has been answered for DEAF_AFTER: what is sent does not arrive."""
+        is_long = moment.monotonic - self._unanswered_since > DEAF_AFTER
+        return self.link_up and self._unanswered >= LEAST_UNANSWERED and is_long
+
+    @property
+    def unanswered_for(self) -> float:
+        """[s] since the device has answered a question, when its newest state came; 0 before its first answer."""
+        return max(0.0, self.state_arrival - self.answered) if self.clock.exchanges else 0.0
 
     def _lacks_status(self, moment: Moment) -> bool:
         is_wanted = self.status is None or self._doubted is not None
@@ -232,7 +265,7 @@ class DeviceSession:
         return DeviceMode(self.latest.mode) if self.latest is not None else DeviceMode.BOOT
 
     def unreachable_reason(self, moment: Moment, timeout: float) -> str:
-        """Why the device cannot be reached: no link, or no state for `timeout` [s]; empty if it can."""
+        """Why the device cannot be reached: no link, no state for `timeout` [s], or no answer; empty if it can."""
         name = self._device
         if not self.link_up:
             return f'no link to device "{name}": {self.link_reason}'
@@ -242,6 +275,8 @@ class DeviceSession:
             if self.latest is None and not self._reports:
                 return f'device "{name}" has not been heard: {NOT_HEARD}'
             return f'device "{name}" is silent for more than {timeout:g} s: check its power and network'
+        if self.is_deaf(moment):
+            return f'device "{name}" {DEAF}'
         if self.status is None:
             return f'device "{name}" has not said yet who it is: wait a second, or restart it'
         if not self.clock.is_synchronised:
@@ -260,7 +295,7 @@ class DeviceSession:
         self.latest = None
         self._doubted, self._checks = None, StateChecks()
         self.clock.reset()
-        self._sync_due = 0.0
+        self._sync_due, self._unanswered = 0.0, 0
         self._status_due, self._tells_status = 0.0, True
         return is_reboot
 

@@ -27,6 +27,7 @@ struct Board {
     Ring<8192> to_mqtt;
     Ring<8192> to_wire;
     uint32_t understood = 0;  // frames and lines of the wire; written in the slot's task, atomically
+    uint32_t silences = 0;    // that asked for another subscription; the same
 };
 
 extern Board board;

@@ -54,6 +54,7 @@ void Device::run() {
         remember();
         serve();
         keep_config();
+        if (machine_.subscribes_anew(clock_us())) __atomic_add_fetch(&board.silences, 1, __ATOMIC_RELAXED);
         provisioning_.restart_if_due(machine_, clock_us());
         ota_.turn(machine_, clock_us());
         if (slots_++ % kSlotsPerFeeding == 0) esp_task_wdt_reset();

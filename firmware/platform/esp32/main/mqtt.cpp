@@ -79,9 +79,17 @@ void Mqtt::on_event(void* self, esp_event_base_t, int32_t id, void* data) {
 
 void Mqtt::connected() {
     send_at_once(transport_);
-    for (const Heard& heard : kHeard) esp_mqtt_client_subscribe_single(client_, heard_.full(heard.name), heard.qos);
     __atomic_store_n(&is_connected_, true, __ATOMIC_RELEASE);
+    subscribe_by(heard_);
     board.from_mqtt.push(static_cast<uint8_t>(Inbound::Connected), 0, 0, nullptr, 0);
+}
+
+void Mqtt::subscribe() {
+    if (is_connected()) subscribe_by(said_);
+}
+
+void Mqtt::subscribe_by(Topics& topics) {
+    for (const Heard& heard : kHeard) esp_mqtt_client_subscribe_single(client_, topics.full(heard.name), heard.qos);
 }
 
 // Only the first piece of a message tells its topic.

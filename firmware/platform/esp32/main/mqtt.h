@@ -18,12 +18,16 @@ class Mqtt {
     // Once; connects, and again for as long as it takes, in esp-mqtt's task. `credentials` must stay.
     void begin(const Credentials& credentials, uint32_t boot_id);
     bool is_connected() const { return __atomic_load_n(&is_connected_, __ATOMIC_ACQUIRE); }
+    // Once more to everything that is sent to the device, if it is connected: its broker may have lost that. In the
+    // task that publishes.
+    void subscribe();
     // Waits at most as long as the network may take (2 s); lost where there is no connection.
     void publish(Output output, const uint8_t* bytes, size_t size);
 
   private:
     static void on_event(void* self, esp_event_base_t base, int32_t id, void* data);
     void connected();
+    void subscribe_by(Topics& topics);
     void receive(const esp_mqtt_event_t& event);
     void deliver();
 

@@ -30,6 +30,7 @@ void run(void*) {
     ESP_ERROR_CHECK(esp_task_wdt_add(nullptr));
     wifi.begin(*credentials);
     bool has_begun = false;
+    uint32_t silences = 0;
     for (;;) {
         ulTaskNotifyTake(pdTRUE, pdMS_TO_TICKS(kLongestWaitMs));
         esp_task_wdt_reset();
@@ -39,6 +40,9 @@ void run(void*) {
             mqtt.begin(*credentials, boot_id);
         }
         publish_all();
+        const uint32_t now = __atomic_load_n(&board.silences, __ATOMIC_RELAXED);
+        if (now != silences) mqtt.subscribe();
+        silences = now;
     }
 }
 

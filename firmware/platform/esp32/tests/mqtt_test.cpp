@@ -92,6 +92,17 @@ TEST(Esp32Mqtt, SubscribesToWhatADeviceHears) {
     EXPECT_EQ(chip.subscriptions, expected);
 }
 
+TEST(Esp32Mqtt, SubscribesToAllOfItAnewWhileItIsConnected) {
+    Connected connected;
+    const std::vector<std::string> once = chip.subscriptions;
+    connected.mqtt().subscribe();
+    ASSERT_EQ(chip.subscriptions.size(), 2 * once.size());
+    EXPECT_TRUE(std::equal(once.begin(), once.end(), chip.subscriptions.begin() + static_cast<long>(once.size())));
+    connected.send(MQTT_EVENT_DISCONNECTED, nullptr);
+    connected.mqtt().subscribe();
+    EXPECT_EQ(chip.subscriptions.size(), 2 * once.size());
+}
+
 TEST(Esp32Mqtt, PublishesEachOutputOnItsTopicAndOnlyTheStatusRetained) {
     Connected connected;
     const uint8_t byte = 1;
