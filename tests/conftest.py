@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 use_one_kernel()  # as the planner's process does: what it computes is compared with recordings of other machines
 
-pytest_plugins = ["tests.cost", "pytester"]
+pytest_plugins = ["tests.cost", "tests.stacks.counts", "tests.stacks.shared", "tests.stacks.browser", "pytester"]
 
 # A run in the background begins with Ctrl-C ignored, and every process that a test starts would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)

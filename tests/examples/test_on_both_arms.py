@@ -13,7 +13,8 @@ import pytest
 
 import gemelo
 from services.stack.stack import Stack
-from tests.gemelo.conftest import BROKER, NEEDED, make_ready
+from tests.gemelo.conftest import make_ready
+from tests.stacks.shared import BROKER, NEEDED
 
 LONGEST = 90.0  # [s] of one example
 SHOWS = {  # what the last line of each says

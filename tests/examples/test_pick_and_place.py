@@ -17,8 +17,8 @@ from schemas.scene import BoxShape, PlanningScene, SceneAdd, SceneObject, SceneR
 from schemas.topics import DEVICE_SHAFT, SCENE, SCENE_EDIT, STEP_ERRORS
 from services.arm.kinematics.kinematics import Kinematics
 from services.stack.stack import Stack
-from tests.gemelo.conftest import BROKER
 from tests.stack.person import Operator, jumps
+from tests.stacks.shared import BROKER
 
 pytestmark = pytest.mark.full
 

@@ -1,8 +1,7 @@
-"""A stack for all tests of a file, and the arm on it as a script has it."""
+"""The arm on the shared stack, as a script has it."""
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from queue import SimpleQueue
@@ -12,27 +11,14 @@ import pytest
 import gemelo
 from schemas.device import ShaftPositions
 from services.stack.stack import Stack
-
-NEEDED = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner")
-BROKER = "mosquitto" if shutil.which("mosquitto", path="/usr/bin:/usr/sbin:/usr/local/sbin") else "amqtt"
+from tests.stacks.shared import found_by_scripts
 
 
 @pytest.fixture(scope="module")
-def robot() -> str:
-    return "rm1"
-
-
-@pytest.fixture(scope="module")
-def twin(robot: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
-    """A stack; what connects in this process or in one that it starts finds it."""
-    out = tmp_path_factory.mktemp("out")
-    with (
-        Stack(broker=BROKER, out=out, processes=NEEDED, environment={"GEMELO_ROBOT": f"urdf/{robot}"}) as stack,
-        pytest.MonkeyPatch.context() as patch,
-    ):
-        for name, value in stack.deployment.items():
-            patch.setenv(name, value)
-        yield stack
+def twin(rm1_stack: Stack) -> Iterator[Stack]:
+    """The shared stack; what connects in this process or in one that it starts finds it."""
+    with found_by_scripts(rm1_stack):
+        yield rm1_stack
 
 
 @pytest.fixture

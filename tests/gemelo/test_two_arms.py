@@ -10,7 +10,8 @@ import pytest
 
 import gemelo
 from services.stack.stack import Stack
-from tests.gemelo.conftest import BROKER, NEEDED, make_ready
+from tests.gemelo.conftest import make_ready
+from tests.stacks.shared import BROKER, NEEDED
 
 pytestmark = pytest.mark.full
 

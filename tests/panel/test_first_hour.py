@@ -11,9 +11,9 @@ from playwright.sync_api import Browser
 import gemelo
 from services.panel.words.words import TABLES
 from services.stack.stack import Stack
-from tests.panel.conftest import SIZE
 from tests.panel.person import Person, until
 from tests.panel.test_page import is_moving, rests
+from tests.stacks.browser import SIZE
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {"en": DOCS / "first_hour.md", "es": DOCS / "es" / "primera_hora.md"}

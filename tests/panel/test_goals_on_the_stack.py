@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
+from collections.abc import Iterator
 from math import cos, degrees, radians, sin
 
 import numpy as np
@@ -14,9 +15,10 @@ from schemas.scene import CylinderShape, SphereShape
 from services.bench.bare_browser import bare_browser
 from services.panel.view.world import configuration_at
 from services.panel.words.en import ENGLISH
-from tests.gemelo.conftest import NEEDED
+from services.stack.stack import Stack
 from tests.panel.person import until
 from tests.panel.served import Served, passed, rests
+from tests.stacks.shared import found_by_scripts
 
 ARM, FOREARM, LIFT = "brazo_joint", "antebrazo_joint", "efector_joint"
 POST = {"size": (0.08, 0.08, 0.2), "at": (0.36, 0.25, 0.1)}  # [m] beside "home", 4 mm away from 0.42 rad on
@@ -24,8 +26,9 @@ BEHIND = {ARM: radians(35.0), FOREARM: 0.0, LIFT: 0.0}  # where the arm would be
 
 
 @pytest.fixture(scope="module")
-def processes() -> tuple[str, ...]:
-    return NEEDED
+def twin(rm1_stack: Stack) -> Iterator[Stack]:
+    with found_by_scripts(rm1_stack):
+        yield rm1_stack
 
 
 @pytest.fixture(autouse=True)

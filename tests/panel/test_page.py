@@ -15,8 +15,8 @@ from playwright.sync_api import Browser, expect
 import gemelo
 from schemas.joints import JointState
 from services.stack.stack import Stack
-from tests.panel.conftest import SIZE
 from tests.panel.person import BLUE, Person, until
+from tests.stacks.browser import SIZE
 
 PICTURES = (
     "() => [...document.images].filter((each) => each.offsetParent).map((i) => [i.naturalWidth, i.naturalHeight])"

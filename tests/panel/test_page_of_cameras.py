@@ -9,10 +9,9 @@ from playwright.sync_api import TimeoutError as NotSeen
 from playwright.sync_api import expect
 
 from schemas.topics import camera_detections
-from services.runtime.deployment import project_root
 from services.stack.stack import Stack
-from tests.gemelo.conftest import BROKER, NEEDED
 from tests.panel.person import OPENING, PATIENCE, Person, place_in_image, until
+from tests.stacks.shared import found_by_scripts
 
 CAMERA = "overhead"
 WIDTH, HEIGHT = 640.0, 480.0  # [px] of its images
@@ -20,21 +19,9 @@ PRESSES = 5  # a page under load may shift between the look for a place and the 
 
 
 @pytest.fixture(scope="module")
-def twin(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
-    """With the sample cell, whose camera draws a quarter as much: a browser draws on the same machine."""
-    cell = tmp_path_factory.mktemp("cell") / "cell.toml"
-    sample = (project_root() / "urdf/rm1/cell.toml").read_text("utf-8").replace("fps = 5.0", "fps = 4.0")
-    cell.write_text(sample.replace('kind = "virtual"', 'kind = "virtual"\nsamples = 1'), "utf-8")
-    environment = {"GEMELO_ROBOT": "urdf/rm1", "GEMELO_CELL": str(cell)}
-    processes = (*NEEDED, "camera", "detector", "panel")
-    out = tmp_path_factory.mktemp("out")
-    with (
-        Stack(broker=BROKER, out=out, processes=processes, environment=environment) as stack,
-        pytest.MonkeyPatch.context() as patch,
-    ):
-        for name, value in stack.deployment.items():
-            patch.setenv(name, value)
-        yield stack
+def twin(cell_stack: Stack) -> Iterator[Stack]:
+    with found_by_scripts(cell_stack):
+        yield cell_stack
 
 
 def clicks(person: Person, x: float, y: float) -> None:

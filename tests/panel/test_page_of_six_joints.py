@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import degrees, radians
 
 import numpy as np
 import pytest
 
 import gemelo
+from services.stack.stack import Stack
 from tests.panel.person import Person, until
+from tests.stacks.shared import found_by_scripts
 
 
 @pytest.fixture(scope="module")
-def robot() -> str:
-    return "parol6"
+def twin(parol6_stack: Stack) -> Iterator[Stack]:
+    with found_by_scripts(parol6_stack):
+        yield parol6_stack
 
 
 def test_sliders_a_plan_and_execute_bring_six_joints_there(person: Person, arm: gemelo.Arm) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
+from collections.abc import Iterator
 
 import pytest
 
@@ -11,9 +12,10 @@ import gemelo
 from gemelo.programs import Go, Program
 from services.panel.words.en import ENGLISH
 from services.stack.stack import Stack
-from tests.gemelo.conftest import NEEDED, make_ready
+from tests.gemelo.conftest import make_ready
 from tests.panel.person import until
 from tests.panel.served import Served, passed, rests
+from tests.stacks.shared import found_by_scripts
 
 ARM = "brazo_joint"
 LIT = "font-weight:bold"  # of the row of a step that is carried out
@@ -21,8 +23,9 @@ POINTS = {"P0": "left", "P1": "ready", "P2": "right"}  # by name, the states at 
 
 
 @pytest.fixture(scope="module")
-def processes() -> tuple[str, ...]:
-    return NEEDED
+def twin(rm1_stack: Stack) -> Iterator[Stack]:
+    with found_by_scripts(rm1_stack):
+        yield rm1_stack
 
 
 def says(served: Served, text: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import degrees, radians
 
 import numpy as np
@@ -12,19 +13,16 @@ from gemelo.programs import Go, Line, Program
 from services.arm.frames.transforms import from_rpy, multiply
 from services.panel.model.tool_turns import ALL_RINGS
 from services.panel.words.en import ENGLISH
-from tests.gemelo.conftest import NEEDED
+from services.stack.stack import Stack
 from tests.panel.person import until
 from tests.panel.served import Served, rests
+from tests.stacks.shared import found_by_scripts
 
 
 @pytest.fixture(scope="module")
-def robot() -> str:
-    return "parol6"
-
-
-@pytest.fixture(scope="module")
-def processes() -> tuple[str, ...]:
-    return NEEDED
+def twin(parol6_stack: Stack) -> Iterator[Stack]:
+    with found_by_scripts(parol6_stack):
+        yield parol6_stack
 
 
 @pytest.fixture(autouse=True)

@@ -1,4 +1,4 @@
-"""One stack for all tests of a file, started through process-compose as a user starts it."""
+"""The shared stack of rm1, started through process-compose as a user starts it, and a person at the command."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from services.stack.stack import Stack
-from tests.optional import need
 from tests.stack.person import Operator
 
 
@@ -19,10 +17,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(scope="module")
-def stack(tmp_path_factory):
-    need("mosquitto")
-    with Stack(broker="mosquitto", out=tmp_path_factory.mktemp("out")) as running:
-        yield running
+def stack(rm1_stack):
+    return rm1_stack
 
 
 @pytest.fixture

@@ -11,17 +11,12 @@ import pytest
 from mcap.exceptions import McapError
 from mcap.stream_reader import StreamReader
 
-from services.stack.stack import Stack
 from tests.stack.gemelo import gemelo
-
-PROCESSES = ("router", "broker", "virtual_esp32", "stepper_gateway", "planner", "logger", "camera")
 
 
 @pytest.fixture(scope="module")
-def stack(tmp_path_factory):
-    environment = {"GEMELO_CELL": "urdf/rm1/cell.toml"}
-    with Stack(out=tmp_path_factory.mktemp("out"), processes=PROCESSES, environment=environment) as running:
-        yield running
+def stack(cell_stack):
+    return cell_stack
 
 
 def tags_in(file: Path) -> set[int]:
@@ -32,7 +27,6 @@ def tags_in(file: Path) -> set[int]:
 
 def test_the_camera_of_the_cell_sees_the_arm_where_it_is_and_is_recorded(stack, tmp_path):
     assert re.search(r"overhead +virtual .* calibrated +measured +streaming", gemelo(stack, "camera", "list"))
-    gemelo(stack, "reference")
     gemelo(stack, "move", "--named", "left")
     view = tmp_path / "view.jpg"
     gemelo(stack, "camera", "view", "overhead", "--save", str(view))

@@ -15,11 +15,9 @@ from schemas.topics import DEVICE_SHAFT
 from services.cli.errors import ExitCode
 from tests.stack import gemelo as command
 
-NEAR_ITS_SWITCHES = (
-    "brazo_joint=-2.9rad",
-    "antebrazo_joint=-2.9rad",
-    "efector_joint=0.19",
-)  # a homing is short from there
+pytestmark = pytest.mark.stands_at(  # a homing is short from there
+    brazo_joint=-2.9, antebrazo_joint=-2.9, efector_joint=0.19
+)
 
 
 @pytest.fixture
@@ -28,12 +26,9 @@ def gemelo(stack):
 
 
 @pytest.fixture
-def ready(operator, gemelo):
+def ready(operator):
     """A person before an arm that stands in Idle, near its switches."""
-    operator.wait_for(lambda: operator.device.message is not None, 5.0)
-    if operator.device.message.mode is DeviceMode.UNREFERENCED:
-        gemelo("home")
-    gemelo("move", "--joints", *NEAR_ITS_SWITCHES)
+    assert operator.wait_for(lambda: operator.device.message is not None, 5.0)
     assert operator.wait_for(lambda: operator.device.message.mode is DeviceMode.IDLE, 5.0)
     return operator
 

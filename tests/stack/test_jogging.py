@@ -76,6 +76,7 @@ def test_the_arm_moves_while_a_key_is_held_and_stops_when_it_is_let_go(stack, op
         joint = operator.arm.joints[0]
         assert 0.3 * SPEED * joint.velocity < moved < 2.5 * SPEED * joint.velocity
         assert "100 % of the asked speed" in typist.shown
+        typist.hold_while("a", lambda: not operator.is_moving())
         last = typist.hold("a", 1.0)
         assert rest(operator, last) < STOPPED
         assert abs(went(operator)) > moved
@@ -206,3 +207,4 @@ def test_a_fault_while_jogging_is_said_with_its_joint_and_its_remedy(stack, oper
     gemelo(stack, "device", "press", "switch", "limit_q2", "auto")
     refused = gemelo(stack, "jog", "--joint", "brazo_joint=5deg/s", "--for", "1", code=ExitCode.FAILED)
     assert 'LIMIT_SWITCH at joint "antebrazo_joint"' in refused
+    gemelo(stack, "reset")

@@ -12,23 +12,15 @@ from schemas.motion import FollowJointTrajectoryGoal
 from schemas.planning import NamedGoal, PlanCode, PlanRequest
 from schemas.topics import PLAN, STEP_ERRORS
 from services.arm.kinematics.kinematics import Kinematics
-from services.stack.stack import Stack
-from tests.optional import need
 from tests.stack.gemelo import gemelo
 from tests.stack.person import Operator, jumps
 
-NEEDED = ("router", "broker", "virtual_esp32", "stepper_gateway", "planner")
 
-
-@pytest.fixture(scope="module")
-def parol6(tmp_path_factory):
-    need("mosquitto")
-    environment = {"GEMELO_ROBOT": "urdf/parol6"}
-    out = tmp_path_factory.mktemp("out")
-    with Stack(broker="mosquitto", out=out, processes=NEEDED, environment=environment) as running:
-        person = Operator(running)
-        yield person
-        person.close()
+@pytest.fixture
+def parol6(parol6_stack):
+    person = Operator(parol6_stack)
+    yield person
+    person.close()
 
 
 def test_six_joints_go_from_state_to_state_and_lose_no_step(parol6):

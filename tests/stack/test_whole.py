@@ -13,10 +13,12 @@ import urllib.request
 import psutil
 import pytest
 
+import gemelo as api
 from schemas.actions import GoalStatusCode
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from services.stack.stack import Stack
 from tests.stack.person import jumps
+from tests.stacks.shared import found_by_scripts
 
 
 def gemelo(stack, *arguments, timeout=30):
@@ -159,6 +161,7 @@ def test_every_log_is_kept_and_no_process_has_complained(stack):
 def test_ctrl_c_ends_everything_with_zero_and_leaves_nothing_behind(tmp_path):
     # As a user starts it: `Stack` alone leaves dependencies out, and with them the order of stopping.
     with Stack(broker="amqtt", out=tmp_path, viewer="web", command=("deploy/up",)) as stack:
+        stream_a_little(stack)
         pids = [psutil.Process(pid) for pid in stack.pids().values()]
         family = [each for pid in pids for each in [pid, *pid.children(recursive=True)]]
         started = time.monotonic()
@@ -170,6 +173,19 @@ def test_ctrl_c_ends_everything_with_zero_and_leaves_nothing_behind(tmp_path):
         console = stack.console()
         assert "Traceback" not in console, console[-3000:]
         assert "WARNING" not in console, console[-3000:]
+        logs = {name: stack.logs(name) for name in stack.processes}
+        assert [name for name, log in logs.items() if "nanobind" in log or "leaked" in log] == []
+        assert all(logs[name] for name in ("planner", "stepper_gateway")), "the logs are kept"
+
+
+def stream_a_little(stack):
+    """What is streamed to makes objects of the planner's native library, which are to be freed at the end."""
+    with found_by_scripts(stack), api.connect(timeout=10.0) as arm:
+        arm.reference()
+        end = time.monotonic() + 20.0
+        while abs(arm.joints["brazo_joint"] - 0.1) > 0.005:
+            assert time.monotonic() < end
+            arm.stream({"brazo_joint": 0.1})
 
 
 def test_make_up_welcomes_the_user_and_a_sigterm_ends_it(tmp_path):

@@ -1,0 +1,192 @@
+"""Leads a shared stack back to how it was before a test, and says what the test has left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import NamedTuple
+
+import psutil
+import pytest
+
+import gemelo
+from schemas import system
+from schemas.device import ShaftPositions
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY, Request
+from services.stack.stack import Stack
+
+READY = 60.0  # [s] in which a process that a test has killed is there again
+LETS_GO = 6.0  # [s] in which control, motions and processes of a client that has just ended are over
+
+Values = dict[tuple[str, str], system.ParameterValue]
+
+
+class Before(NamedTuple):
+    """What stands when a test begins, and is to stand when it has ended."""
+
+    children: frozenset[int]  # process ids of the tests' own
+    logs: dict[str, int]  # characters that each process had printed
+    files: frozenset[Path]  # of points, programs and scenes
+
+
+class Reset:
+    """Of one shared stack, on a connection of its own that stays open."""
+
+    def __init__(self, stack: Stack) -> None:
+        self._stack = stack
+        self._arm = self._connected()
+        self._parameters: Values = {}
+        self._put_right()
+        self._parameters = self._read_parameters()
+
+    def close(self) -> None:
+        """Leaves the bus."""
+        self._arm.close()
+
+    def before(self, stands_at: Mapping[str, float]) -> Before:
+        """Leads the arm to `stands_at` [rad] or [m], home where a joint is not named; to be given to `after`."""
+        self._stand({**self._arm.states["home"], **stands_at})
+        return Before(
+            frozenset(each.pid for each in psutil.Process().children()),
+            {name: len(self._stack.logs(name)) for name in self._stack.processes},
+            frozenset(self._files()),
+        )
+
+    def after(self, before: Before) -> list[str]:
+        """What the test should have ended or put back itself, a sentence for each; all of it is put right."""
+        left = [*self._processes(), *self._children(before), *self._complaints(before)]
+        left += [*self._control(), *self._motion(), *self._device(), *self._changed_parameters()]
+        self._put_right()
+        for path in self._files() - before.files:
+            path.unlink()
+        return left
+
+    def _processes(self) -> Iterator[str]:
+        """Frozen ones; those that were killed have time to come back."""
+        for name, pid in self._stack.pids().items():
+            if psutil.Process(pid).status() == psutil.STATUS_STOPPED:
+                os.kill(pid, signal.SIGCONT)
+                yield f"{name} is frozen"
+        self._stack.wait_ready(READY)
+
+    def _children(self, before: Before) -> Iterator[str]:
+        """Programs that the test has started."""
+        mine = [each for each in psutil.Process().children() if each.pid not in before.children]
+        for each in psutil.wait_procs(mine, timeout=LETS_GO if mine else 0.0)[1]:
+            yield f"the process {each.pid} still runs: {' '.join(each.cmdline()[:6])}"
+            each.kill()
+
+    def _complaints(self, before: Before) -> Iterator[str]:
+        for name, size in before.logs.items():
+            said = self._stack.logs(name)[size:]
+            if "Traceback" in said:
+                yield f"{name} has raised: {said[said.index('Traceback') :][:2000]}"
+
+    def _control(self) -> Iterator[str]:
+        control = self._arm.control
+        if not self._becomes(lambda: not control.held, LETS_GO):
+            yield f"{control.holder} holds control"
+            self._arm.take_control("reset", force=True).give()
+
+    def _motion(self) -> Iterator[str]:
+        arm = self._arm
+        if not self._becomes(lambda: _rests(arm), LETS_GO):
+            yield f"the arm still moves, device mode {arm.device.mode.name}"
+            arm.node.action(FOLLOW_JOINT_TRAJECTORY).cancel_all()
+            arm.stop()
+            assert self._becomes(lambda: _rests(arm), LETS_GO), "the arm does not come to rest"
+
+    def _device(self) -> Iterator[str]:
+        """What is pressed, switched on, slowed down or in a fault."""
+        arm = self._arm
+        if arm.inputs.get("estop"):
+            yield "the emergency stop is pressed"
+        if on := [name for name, is_on in arm.outputs.items() if is_on]:
+            yield f"outputs are on: {', '.join(on)}"
+            for name in on:
+                arm.output(name, False)
+        for kind, targets, value in (
+            ("estop", ("",), 0.0),
+            ("switch", [each.name for each in arm.description.inputs], -1.0),
+            ("block", arm.joint_names, 0.0),
+        ):
+            for target in targets:
+                arm.device.inject(kind, target, value)
+        if arm.device.fault:
+            yield f"the device has a fault: {arm.device.fault}"
+            arm.device.reset()
+
+    def _changed_parameters(self) -> Iterator[str]:
+        for (node, name), value in self._read_parameters().items():
+            usual = self._parameters.get((node, name), value)
+            if value != usual:
+                yield f"{node}'s parameter {name} is {value}, it was {usual}"
+                setting = Request(f"@node/{node}/parameters/set", system.SetParameter, system.Parameter, node, "")
+                self._arm.node.call(setting, system.SetParameter(name=name, value=usual), 5.0)
+
+    def _read_parameters(self) -> Values:
+        found: Values = {}
+        for node in self._stack.processes:
+            if node in self._arm.node.alive():
+                listed = Request(f"@node/{node}/parameters/list", system.Empty, system.Parameters, node, "")
+                answer = self._arm.node.call(listed, system.Empty(), 5.0)
+                found |= {(node, each.name): each.value for each in answer.parameters}
+        return found
+
+    def _put_right(self) -> None:
+        """Without a word: armed, referenced, at full speed, with an empty scene."""
+        arm = self._arm
+        self._stack.wait_ready(READY)
+        if arm.device.mode is gemelo.DeviceMode.HOLD:
+            arm.stop()
+        if not arm.device.state.armed:
+            arm.device.arm()
+        if not all(arm.device.state.referenced):
+            arm.reference(self._where_it_stands())
+        if arm.device.state.time_scale != 1.0:
+            arm.speed(1.0)
+        if arm.scene.present.objects or arm.scene.present.allowed:
+            arm.scene.clear()
+
+    def _stand(self, where: dict[str, float]) -> None:
+        arm = self._arm
+        steps = {name: arm.description.joint(name).steps.per_unit for name in where}
+        if any(abs(arm.joints[name] - at) * steps[name] > 1.0 for name, at in where.items()):
+            arm.move(joints=where)
+
+    def _where_it_stands(self) -> dict[str, float]:
+        """A person looks at the arm before declaring: a virtual one says where its shafts are."""
+        shafts: SimpleQueue[ShaftPositions] = SimpleQueue()
+        listening = self._arm.node.subscribe(gemelo.topics.DEVICE_SHAFT, shafts.put)
+        try:
+            shaft = shafts.get(timeout=5.0)
+        except Empty as error:
+            raise AssertionError("the virtual device does not say where its shafts are") from error
+        finally:
+            listening.close()
+        joint = self._arm.description.joint
+        return {name: joint(name).clamp(at) for name, at in zip(shaft.name, shaft.position, strict=True)}
+
+    def _files(self) -> set[Path]:
+        return {path for path in Path(self._stack.deployment["GEMELO_PATHS_PROGRAMS"]).rglob("*") if path.is_file()}
+
+    def _becomes(self, is_so: Callable[[], bool], timeout: float) -> bool:
+        return self._arm.wait_for(is_so, timeout)
+
+    def _connected(self) -> gemelo.Arm:
+        self._stack.wait_ready(READY)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.delenv("GEMELO_CONFIG", raising=False)
+            for name, value in self._stack.deployment.items():
+                patch.setenv(name, value)
+            arm = gemelo.connect(name="reset", timeout=10.0)
+        arm.control.shares = False
+        return arm
+
+
+def _rests(arm: gemelo.Arm) -> bool:
+    still = all(abs(speed) < 1e-3 for speed in arm.velocities.values())
+    return still and arm.device.mode is not gemelo.DeviceMode.RUN
