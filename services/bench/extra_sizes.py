@@ -13,7 +13,7 @@ from pathlib import Path
 from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
 from services.runtime.deployment import project_root
 
-EXTRAS = ("record", "broker", "planner", "view", "panel", "eyes")
+EXTRAS = ("record", "planner", "view", "panel", "eyes")
 GOAL = FigureGoal(median=150.0)  # [MB] of a host with nothing but a gateway
 INSTALLED_WITHIN = 600.0  # [s] of one environment
 

@@ -104,7 +104,7 @@ FIGURES = {
     "stop_ms": FigureRow("stops:stop_ms", "ms", True),
     "chunk_ack_ms": FigureRow("latency:chunk_ack_ms", "ms", True, "mosquitto"),
     "chunk_ack_tls_ms": FigureRow("latency:chunk_ack_tls_ms", "ms", True),
-    "chunk_ack_ms_amqtt": FigureRow("latency:chunk_ack_ms", "ms", True, "amqtt"),
+    "chunk_ack_ms_embedded": FigureRow("latency:chunk_ack_ms", "ms", True, "embedded"),
     "panel_cpu_percent": FigureRow("panel:panel_cpu_percent", "% of one core", True),
     "panel_lag_ms": FigureRow("panel:panel_lag_ms", "ms", True),
     "stop_key_ms": FigureRow("panel:stop_key_ms", "ms", True),

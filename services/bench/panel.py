@@ -139,7 +139,7 @@ def goal_drag_hz(stacks: Stacks) -> Figure:
 def opened(stacks: Stacks) -> Iterator[Opened]:
     """Starts all but a browser, and ends it."""
     stacks.stop()
-    broker = "mosquitto" if has_mosquitto() else "amqtt"
+    broker = "mosquitto" if has_mosquitto() else "embedded"
     with Stack(broker=broker, panel=True) as stack, _arm(stack) as arm:
         deployment = load_deployment(None, stack.environment)
         yield Opened(stack, arm, f"{deployment.panel.host}:{deployment.panel.port}")

@@ -75,7 +75,7 @@ class Stacks:
         """The stack that runs, else a new one."""
         for running in self._running.values():
             return running
-        return self.with_broker("mosquitto" if has_mosquitto() else "amqtt")
+        return self.with_broker("mosquitto" if has_mosquitto() else "embedded")
 
     def _start(self, broker: str, locked_for: str) -> Running:
         stack = self._open.enter_context(Stack(broker=broker, locked_for=locked_for, viewer="none"))
@@ -150,7 +150,8 @@ def ready_s(stacks: Stacks) -> Figure:
             samples.append(skipping[-1] + stack.ready_seconds)
             count = len(stack.processes)
     note = (
-        f"deploy/bootstrap with everything done ({min(skipping):.2f} s), then {count} processes with amqtt, no viewer"
+        f"deploy/bootstrap with everything done ({min(skipping):.2f} s), then {count} processes with the embedded "
+        "broker, no viewer"
     )
     return of_samples(samples, READY_GOAL, note=note)
 

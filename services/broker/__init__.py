@@ -1,1 +1,1 @@
-"""The MQTT broker between gateway and device: amqtt in this process, or mosquitto in its place."""
+"""The MQTT broker between gateway and device: the embedded one (native/), or mosquitto."""

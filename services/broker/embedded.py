@@ -1,53 +1,41 @@
-"""amqtt in this process: enough for a simulated arm, with nothing to install."""
+"""The embedded broker: a program of our own on mochi-mqtt (native/), which `make setup` builds."""
 
 from __future__ import annotations
 
-import asyncio
-import logging
-import signal
-from collections.abc import Callable
-
-from amqtt.broker import Broker
+from pathlib import Path
 
 from schemas.deployment import MqttSection
+from services.broker.replacement import NotInstalled
+from services.mqtt import secure_folder
+from services.runtime.deployment import project_root
 
-BEAT = 1.0  # [s]
-
-
-def serve(section: MqttSection, beat: Callable[[], None]) -> int:
-    """Runs until SIGTERM or SIGINT, calling `beat` once a second while it serves; the exit code."""
-    for chatty in ("amqtt", "transitions", "asyncio"):
-        logging.getLogger(chatty).setLevel(logging.ERROR)
-    asyncio.run(_serve(section, beat))
-    return 0
+PROGRAM = ".gemelo/bin/gemelo-mqtt"  # deploy/embedded_broker.sh
+PERSISTENCE = "embedded_broker.json"  # in mqtt.persistence_folder
 
 
-async def _serve(section: MqttSection, beat: Callable[[], None]) -> None:
-    stop = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, stop.set)
-    # asyncio sets TCP_NODELAY on every connection it accepts, without which a command waits 40 ms.
-    broker = Broker(_settings(section))
-    await broker.start()
-    try:
-        while not stop.is_set():
-            beat()
-            await _wait(stop, BEAT)
-    finally:
-        await broker.shutdown()
+def find() -> Path:
+    """The path of the program; raises `NotInstalled`."""
+    program = project_root() / PROGRAM
+    if not program.is_file():
+        raise NotInstalled(
+            f'the deployment says mqtt.broker = "embedded", but {PROGRAM} is not there: make setup builds it '
+            '(EXTRAS="broker" on a host), or GEMELO_MQTT_BROKER=mosquitto'
+        )
+    return program
 
 
-async def _wait(stop: asyncio.Event, seconds: float) -> None:
-    try:
-        await asyncio.wait_for(stop.wait(), seconds)
-    except TimeoutError:
-        return
-
-
-def _settings(section: MqttSection) -> dict[str, object]:
+def command(section: MqttSection) -> list[str]:
+    """The program with its arguments: open, or with the lock that `gemelo broker secure` has made."""
     host, port = section.listening
-    return {
-        "listeners": {"default": {"type": "tcp", "bind": f"{host}:{port}"}},
-        "plugins": {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}},
-    }
+    arguments = [str(find()), f"--listen={f'[{host}]' if ':' in host else host}:{port}"]
+    if section.secure_folder:
+        folder = secure_folder.require_made(Path(section.secure_folder))
+        arguments += [
+            f"--users={folder / secure_folder.USERS}",
+            f"--acl={folder / secure_folder.ACL}",
+            f"--certificate={folder / secure_folder.CERTIFICATE}",
+            f"--key={folder / secure_folder.KEY}",
+        ]
+    if section.persistence_folder:
+        arguments.append(f"--persistence={Path(section.persistence_folder) / PERSISTENCE}")
+    return arguments

@@ -11,10 +11,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from schemas.deployment import Broker, Deployment, MqttSection
-from services.broker import mosquitto
+from services.broker import embedded, mosquitto
+from services.broker.replacement import NotInstalled, become
 from services.credentials.private_files import AccessError
 from services.mqtt.access import gateway_access
-from services.mqtt.secure_folder import CERTIFICATE
+from services.mqtt.secure_folder import CERTIFICATE, require_made
 from services.runtime.certificate_watch import CertificateWatch
 from services.runtime.deployment import DeploymentError, exposure, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
@@ -36,19 +37,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     log = line_logger("broker", options.log_level)
     try:
         return run(load_deployment(options.config), log)
-    except (DeploymentError, AccessError, PortTaken, mosquitto.NotInstalled) as error:
+    except (DeploymentError, AccessError, PortTaken, NotInstalled) as error:
         log.error("%s", error)
         return 1
 
 
 def run(deployment: Deployment, log: logging.Logger) -> int:
-    """Serves; the readiness file is beaten once a second for as long as connections are accepted."""
+    """Becomes the broker; the readiness file is beaten once a second for as long as connections are accepted."""
     section = deployment.mqtt
     folder = Path(deployment.paths.run)
     readiness = Readiness(folder, "broker", UnwrittenFiles(log.warning))
     if section.broker is Broker.EXTERNAL:
         log.info("the deployment has its broker at %s port %d: this one stands aside", section.host, section.port)
         return stand_aside(readiness)
+    if section.secure_folder:
+        require_made(Path(section.secure_folder))
     gateway_access(section)  # raises where its users and TLS cannot be
     host, port = section.listening
     if warning := exposure("mqtt", host, bool(section.secure_folder), section.insecure):
@@ -62,19 +65,11 @@ def run(deployment: Deployment, log: logging.Logger) -> int:
         readiness.beat()
         certificate.beat()
 
-    if section.broker is Broker.MOSQUITTO:
-        mosquitto.find()  # raises where it is not installed
+    is_embedded = section.broker is Broker.EMBEDDED
+    command = embedded.command(section) if is_embedded else mosquitto.command(section, folder)
     log.info("%s listens on %s port %d%s", section.broker, host, port, " with TLS" if section.secure_folder else "")
     step_ahead()  # the device's heartbeats pass through here
-    if section.broker is Broker.MOSQUITTO:
-        return mosquitto.serve(section, folder, beat, readiness.not_ready)
-    # amqtt takes half a second to import, which mosquitto need not wait for.
-    from services.broker import embedded
-
-    try:
-        return embedded.serve(section, beat)
-    finally:
-        readiness.not_ready()
+    return become(command, section, beat, readiness.not_ready)
 
 
 def shown(section: MqttSection) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from pathlib import Path
 
-BROKERS = ("amqtt", "mosquitto")
-BROKER_HELP = "[mosquitto where it is installed, else amqtt]"
+BROKERS = ("embedded", "mosquitto")
+BROKER_HELP = "[mosquitto where it is installed, else the embedded one]"
 
 
 def add_chaos_options(parser: ArgumentParser) -> None:

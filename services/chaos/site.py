@@ -20,6 +20,7 @@ from schemas.deployment import Deployment, RouterSection
 from schemas.topics import ACTIONS, CAMERA_TOPICS, TOPICS, Delivery
 from services.arm.cell.cell_file import deployed_cell
 from services.broker import mosquitto
+from services.broker.replacement import NotInstalled
 from services.chaos.clocks import ClockError, SteppingClocks
 from services.chaos.slots import SlotFile
 from services.chaos.slow_link import SlowLink
@@ -41,11 +42,11 @@ def program(process: str) -> str:
 
 
 def installed_broker() -> str:
-    """mosquitto, or amqtt where mosquitto is not installed."""
-    with suppress(mosquitto.NotInstalled):
+    """mosquitto, or the embedded broker where mosquitto is not installed."""
+    with suppress(NotInstalled):
         mosquitto.find()
         return "mosquitto"
-    return "amqtt"
+    return "embedded"
 
 
 def cell_of(deployment: Deployment) -> str:

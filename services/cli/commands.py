@@ -100,7 +100,7 @@ COMMANDS = (
             "program:run_program", "program:run_options", "gemelo program run tour --from 3.1", "program:choices"),
     Command(("program", "export"), "write the same as a Python script",
             "program:run_export", "program:export_options", "gemelo program export tour tour.py", "program:choices"),
-    Command(("broker", "secure"), "give mosquitto users, an ACL and TLS, and tell the board of them",
+    Command(("broker", "secure"), "give the broker users, an ACL and TLS, and tell the board of them",
             "broker_secure:run", "broker_secure:add_options", "gemelo broker secure --host 192.168.1.10"),
     Command(("deploy", "check"), "validate a site's file; says what runs where",
             "deploy:run_check", "deploy:site_option", "gemelo deploy check example"),

@@ -30,7 +30,7 @@ def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(prog="make demo", description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--out", type=Path, default=project_root() / "out", help="folder of the results")
-    parser.add_argument("--broker", choices=("amqtt", "mosquitto"), default=None)
+    parser.add_argument("--broker", choices=("embedded", "mosquitto"), default=None)
     parser.add_argument("--no-picture", action="store_true", help="leave out the PNG")
     options = parser.parse_args()
     try:
@@ -43,8 +43,8 @@ def main() -> None:
 
 
 def best_broker() -> str:
-    """mosquitto if it is installed, as real arms use it; else the embedded amqtt."""
-    return "mosquitto" if any(MOSQUITTO) else "amqtt"
+    """mosquitto if it is installed, as real arms use it; else the embedded one."""
+    return "mosquitto" if any(MOSQUITTO) else "embedded"
 
 
 def demonstrate(out: Path, broker: str, with_picture: bool) -> int:

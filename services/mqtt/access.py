@@ -30,7 +30,6 @@ class BrokerAccess:
     tls: ssl.SSLContext | None = field(default=None, repr=False)
     authority: str = ""  # the file that `tls` trusts; empty: those of this system
     has_certificate: bool = False  # of our own
-    speaks_5: bool = True  # MQTT 5 is tried first: it says what an ACL denies
     is_ours: bool = False  # the process `broker`
 
     def __str__(self) -> str:
@@ -70,15 +69,9 @@ def read_secret(path: str) -> str:
 
 
 def _require_consistent(section: MqttSection) -> None:
-    is_locked = bool(section.secure_folder or section.tls or section.user)
-    if section.broker is Broker.AMQTT and is_locked:
+    if section.broker is not Broker.EXTERNAL and (section.tls or section.user) and not section.secure_folder:
         raise AccessError(
-            'mqtt.broker = "amqtt" knows neither users nor TLS: set it to "mosquitto" or "external", or take '
-            "mqtt.user, mqtt.tls and mqtt.secure_folder away"
-        )
-    if section.broker is Broker.MOSQUITTO and is_locked and not section.secure_folder:
-        raise AccessError(
-            'mqtt.user and mqtt.tls are for mqtt.broker = "external": the mosquitto that gemelo starts gets its '
+            'mqtt.user and mqtt.tls are for mqtt.broker = "external": the broker that gemelo starts gets its '
             "users and TLS from mqtt.secure_folder, which `gemelo broker secure` writes"
         )
     if not section.tls and not section.secure_folder and (section.ca or section.certificate or section.key):
@@ -109,7 +102,6 @@ def _access(section: MqttSection, user: str, password: str) -> BrokerAccess:
         tls=tls_context(authority, section.certificate, section.key) if is_tls else None,
         authority=authority,
         has_certificate=bool(section.certificate),
-        speaks_5=section.broker is not Broker.AMQTT,
         is_ours=section.broker is not Broker.EXTERNAL,
     )
 

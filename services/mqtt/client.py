@@ -29,12 +29,11 @@ class MqttClient(paho.Client):
     def __init__(
         self, access: BrokerAccess, client_id: str, *, speaks_5: bool = True, reconnect_on_failure: bool = False
     ) -> None:
-        is_5 = speaks_5 and access.speaks_5
         super().__init__(
             CallbackAPIVersion.VERSION2,
             client_id=client_id,
-            clean_session=None if is_5 else True,
-            protocol=paho.MQTTv5 if is_5 else paho.MQTTv311,
+            clean_session=None if speaks_5 else True,
+            protocol=paho.MQTTv5 if speaks_5 else paho.MQTTv311,
             reconnect_on_failure=reconnect_on_failure,
         )
         if access.user:

@@ -1,4 +1,6 @@
-"""The folder that locks a mosquitto: a small authority, the broker's certificate, users with passwords, and an ACL.
+"""The folder that locks a broker: a small authority, its certificate, users with passwords, and an ACL.
+
+mosquitto and the embedded broker read the same files.
 
 Everything in it is for its owner alone, and a .gitignore keeps all of it out of any repository.
 """
@@ -7,7 +9,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import os
 import secrets
 from collections.abc import Iterable
 from pathlib import Path
@@ -27,7 +28,7 @@ CONF = """\
 listener {port} {host}
 {door}
 set_tcp_nodelay true
-persistence false
+{persistence}
 # No limit: a stop must not wait until a device has acknowledged what came before it.
 max_inflight_messages 0
 connection_messages false
@@ -35,6 +36,11 @@ log_dest stderr
 log_type error
 log_type warning
 """
+KEPT = """\
+persistence true
+persistence_location {folder}/
+autosave_on_changes true
+autosave_interval 1"""
 
 
 def make(
@@ -70,14 +76,17 @@ def password_of(folder: Path, user: str) -> str:
     return read_secret(str(folder / f"{user}.password"))
 
 
-def listener(folder: Path) -> str:
-    """The lines of mosquitto.conf that belong to a listener; raises `AccessError` if the folder was never made."""
+def require_made(folder: Path) -> Path:
+    """The folder itself; raises `AccessError` if it was never made."""
     missing = [name for name in (AUTHORITY, CERTIFICATE, KEY, USERS, ACL) if not (folder / name).is_file()]
     if missing:
         raise AccessError(f"mqtt.secure_folder: {folder} has no {missing[0]}: `gemelo broker secure` makes it")
-    # Started by root, mosquitto would become a user who cannot read these files.
-    stays = "user root\n" if os.geteuid() == 0 else ""
-    return f"{stays}{lines(folder)}"
+    return folder
+
+
+def listener(folder: Path) -> str:
+    """The lines of mosquitto.conf that belong to a listener; raises `AccessError` if the folder was never made."""
+    return lines(require_made(folder))
 
 
 def lines(folder: Path) -> str:
@@ -88,13 +97,14 @@ def lines(folder: Path) -> str:
     )
 
 
-def mosquitto_conf(host: str, port: int, door: str) -> str:
+def mosquitto_conf(host: str, port: int, door: str, persistence_folder: str = "") -> str:
     """The text of mosquitto.conf; `door` are the lines that say who may come in."""
-    return CONF.format(host=host, port=port, door=door)
+    persistence = KEPT.format(folder=persistence_folder) if persistence_folder else "persistence false"
+    return CONF.format(host=host, port=port, door=door, persistence=persistence)
 
 
 def acl(devices: Iterable[str]) -> str:
-    """mosquitto's ACL: what no line allows is denied."""
+    """The ACL in mosquitto's form, which the embedded broker reads too: what no line allows is denied."""
     parts = [
         "# Written by `gemelo broker secure`: a device writes only what it says itself, a gateway what devices hear."
     ]

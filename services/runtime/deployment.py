@@ -20,7 +20,15 @@ from schemas.errors import ConfigurationError
 from schemas.text_file import NotUtf8, read_text
 
 DEFAULT_FILE = "deploy/local.toml"
-MQTT_FILES = ("secure_folder", "password_file", "device_password_file", "ca", "certificate", "key")
+MQTT_FILES = (
+    "secure_folder",
+    "persistence_folder",
+    "password_file",
+    "device_password_file",
+    "ca",
+    "certificate",
+    "key",
+)
 ROUTER_FILES = ("configuration", "ca", "certificate", "key")
 PREFIX = "GEMELO_"
 ARMS = "arms"  # folder in `paths.run` with a deployment for each of several arms that `make up ARMS=...` started last

@@ -62,7 +62,7 @@ class Stack:
     def __init__(
         self,
         *,
-        broker: str = "amqtt",
+        broker: str = "embedded",
         locked_for: str = "",
         viewer: str = "none",
         panel: bool = False,

@@ -12,7 +12,7 @@ from services.arm.cell.cell_file import load_cell
 from services.arm.model.description import ArmDescription, load_arm, require_motors
 from services.arm.model.virtual_drive import NO_MOTORS
 from services.mqtt.access import device_access, gateway_access
-from services.mqtt.secure_folder import listener
+from services.mqtt.secure_folder import require_made
 from services.runtime.deployment import exposure, forget_arms, load_deployment, project_root
 from services.runtime.process.ports import PortTaken, require_free
 
@@ -71,8 +71,8 @@ def broker_problems(deployment: Deployment, device: str) -> list[str]:
     section = deployment.mqtt
     try:
         accesses = [gateway_access(section), *([device_access(section, device)] if device else [])]
-        if section.broker is Broker.MOSQUITTO and section.secure_folder:
-            listener(Path(section.secure_folder))
+        if section.broker is not Broker.EXTERNAL and section.secure_folder:
+            require_made(Path(section.secure_folder))
     except ConfigurationError as error:
         return [str(error)]
     if section.broker is not Broker.EXTERNAL or deployment.wire is Wire.SERIAL:

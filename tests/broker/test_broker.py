@@ -7,63 +7,17 @@ import queue
 import signal
 import socket
 import statistics
-import subprocess
-import sys
 import time
+from contextlib import suppress
 
 import paho.mqtt.client as mqtt
 import psutil
 import pytest
 
 from schemas.deployment import MqttSection
-from services.broker import mosquitto
-from services.runtime.deployment import project_root
-from services.stack.stack import free_ports
-from tests.optional import need
-
-BROKERS = ["amqtt", "mosquitto"]
-
-
-class Process:
-    """A gemelo-broker of its own port and folder."""
-
-    def __init__(self, broker, folder, port=None):
-        if broker == "mosquitto":
-            need("mosquitto")
-        self.port = port or free_ports(1)[0]
-        self.ready = folder / "broker.ready"
-        settings = {"GEMELO_MQTT_BROKER": broker, "GEMELO_MQTT_PORT": str(self.port), "GEMELO_PATHS_RUN": str(folder)}
-        self.popen = subprocess.Popen(
-            [sys.executable, "-m", "services.broker.main"],
-            cwd=project_root(),
-            env={**os.environ, **settings},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-
-    def wait_ready(self):
-        wait_until(lambda: self.ready.exists() or self.popen.poll() is not None, 10.0)
-        assert self.ready.exists(), self.popen.communicate()[0]
-
-    def stop(self):
-        if self.popen.poll() is None:
-            self.popen.terminate()
-        return self.popen.communicate(timeout=10)[0]
-
-
-def wait_until(condition, timeout):
-    deadline = time.monotonic() + timeout
-    while not condition() and time.monotonic() < deadline:
-        time.sleep(0.01)
-
-
-@pytest.fixture(params=BROKERS)
-def broker(request, tmp_path):
-    process = Process(request.param, tmp_path)
-    process.wait_ready()
-    yield process
-    process.stop()
+from services.broker import embedded, mosquitto
+from services.broker.replacement import NotInstalled
+from tests.broker.running import BROKERS, Client, RunningBroker, wait_until
 
 
 def echo_times(port, count=50):
@@ -103,32 +57,36 @@ def test_it_says_that_it_is_ready_again_and_again(broker):
     assert broker.ready.stat().st_mtime > first
 
 
-def test_a_sigterm_ends_it_at_once_with_zero_and_takes_its_readiness_back(broker):
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("name", BROKERS)
+def test_a_signal_ends_it_at_once_with_zero_and_takes_its_readiness_back(tmp_path, name, number):
+    running = RunningBroker(name, tmp_path).wait_ready()
+    Client(running.port).connected()
     started = time.monotonic()
-    output = broker.stop()
-    assert broker.popen.returncode == 0, output
-    assert time.monotonic() - started < 6.0
-    wait_until(lambda: not broker.ready.exists(), 2.0)
-    assert not broker.ready.exists()
+    running.popen.send_signal(number)
+    assert running.popen.wait(timeout=10) == 0, running.output
+    assert time.monotonic() - started < 3.0
+    wait_until(lambda: not running.ready.exists())
 
 
 def test_its_log_is_quiet(broker):
+    before = broker.output
     echo_times(broker.port, count=3)
-    output = broker.stop()
-    assert len(output.splitlines()) <= 3, output
+    Client(broker.port, will=("test/will", "x", False)).connected().cut()
+    with socket.create_connection(("127.0.0.1", broker.port)) as link:
+        link.sendall(b"GET / HTTP/1.0\r\n\r\n")
+        with suppress(ConnectionResetError):
+            assert link.recv(1) == b""
+    assert len(broker.output.splitlines()) <= 3, broker.output
+    assert broker.output == before
 
 
 @pytest.mark.parametrize("name", BROKERS)
 def test_a_killed_broker_leaves_its_port_to_the_next(tmp_path, name):
-    first = Process(name, tmp_path)
-    first.wait_ready()
-    first.popen.kill()
-    first.popen.communicate(timeout=5)  # returns when nothing holds its output any more
-    first.ready.unlink(missing_ok=True)
-    second = Process(name, tmp_path, first.port)
-    second.wait_ready()
-    second.stop()
-    assert second.popen.returncode == 0
+    running = RunningBroker(name, tmp_path).wait_ready()
+    running.restart(kill=True)
+    Client(running.port).connected().close()
+    running.stop()
 
 
 @pytest.mark.parametrize("name", BROKERS)
@@ -137,29 +95,30 @@ def test_a_taken_port_is_named_with_its_holder_and_the_setting(tmp_path, name):
         other.bind(("127.0.0.1", 0))
         other.listen()
         port = other.getsockname()[1]
-        process = Process(name, tmp_path, port)
-        output = process.popen.communicate(timeout=10)[0]
-    assert process.popen.returncode == 1
-    assert f"port {port} on 127.0.0.1 is taken" in output
-    assert f"(pid {os.getpid()})" in output
-    assert "GEMELO_MQTT_PORT" in output
-    assert "Traceback" not in output
+        running = RunningBroker(name, tmp_path, port)
+        assert running.popen.wait(timeout=10) == 1
+    assert f"port {port} on 127.0.0.1 is taken" in running.output
+    assert f"(pid {os.getpid()})" in running.output
+    assert "GEMELO_MQTT_PORT" in running.output
+    assert "Traceback" not in running.output
 
 
-def test_a_missing_mosquitto_is_said_with_the_remedy(monkeypatch):
+def test_a_missing_program_is_said_with_the_remedy(monkeypatch, tmp_path):
     monkeypatch.setattr("services.broker.mosquitto.shutil.which", lambda *_, **__: None)
-    with pytest.raises(mosquitto.NotInstalled, match="sudo apt-get install mosquitto, or GEMELO_MQTT_BROKER=amqtt"):
+    with pytest.raises(NotInstalled, match="sudo apt-get install mosquitto, or GEMELO_MQTT_BROKER=embedded"):
         mosquitto.find()
+    monkeypatch.setattr("services.broker.embedded.project_root", lambda: tmp_path)
+    with pytest.raises(NotInstalled, match=r"gemelo-mqtt is not there: make setup builds it .*BROKER=mosquitto"):
+        embedded.find()
 
 
 def test_it_stands_aside_for_a_broker_that_runs_already(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as theirs:
-        process = Process("external", tmp_path, theirs.getsockname()[1])
-        process.wait_ready()
-        output = process.stop()
-    assert process.popen.returncode == 0
+        running = RunningBroker("external", tmp_path, theirs.getsockname()[1]).wait_ready()
+        output = running.stop()
+    assert running.popen.returncode == 0
     assert "this one stands aside" in output
-    assert not process.ready.exists()
+    assert not running.ready.exists()
 
 
 def test_mosquitto_is_told_to_send_at_once_and_to_keep_nothing():
@@ -168,11 +127,3 @@ def test_mosquitto_is_told_to_send_at_once_and_to_keep_nothing():
     assert "allow_anonymous true" in conf
     assert "set_tcp_nodelay true" in conf
     assert "persistence false" in conf
-
-
-def test_an_interrupt_ends_it_too(tmp_path):
-    process = Process("amqtt", tmp_path)
-    process.wait_ready()
-    process.popen.send_signal(signal.SIGINT)
-    process.popen.communicate(timeout=5)
-    assert process.popen.returncode == 0

@@ -1,4 +1,4 @@
-"""A mosquitto that stands still is not called ready, and systemd's watchdog is not fed for it."""
+"""A broker that stands still is not called ready, and systemd's watchdog is not fed for it."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import pytest
 
 from services.mqtt import secure_folder
 from services.runtime.process.readiness import ALIVE
+from tests.broker.running import BROKERS
 from tests.optional import need
 from tests.runtime.support import ROOT, free_port, until
 
@@ -29,11 +30,13 @@ def systemd(tmp_path: Path) -> Iterator[socket.socket]:
         yield listening
 
 
-@pytest.fixture(params=["open", "locked"])
+@pytest.fixture(params=[(name, lock) for name in BROKERS for lock in ("open", "locked")], ids="-".join)
 def broker(request: pytest.FixtureRequest, systemd: socket.socket, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
-    need("mosquitto")
-    settings = {"MQTT_BROKER": "mosquitto", "MQTT_PORT": str(free_port()), "PATHS_RUN": str(tmp_path / "run")}
-    if request.param == "locked":
+    name, lock = request.param
+    if name == "mosquitto":
+        need("mosquitto")
+    settings = {"MQTT_BROKER": name, "MQTT_PORT": str(free_port()), "PATHS_RUN": str(tmp_path / "run")}
+    if lock == "locked":
         secure_folder.make(tmp_path / "secure", ["127.0.0.1"], ["rm1"])
         settings["MQTT_SECURE_FOLDER"] = str(tmp_path / "secure")
     process = subprocess.Popen(

@@ -7,7 +7,7 @@ from services.chaos.site import installed_broker
 from services.chaos.soak import ProcessSample, progress
 
 
-@pytest.mark.parametrize(("is_installed", "broker"), [(True, "mosquitto"), (False, "amqtt")])
+@pytest.mark.parametrize(("is_installed", "broker"), [(True, "mosquitto"), (False, "embedded")])
 def test_the_broker_is_mosquitto_where_it_is_installed(
     is_installed: bool, broker: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,9 +11,9 @@ from services.stack.stack import StackError
 
 BEGUN = 60.0  # [s] in which a run that does not refuse its folder would have emptied it
 COMMANDS = (
-    ("services.chaos", "--broker", "amqtt", "--minutes", "0.1"),
-    ("services.chaos.soak", "--broker", "amqtt", "--hours", "0.001"),
-    ("services.demo", "--broker", "amqtt", "--no-picture"),
+    ("services.chaos", "--broker", "embedded", "--minutes", "0.1"),
+    ("services.chaos.soak", "--broker", "embedded", "--hours", "0.001"),
+    ("services.demo", "--broker", "embedded", "--no-picture"),
 )
 
 

@@ -9,7 +9,9 @@ from services.stack.stack import PROCESSES
 
 
 def test_everything_that_a_stack_may_run_runs_in_chaos_and_less_in_a_soak(tmp_path: Path):
-    sites = [ChaosSite(tmp_path / str(is_judged), "amqtt", seed=1, is_judged=is_judged) for is_judged in (True, False)]
+    sites = [
+        ChaosSite(tmp_path / str(is_judged), "embedded", seed=1, is_judged=is_judged) for is_judged in (True, False)
+    ]
     try:
         assert sites[0].stack.processes == processes_of(load_deployment()) == PROCESSES
         assert set(PROCESSES) - set(sites[1].stack.processes) == {"viewer", "panel", "camera", "detector"}
@@ -19,7 +21,7 @@ def test_everything_that_a_stack_may_run_runs_in_chaos_and_less_in_a_soak(tmp_pa
 
 
 def test_the_logger_keeps_every_recording_of_a_long_run(tmp_path: Path):
-    site = ChaosSite(tmp_path, "amqtt", seed=1, is_judged=False)
+    site = ChaosSite(tmp_path, "embedded", seed=1, is_judged=False)
     try:
         assert SavedParameters(site.stack.run, "logger").read() == {"keep_files": 0}
     finally:

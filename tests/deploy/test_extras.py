@@ -28,7 +28,6 @@ NEVER_ON_A_GATEWAY = {
     "trimesh",
     "scipy",
     "mcap",
-    "amqtt",
 }
 IN_A_PREFIX = {"pinocchio": ["pin"], "coal": ["coal"], "hppfcl": ["coal"]}  # where metadata names no module
 IMPORT = """
@@ -113,7 +112,12 @@ def test_a_gateway_host_and_a_person_need_no_extra(module):
 def test_every_extra_that_a_service_names_is_there_and_every_extra_for_use_is_named():
     named = {extra for each in SERVICES.values() for extra in each.extras}
     assert named <= set(EXTRAS)
-    assert set(EXTRAS) - named == {"broker", "dev", "bench", "build"}  # amqtt is for one machine: a site has mosquitto
+    assert set(EXTRAS) - named == {
+        "broker",
+        "dev",
+        "bench",
+        "build",
+    }  # the embedded broker is for one machine: a site has mosquitto
     assert not SERVICES[BROKER].extras
 
 

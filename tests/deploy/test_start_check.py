@@ -90,7 +90,7 @@ def test_the_listening_port_is_the_one_that_must_be_free(free):
 def test_a_word_that_the_deployment_does_not_know_is_refused_with_those_it_does(monkeypatch, capsys):
     monkeypatch.setenv("GEMELO_MQTT_BROKER", "mosquito")
     assert main() == 1
-    assert "known are amqtt, mosquitto, external" in capsys.readouterr().err
+    assert "known are embedded, mosquitto, external" in capsys.readouterr().err
 
 
 def test_an_arm_without_motors_starts_with_a_virtual_device_and_is_refused_a_board(free, tmp_path, capsys, monkeypatch):

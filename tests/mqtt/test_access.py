@@ -66,7 +66,7 @@ def test_the_device_has_its_own_user_else_that_of_the_gateway(password, tmp_path
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"broker": Broker.AMQTT, "user": "ada"}, 'mqtt.broker = "amqtt" knows neither users nor TLS'),
+        ({"broker": Broker.EMBEDDED, "user": "ada"}, "`gemelo broker secure` writes"),
         ({"broker": Broker.MOSQUITTO, "tls": True}, "`gemelo broker secure` writes"),
         ({"ca": "ca.pem"}, "set mqtt.tls = true too"),
         ({"tls": True, "key": "client.key"}, "mqtt.key is the key of mqtt.certificate, which is not set"),

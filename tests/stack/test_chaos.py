@@ -40,7 +40,7 @@ def test_the_clocks_of_the_host_and_of_single_processes_step_in_the_middle_of_mo
         "--only",
         "clock steps",
         "--broker",
-        "amqtt",
+        "embedded",
         "--seed",
         str(SEED),
     ]
@@ -58,9 +58,9 @@ def test_the_clocks_of_the_host_and_of_single_processes_step_in_the_middle_of_mo
 @pytest.mark.parametrize(
     "command",
     [
-        ("services.chaos.soak", "--broker", "amqtt", "--out"),
+        ("services.chaos.soak", "--broker", "embedded", "--out"),
         ("services.bench", "--only", "move_accept_to_first_step_ms", "--out"),
-        ("services.demo", "--broker", "amqtt", "--no-picture", "--out"),
+        ("services.demo", "--broker", "embedded", "--no-picture", "--out"),
     ],
     ids=lambda command: command[0],
 )

@@ -160,7 +160,7 @@ def test_every_log_is_kept_and_no_process_has_complained(stack):
 
 def test_ctrl_c_ends_everything_with_zero_and_leaves_nothing_behind(tmp_path):
     # As a user starts it: `Stack` alone leaves dependencies out, and with them the order of stopping.
-    with Stack(broker="amqtt", out=tmp_path, viewer="web", command=("deploy/up",)) as stack:
+    with Stack(broker="embedded", out=tmp_path, viewer="web", command=("deploy/up",)) as stack:
         stream_a_little(stack)
         pids = [psutil.Process(pid) for pid in stack.pids().values()]
         family = [each for pid in pids for each in [pid, *pid.children(recursive=True)]]
@@ -189,7 +189,7 @@ def stream_a_little(stack):
 
 
 def test_make_up_welcomes_the_user_and_a_sigterm_ends_it(tmp_path):
-    with Stack(broker="amqtt", out=tmp_path, viewer="web", command=("make", "--silent", "up")) as stack:
+    with Stack(broker="embedded", out=tmp_path, viewer="web", command=("make", "--silent", "up")) as stack:
         deadline = time.monotonic() + 15.0
         while "stop it" not in stack.console() and time.monotonic() < deadline:
             time.sleep(0.1)

@@ -16,7 +16,7 @@ from tests.optional import need
 from tests.stacks.reset import Reset
 
 NEEDED = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner")
-BROKER = "mosquitto" if shutil.which("mosquitto", path="/usr/bin:/usr/sbin:/usr/local/sbin") else "amqtt"
+BROKER = "mosquitto" if shutil.which("mosquitto", path="/usr/bin:/usr/sbin:/usr/local/sbin") else "embedded"
 
 
 class Kind(NamedTuple):

@@ -11,7 +11,7 @@ import pytest
 from tests.stepper_gateway.processes import DEVICE, Processes
 
 
-@pytest.fixture(params=["mosquitto", "amqtt"])
+@pytest.fixture(params=["mosquitto", "embedded"])
 def processes(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Processes]:
     with closing(Processes(request.param, tmp_path)) as found:
         found.start_broker()

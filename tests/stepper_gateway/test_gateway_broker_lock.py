@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import socket
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
+import pytest
 from msgspec.structs import replace
 
 from firmware.platform.host.link import COMMANDS, REPORTS
-from schemas.deployment import MqttSection
+from schemas.deployment import Broker, MqttSection
 from services.credentials.authority import Authority
 from services.mqtt import secure_folder
 from services.mqtt.access import device_access, gateway_access
@@ -130,15 +133,33 @@ def test_a_refused_gateway_asks_ever_more_seldom_and_a_vanished_broker_is_met_ag
             assert time.monotonic() - began < 6.0
 
 
-def test_the_old_brokers_are_joined_by_their_own_version(tmp_path: Path) -> None:
-    """amqtt speaks MQTT 3.1.1 only, and can be anybody's."""
-    from tests.stepper_gateway.processes import Processes
+def serve_old(listening: socket.socket, answer: bytes) -> None:
+    """A broker of MQTT 3.1.1, which has `answer` for another version, and hangs up."""
+    while True:
+        try:
+            wire, _ = listening.accept()
+        except OSError:
+            return
+        with wire:
+            if wire.recv(1024)[8] != 4:
+                wire.sendall(answer)
+                continue
+            wire.sendall(b"\x20\x02\x00\x00")
+            subscribe = wire.recv(4096)
+            number = subscribe.index(b"\x00")  # after the length: the packet's number has two bytes, the first 0
+            wire.sendall(
+                b"\x90" + bytes([2 + len(FROM_DEVICE)]) + subscribe[number : number + 2] + b"\x01" * len(FROM_DEVICE)
+            )
+            while wire.recv(4096):
+                pass
 
-    with closing(Processes("amqtt", tmp_path)) as processes:
-        processes.start_broker()
-        section = replace(processes.deployment.mqtt, broker=external(locked(tmp_path / "lock")).broker)
-        link = MqttLink(gateway_access(section, {}), "rm1", lambda: None)
-        with closing(link):
+
+@pytest.mark.parametrize("answer", [b"\x20\x02\x00\x01", b""], ids=["says so", "hangs up"])
+def test_an_old_broker_is_joined_by_its_own_version(answer: bytes) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        threading.Thread(target=serve_old, args=(listening, answer), daemon=True).start()
+        section = MqttSection(broker=Broker.EXTERNAL, port=listening.getsockname()[1])
+        with closing(MqttLink(gateway_access(section, {}), "rm1", lambda: None)) as link:
             wait_for(lambda: link.connected)
 
 

@@ -1,0 +1,85 @@
+"""The broker's own program in the place of this process (exec), so that a signal to this process ends the broker."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import select
+import signal
+import socket
+import ssl
+import sys
+from collections.abc import Callable, Sequence
+
+from schemas.deployment import MqttSection
+
+BEAT = 1.0  # [s]
+PATIENCE = 1.5  # [s] for the handshake, and again for the answer: with BEAT less than the watchdog of its unit
+FILES = 16_384  # descriptors: above any flood that is held off, and no more than the system allows
+# MQTT 3.1.1, 3.1: protocol, level 4, a session that leaves nothing, 5 s of keep-alive, no name, no user.
+CONNECT = b"\x10\x0c\x00\x04MQTT\x04\x02\x00\x05\x00\x00"
+CONNACK, DISCONNECT = b"\x20", b"\xe0\x00"
+
+
+class NotInstalled(Exception):
+    """The broker's program is not on this machine; one sentence with the remedy."""
+
+
+def become(command: Sequence[str], section: MqttSection, beat: Callable[[], None], on_end: Callable[[], None]) -> int:
+    """Becomes the program; a child process calls `beat` once a second while it answers, and `on_end` when it has ended.
+
+    Does not return in the process that becomes it.
+    """
+    alive, held = os.pipe()
+    if os.fork() == 0:
+        os.close(held)
+        _watch_broker(section, alive, beat, on_end)
+        os._exit(0)
+    os.close(alive)
+    # Held open by the broker, never written: its end is seen by the companion whatever way it ends.
+    os.set_inheritable(held, True)
+    _allow_files()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os.execv(command[0], list(command))
+
+
+def _allow_files() -> None:
+    limit, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = FILES if most == resource.RLIM_INFINITY else min(FILES, most)
+    if limit != resource.RLIM_INFINITY and limit < wanted:
+        with contextlib.suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
+
+
+def _watch_broker(section: MqttSection, alive: int, beat: Callable[[], None], on_end: Callable[[], None]) -> None:
+    for number in (signal.SIGTERM, signal.SIGINT):  # they are the broker's; this one ends with it
+        signal.signal(number, signal.SIG_IGN)
+    interval = 0.02
+    while not select.select([alive], [], [], interval)[0]:
+        if _answers(section):
+            interval = BEAT
+            beat()
+    on_end()
+
+
+def _answers(section: MqttSection) -> bool:
+    """It says yes or no to a client: the kernel accepts connections also for one that stands still."""
+    try:
+        with socket.create_connection(section.listening, timeout=PATIENCE) as plain, _wrapped(section, plain) as link:
+            link.sendall(CONNECT)
+            answer = link.recv(4)
+            link.sendall(DISCONNECT)
+    except OSError:
+        return False
+    return answer.startswith(CONNACK)
+
+
+def _wrapped(section: MqttSection, link: socket.socket) -> socket.socket:
+    if not section.secure_folder:
+        return link
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    # It is our own broker, at our own address; one whose certificate has ended still answers.
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    return context.wrap_socket(link)
