@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from gemelo.scene import Scene
     from gemelo.scene_files import load_mesh
     from gemelo.seeing import Seen
+    from gemelo.simulation import SimulatedArm, SimulatedArms, Simulation, simulate
     from gemelo.units import Pose, deg, mm
     from gemelo.verification import Verification
     from schemas import topics
@@ -70,6 +71,9 @@ __all__ = [
     "Robot",
     "Scene",
     "Seen",
+    "SimulatedArm",
+    "SimulatedArms",
+    "Simulation",
     "StopKind",
     "Target",
     "ToolGoal",
@@ -80,6 +84,7 @@ __all__ = [
     "load_robot",
     "mm",
     "robots",
+    "simulate",
     "topics",
 ]
 
@@ -101,6 +106,7 @@ MODULES = {
     "gemelo.scene": ("Scene",),
     "gemelo.scene_files": ("load_mesh",),
     "gemelo.seeing": ("Seen",),
+    "gemelo.simulation": ("SimulatedArm", "SimulatedArms", "Simulation", "simulate"),
     "gemelo.units": ("Pose", "deg", "mm"),
     "gemelo.verification": ("Verification",),
     "schemas.actions": ("GoalStatusCode",),

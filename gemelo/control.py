@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -17,6 +16,7 @@ from schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlStat
 from schemas.deployment import Deployment
 from schemas.topics import CONTROL, CONTROL_GIVE, CONTROL_JOIN, CONTROL_TAKE
 from services.runtime import errors as runtime
+from services.runtime.clock import token
 from services.runtime.node import Node
 
 TO_REST = 15.0  # [s] that the arm may take to come to rest, where another moves it
@@ -103,7 +103,7 @@ class Control:
         >>> secret = arm.control.take("ana")
         >>> arm.control.give()
         """
-        node, secret = self._session.node, secrets.token_hex(32)
+        node, secret = self._session.node, token(self._session.clock, 256)
         question = ControlTake(name=name or node.name[:40], client=node.token, secret=secret, force=force)
         answer = self._require(self._session.call(CONTROL_TAKE, question, TO_REST), "take")
         self._own = HeldControl(secret, answer.epoch, answer.number)

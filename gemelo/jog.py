@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 
 from msgspec.structs import replace
@@ -40,7 +39,7 @@ class JogCommands:
 
     def say(self, command: JogCommand) -> JogStatus | None:
         """Moves for 0.1 s; the planner's newest word on this jog. Raises `Refused`, or `Lost` where it says no more."""
-        now = time.monotonic()
+        now = self._session.clock.monotonic()
         self._session.latest(JOG_STATUS, self._on_status)
         if now - self._said > PAUSE:
             self._began = now
@@ -65,13 +64,13 @@ class JogCommands:
         self, command: JogCommand, duration: float, on_progress: Callable[[JogStatus], object] | None
     ) -> JogStatus:
         """Says it for `duration` [s], then waits until the arm rests; raises `Interrupted` at Ctrl-C, when it rests."""
-        end = time.monotonic() + duration
+        end = self._session.clock.monotonic() + duration
         try:
-            while time.monotonic() < end:
+            while self._session.clock.monotonic() < end:
                 status = self.say(command)
                 if status is not None and on_progress is not None:
                     on_progress(status)
-                self._session.wait_for(lambda: False, min(PERIOD, max(0.0, end - time.monotonic())))
+                self._session.wait_for(lambda: False, min(PERIOD, max(0.0, end - self._session.clock.monotonic())))
         except KeyboardInterrupt:
             self.rest()
             raise Interrupted("jogging stopped by Ctrl-C") from None
@@ -99,7 +98,7 @@ class JogCommands:
 
     def _on_status(self, status: JogStatus) -> None:
         if status.client in ("", self._session.node.name):
-            self._heard, self._heard_at = status, time.monotonic()
+            self._heard, self._heard_at = status, self._session.clock.monotonic()
 
     def _heard_since(self, began: float) -> JogStatus | None:
         """The newest status, if it came after `began` [s] monotonic."""
@@ -122,7 +121,7 @@ class Streaming:
         _require_within(arm, dict(zip(state.name, state.position, strict=True)))
         self._session.latest(DEVICE_EVENTS, self._on_event)
         node = self._session.node
-        now = time.monotonic()
+        now = self._session.clock.monotonic()
         if now - self._said > PAUSE:
             self._began = now
         self._said = now
@@ -141,7 +140,7 @@ class Streaming:
         """Only of the stream that runs, and not of another's: events of before may come late."""
         if event.client not in ("", self._session.node.name):
             return
-        if event.event == "target_refused" and time.monotonic() - self._said < PAUSE:
+        if event.event == "target_refused" and self._session.clock.monotonic() - self._said < PAUSE:
             self._refused = event.detail
 
 

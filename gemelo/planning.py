@@ -5,7 +5,6 @@ With `targets` the only place that knows the planner's messages.
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -40,6 +39,7 @@ from schemas.scene import Contact
 from schemas.text_file import NotUtf8, read_text
 from schemas.topics import FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS, STATE_VALIDITY
 from services.arm.model.description import ArmDescription
+from services.runtime.clock import token
 from services.runtime.requests.client import PendingCall
 
 MARGIN = 2.0  # [s] that a planner may take beyond its allowed time before it counts as gone
@@ -178,7 +178,7 @@ def make_plan(session: Session, asked: PlanRequest, target: Target, on_progress:
     """
     until = session.node.monotonic() + COMING_TO_REST
     while True:
-        request = replace(asked, request_id=uuid.uuid4().hex)
+        request = replace(asked, request_id=token(session.clock))
         response = _ask(session, request, on_progress)
         if not _is_moving_start(response) or session.node.monotonic() > until:
             break

@@ -6,7 +6,6 @@ import os
 import re
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import count
@@ -40,15 +39,21 @@ class Session:
     def __init__(self, deployment: Deployment, description: ArmDescription, node: Node) -> None:
         """Takes over a `node` that does not spin yet, and closes it in the end."""
         self.deployment, self.description, self._node = deployment, description, node
-        self.news = threading.Condition()  # notified after every message that was handled
+        self.clock = node.clock
+        self.news = self.clock.condition()  # notified after every message that was handled
         self._latest: dict[str, Latest[Any]] = {}
         self._changed = 0.0  # [s] monotonic: what is asked from now on must have been heard after this
         self._changed_unix = 0  # [ns] the same moment, after which it should also have been measured
         self._clocks: dict[str, NodeClock] = {}  # by the name of the node
         self._pid = os.getpid()
         self._failure: BaseException | None = None
-        self._thread = threading.Thread(target=self._run, name=self._node.name, daemon=True)
-        self._thread.start()
+        self._is_closed = False
+        self._thread: threading.Thread | None = None  # in virtual time whoever waits runs the node
+        if self.clock.is_virtual:
+            node.begin(rate=IDLE_RATE)
+        else:
+            self._thread = threading.Thread(target=self._run, name=self._node.name, daemon=True)
+            self._thread.start()
 
     @property
     def node(self) -> Node:
@@ -57,7 +62,7 @@ class Session:
             raise Error(f"this connection belongs to process {self._pid}: a forked process calls gemelo.connect() anew")
         if self._failure is not None:
             raise Lost(f"the connection has ended: {self._failure}") from self._failure
-        if not self._thread.is_alive():
+        if self._is_closed or (self._thread is not None and not self._thread.is_alive()):
             raise Lost("this connection is closed: call gemelo.connect() anew")
         return self._node
 
@@ -65,7 +70,7 @@ class Session:
         """The newest message of `topic`, heard from the first call on; `handle` is called with every one of them."""
         node = self.node
         if topic.key not in self._latest:
-            latest = self._latest[topic.key] = Latest(topic)
+            latest = self._latest[topic.key] = Latest(topic, self.clock)
 
             def on_message(message: M) -> None:
                 with self.news:
@@ -79,10 +84,11 @@ class Session:
 
     def newest(self, topic: Topic[M]) -> M:
         """A message that came after the last motion or command, not older than its rate allows; raises `Lost`."""
+        self.clock.look()
         latest = self.latest(topic)
 
         def is_fresh() -> bool:
-            return not latest.is_stale and latest.age() < max(0.0, time.monotonic() - self._changed)
+            return not latest.is_stale and latest.age() < max(0.0, self.clock.monotonic() - self._changed)
 
         def is_there() -> bool:
             return latest.message is not None if topic.rate is None else is_fresh()
@@ -113,7 +119,7 @@ class Session:
 
     def changed(self) -> None:
         """Something has moved or was switched: what was heard before is no longer fresh."""
-        self._changed, self._changed_unix = time.monotonic(), time.time_ns()
+        self._changed, self._changed_unix = self.clock.monotonic(), self.clock.unix()
 
     def notify(self) -> None:
         """Wakes who waits; from any thread."""
@@ -124,14 +130,14 @@ class Session:
         self, is_so: Callable[[], bool], timeout: float | None, on_news: Callable[[], None] | None = None
     ) -> bool:
         """Sleeps until `is_so()`, looking after every message; False after `timeout` [s]. `on_news` runs in between."""
-        if threading.current_thread() is self._thread:
+        if self._thread is not None and threading.current_thread() is self._thread:
             raise Error("this waits for messages, so it cannot be called where messages are handled")
-        end = None if timeout is None else time.monotonic() + timeout
+        end = None if timeout is None else self.clock.monotonic() + timeout
         while True:
             with self.news:
                 if is_so():
                     return True
-                left = 1.0 if end is None else end - time.monotonic()
+                left = 1.0 if end is None else end - self.clock.monotonic()
                 if left <= 0.0:
                     return False
                 self.news.wait(min(left, 1.0))
@@ -155,8 +161,9 @@ class Session:
     def close(self) -> None:
         """Leaves the bus; may be called twice."""
         if os.getpid() == self._pid:
+            self._is_closed = True
             self._node.stop()
-            if threading.current_thread() is not self._thread:
+            if self._thread is not None and threading.current_thread() is not self._thread:
                 self._thread.join(CLOSING)
             self._node.close()
 

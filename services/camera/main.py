@@ -35,10 +35,8 @@ def run(node: Node, deployment: Deployment) -> None:
 
     cameras = Cameras(node, arm, cell)
     node.every(CAMERA_FILE_PERIOD, _watch(node, arm, cell, cameras.tell_about))
-    try:
-        node.spin(cameras.step, rate=RATE)
-    finally:
-        cameras.close()
+    node.at_end(cameras.close)
+    node.spin(cameras.step, rate=RATE)
 
 
 def _watch(node: Node, arm: ArmDescription, cell: Cell, tell: Callable[[Cell], None]) -> Callable[[], None]:

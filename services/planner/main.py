@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import closing
-
 from schemas.deployment import Deployment
 from schemas.topics import JOINT_STATES
 from services.arm.model.description import load_arm
@@ -14,8 +12,9 @@ from services.planner.parameters import PlannerParameters
 from services.planner.request.start_state import STALE_AFTER
 from services.planner.scene.answer_log import AnswerLog
 from services.planner.scene.scene_keeper import SceneKeeper
-from services.planner.workers.plan_service import PlanService
-from services.planner.workers.workers import Workers
+from services.planner.workers.in_process import PlansInProcess
+from services.planner.workers.plan_service import PlanMaker, PlanService
+from services.planner.workers.workers import Present, Workers
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
@@ -34,7 +33,12 @@ def run(node: Node, deployment: Deployment) -> None:
     keeper = SceneKeeper(node, arm, states, project_root() / deployment.paths.run, planner.set_world, log)
     JogService(node, arm, states, lambda: keeper.world, lambda: parameters.value.record_inputs)
     KinematicService(node, arm, states, lambda: planner.checker.newest, log)
-    workers = Workers(arm.folder, project_root(), lambda: (states.message, states.age()), lambda: keeper.world.scene)
+    present: Present = lambda: (states.message, states.age())  # noqa: E731
+    workers: PlanMaker
+    if node.clock.is_virtual:
+        workers = PlansInProcess(node.clock, planner, present, lambda: keeper.world.scene)
+    else:
+        workers = Workers(arm.folder, project_root(), present, lambda: keeper.world.scene)
     plans = PlanService(node, workers, planner, keeper, lambda: parameters.value.record_inputs)
 
     def step(now: int) -> None:
@@ -42,8 +46,8 @@ def run(node: Node, deployment: Deployment) -> None:
         reason = NOT_READY if states.age() >= STALE_AFTER else "" if workers.are_ready else STARTING
         node.set_ready(not reason, reason)
 
-    with closing(workers):
-        node.spin(step, rate=RATE)
+    node.at_end(workers.close)
+    node.spin(step, rate=RATE)
 
 
 def main() -> None:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import socket
-import time
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -26,6 +23,7 @@ from schemas.topics import Request, Topic
 from services.runtime.actions.server import ActionServer
 from services.runtime.bus.branches import branch_of
 from services.runtime.bus.identity import Identity
+from services.runtime.clock import SYSTEM, Clock
 from services.runtime.loop.loop import LoopFigures
 from services.runtime.requests.server import RequestServer
 from services.runtime.topics import Publisher, Subscription
@@ -65,13 +63,13 @@ class NodeEndpoints:
         self.subscriptions.append(subscription)
         subscription.on_close = lambda: self.subscriptions.remove(subscription)
 
-    def info(self, identity: Identity, robot: str) -> NodeInfo:
+    def info(self, identity: Identity, robot: str, clock: Clock = SYSTEM) -> NodeInfo:
         """The node's identity and endpoints."""
         return NodeInfo(
             node=identity.name,
             robot=robot,
-            host=socket.gethostname(),
-            pid=os.getpid(),
+            host=clock.host(),
+            pid=clock.process(),
             version=_own_version(),
             started=identity.started,
             publishes=tuple(sorted(key for key in self.publishers if not key.startswith("@"))),
@@ -131,18 +129,18 @@ SHORTEST = 0.5  # [s] that a report must cover
 class LoopStatistics:
     """Turns counters into one `NodeStatistics` a second."""
 
-    def __init__(self, identity: Identity) -> None:
-        self._identity = identity
-        self._wall, self._cpu = time.monotonic(), time.process_time()
+    def __init__(self, identity: Identity, clock: Clock = SYSTEM) -> None:
+        self._identity, self._clock = identity, clock
+        self._wall, self._cpu = clock.monotonic(), clock.cpu()
 
     def report(self, figures: LoopFigures, topics: tuple[TopicStatistics, ...]) -> NodeStatistics | None:
         """None where hardly any time has passed since the last one."""
-        wall, cpu = time.monotonic(), time.process_time()
+        wall, cpu = self._clock.monotonic(), self._clock.cpu()
         elapsed = wall - self._wall
         if elapsed < SHORTEST:
             return None
         message = NodeStatistics(
-            stamp=time.time_ns(),
+            stamp=self._clock.unix(),
             node=self._identity.name,
             loop_rate=figures.steps / elapsed,
             loop_late_max=figures.late_max,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
@@ -31,6 +30,7 @@ from services.runtime.bus.connection import connect
 from services.runtime.bus.interface import Bus, Declaration
 from services.runtime.certificate_watch import CertificateWatch
 from services.runtime.client_watch import Absences, ClientWatch
+from services.runtime.clock import SYSTEM, Clock
 from services.runtime.deployment import load_deployment, project_root, robot_name
 from services.runtime.endpoints import (
     LoopStatistics,
@@ -84,20 +84,21 @@ class Node:
     ) -> None:
         """Waits for the router; raises `NodeNameTaken` where `name` lives already. `overrides` are parameters, `rates`
         how much of what is asked is taken, if not as much as usual."""
-        self._identity = identity.identify(name)
+        self.clock: Clock = SYSTEM if bus is None else bus.clock
+        self._identity = identity.identify(name, self.clock)
         self.name = name
         self.deployment = deployment if deployment is not None else load_deployment()
         self.robot = robot or robot_name(self.deployment)
         self.log = line_logger(name, log_level)
         self._signals = stop is None
         self._stop = stop or ShutdownRequest()
-        self._loop = Loop(self._stop)
-        self._worker = Worker()
+        self._loop = Loop(self._stop, self.clock)
+        self._worker = Worker(self.clock)
         self.unwritten = UnwrittenFiles(self.log.warning)
         self._readiness: Readiness | None = None
         self._problem = ""  # why it is not ready
         self._endpoints = NodeEndpoints()
-        self._rates = rates or RequestRates()
+        self._rates = rates or RequestRates(clock=self.clock)
         from_file = self.deployment.parameters.get(name, {})
         saved = SavedParameters(project_root() / self.deployment.paths.run, name)
         self._parameters = ParameterRegistry(name, from_file, overrides or {}, saved, self.log)
@@ -114,9 +115,10 @@ class Node:
         except BaseException:
             self._bus.close()
             raise
-        self._log_to_bus = BusHandler(lambda record: self.publisher(LOG).put(record))
+        self._log_to_bus = BusHandler(lambda record: self.publisher(LOG).put(record), self.clock)
         self.log.addHandler(self._log_to_bus)
-        self._statistics = LoopStatistics(self._identity)
+        self._statistics = LoopStatistics(self._identity, self.clock)
+        self._at_end: list[Callable[[], object]] = []
 
     def __enter__(self) -> Self:
         return self
@@ -160,7 +162,7 @@ class Node:
             unread = LatestOnDemand(self._bus, self._loop, topic, self.log.warning)
             self._endpoints.add(unread.subscription)
             return unread
-        latest = Latest(topic)
+        latest = Latest(topic, self.clock)
         self.subscribe(topic, latest.on_message)
         return latest
 
@@ -213,7 +215,9 @@ class Node:
     def serve_action(self, action: Action[G, F, R], on_goal: OnGoal[G], on_cancel: OnCancel) -> ActionServer[G, F, R]:
         """Serves an action: `on_goal(goal_id, goal)` accepts or refuses, `on_cancel(goal_id)` says "" or why not."""
         clients = ClientWatch(self._watch_alive, lambda: self._bus.is_connected)
-        server = ActionServer(action, on_goal, on_cancel, self._serve, self.publisher, clients, self.log.warning)
+        server = ActionServer(
+            action, on_goal, on_cancel, self._serve, self.publisher, clients, self.log.warning, self.clock
+        )
         self._loop.every(ActionServer.HEARTBEAT, server.beat)
         self._endpoints.actions.append(server)
         return server
@@ -243,7 +247,7 @@ class Node:
 
     def info(self) -> NodeInfo:
         """The node's identity, endpoints, readiness, and its clock."""
-        about = self._endpoints.info(self._identity, self.robot)
+        about = self._endpoints.info(self._identity, self.robot, self.clock)
         return msgspec.structs.replace(
             about,
             clock=self.now(),
@@ -289,11 +293,11 @@ class Node:
 
     def now(self) -> int:
         """[ns] UNIX time: for stamps."""
-        return time.time_ns()
+        return self.clock.unix()
 
     def monotonic(self) -> float:
         """[s] for durations."""
-        return time.monotonic()
+        return self.clock.monotonic()
 
     def spin(self, step: Callable[[int], object] = lambda now: None, rate: float = 50.0) -> None:
         """Calls `step(now [ns])` at `rate` [Hz], with queued tasks between, until SIGTERM, SIGINT or `stop()`.
@@ -317,6 +321,15 @@ class Node:
             self._loop.forget(self._beat)
             if self._readiness is not None:
                 self._readiness.not_ready()
+
+    def begin(self, step: Callable[[int], object] = lambda now: None, rate: float = 50.0) -> None:
+        """As `spin`, in virtual time only: returns at once, and the clock runs the node whenever somebody waits."""
+        self._loop.every(BEAT, self._beat)
+        self._loop.begin(step, rate)
+
+    def at_end(self, task: Callable[[], object]) -> None:
+        """`task` is called when the node closes, while it can still publish; the last that was given is the first."""
+        self._at_end.append(task)
 
     def wait(self, seconds: float) -> None:
         """Handles queued tasks for `seconds` [s]: for scripts that do not spin."""
@@ -343,6 +356,14 @@ class Node:
         if self._is_closed:
             return
         self._is_closed = True
+        try:
+            while self._at_end:
+                self._at_end.pop()()
+        finally:
+            self._leave()
+
+    def _leave(self) -> None:
+        self._loop.end()
         if self._readiness is not None:
             self._readiness.not_ready()
         self._worker.close()

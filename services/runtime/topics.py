@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
@@ -13,6 +12,7 @@ from schemas.topics import ANY, Delivery, Topic
 from services.runtime.bus.branches import is_by_every_node, name_in
 from services.runtime.bus.interface import Arrival, Bus
 from services.runtime.bus.wire import from_arrival, schema_of, to_payload
+from services.runtime.clock import SYSTEM, Clock
 from services.runtime.loop.loop import Loop
 from services.runtime.loop.task_queue import ArrivalQueue, EveryQueue, LatestQueue, UnreadQueue
 
@@ -144,8 +144,9 @@ def _require_own_name(key: str, message: Message, writer: str) -> None:
 class Latest(Generic[M]):
     """The newest message of a topic."""
 
-    def __init__(self, topic: Topic[M]) -> None:
+    def __init__(self, topic: Topic[M], clock: Clock = SYSTEM) -> None:
         self.topic = topic
+        self._clock = clock
         self._message: M | None = None
         self._arrived = 0.0  # [s] monotonic
         self._arrived_unix = 0  # [ns]
@@ -158,14 +159,14 @@ class Latest(Generic[M]):
 
     def on_message(self, message: M) -> None:
         self._message = message
-        self._arrived, self._arrived_unix = time.monotonic(), time.time_ns()
+        self._arrived, self._arrived_unix = self._clock.monotonic(), self._clock.unix()
 
     def age(self, now: int | None = None) -> float:
         """[s] since the message came, up to `now` [ns UNIX] where given; infinite before the first."""
         self._look()
         if self._message is None:
             return float("inf")
-        return time.monotonic() - self._arrived if now is None else (now - self._arrived_unix) * 1e-9
+        return self._clock.monotonic() - self._arrived if now is None else (now - self._arrived_unix) * 1e-9
 
     @property
     def is_stale(self) -> bool:
@@ -187,8 +188,8 @@ class LatestOnDemand(Latest[M]):
     """
 
     def __init__(self, bus: Bus, loop: Loop, topic: Topic[M], warn: Warn) -> None:
-        super().__init__(topic)
-        self._queue, self._looking = UnreadQueue(), threading.Lock()
+        super().__init__(topic, bus.clock)
+        self._queue, self._looking = UnreadQueue(bus.clock), threading.Lock()
         self.subscription = Subscription(bus, loop, topic, self.on_message, warn, False, None, queue=self._queue)
 
     def _look(self) -> None:

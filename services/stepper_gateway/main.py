@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import secrets
 import sys
 from collections.abc import Callable
-from contextlib import closing
 from pathlib import Path
 
 from schemas.deployment import Deployment, DeviceKind, Wire
@@ -32,26 +30,36 @@ NO_PRIORITY = (
 )
 
 
-def run(node: Node, deployment: Deployment) -> None:
+OpenDevice = Callable[[Deployment, ArmDescription, Callable[[], None]], Link]
+
+
+def run(node: Node, deployment: Deployment, open_wire: OpenDevice | None = None) -> None:
     """Serve until the node is stopped; ready while the device is online, synchronised and its state fresh."""
-    sys.setswitchinterval(SWITCH_INTERVAL)
     arm = load_arm(project_root() / deployment.robot)
     require_motors(arm, deployment.device)
     parameters = node.parameters(GatewayParameters)
-    file = LedgerFile(project_root() / deployment.paths.run, arm.name, node.unwritten)
+    file = LedgerFile(project_root() / deployment.paths.run, arm.name, node.unwritten, node.clock)
     kept, trouble = read_ledger(file.path)
     if trouble:
         node.log.warning(trouble)
-    began = BeganInput(secrets.randbelow(2**31 - 1) + 1, parameters.value, kept)
+    began = BeganInput(node.clock.bits(31) or 1, parameters.value, kept)
     core = GatewayCore(arm, began.session, began.parameters, began.kept)
     shell = Shell(node, core, began, parameters, file)
-    with closing(file), closing(open_device(deployment, arm, shell.wake)) as link:
-        shell.use(link)
-        if not step_ahead():
-            node.log.info(NO_PRIORITY)
-        node.spin(shell.step, rate=RATE)
-        shell.finish()
-        file.keep(core.ledger_record())
+    link = (open_wire or open_device)(deployment, arm, shell.wake)
+    node.at_end(file.close)
+    node.at_end(link.close)
+    node.at_end(lambda: file.keep(core.ledger_record()))
+    node.at_end(shell.finish)
+    shell.use(link)
+    node.spin(shell.step, rate=RATE)
+
+
+def run_ahead(node: Node, deployment: Deployment) -> None:
+    """As `run`, in a process of its own, which heartbeats and stops go through."""
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    if not step_ahead():
+        node.log.info(NO_PRIORITY)
+    run(node, deployment)
 
 
 def open_device(deployment: Deployment, arm: ArmDescription, wake: Callable[[], None]) -> Link:
@@ -98,7 +106,7 @@ def serial_device(deployment: Deployment) -> str:
 
 def main() -> None:
     """Console script `gemelo-stepper-gateway`."""
-    service("stepper_gateway", run)
+    service("stepper_gateway", run_ahead)
 
 
 if __name__ == "__main__":

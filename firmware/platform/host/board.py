@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-import secrets
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
@@ -15,9 +15,11 @@ from firmware.platform.host.firmware_slots import Booted, FirmwareSlots
 from firmware.platform.host.flash import Flash, NetworkCredentials
 from firmware.platform.host.memory import BootState, PositionStore, StoredPosition
 from schemas.device_config import config_text
+from schemas.robot import Motor
 from services.arm.device.device_config import device_config, reference_steps
 from services.arm.model.description import ArmDescription
 from services.arm.model.gripper import gripper_unit
+from services.runtime.clock import SYSTEM, Clock
 from services.runtime.process.unwritten import UnwrittenFiles, remedy_of
 
 
@@ -49,16 +51,26 @@ log = logging.getLogger("virtual_esp32")
 class Board:
     """One board of an arm's; its files lie in `folder`.
 
-    It leaves the factory with the configuration that robot.toml asks for, and the arm in its reference pose.
+    It leaves the factory with the configuration that robot.toml asks for, and the arm in its reference pose. The motors
+    are robot.toml's, or those of `motors`, one for each joint.
     """
 
-    def __init__(self, arm: ArmDescription, folder: Path, name: str, unwritten: UnwrittenFiles) -> None:
+    def __init__(
+        self,
+        arm: ArmDescription,
+        folder: Path,
+        name: str,
+        unwritten: UnwrittenFiles,
+        motors: Sequence[Motor] = (),
+        clock: Clock = SYSTEM,
+    ) -> None:
         """`unwritten` gets what the disk refuses; the board runs on without."""
+        self._clock = clock
         self._factory = config_text(device_config(arm))
         self._reference = reference_steps(arm)
         self._gripper = arm.gripper
         self._gripper_unit = gripper_unit(arm)
-        self._motors = tuple(joint.drive.motor for joint in arm.joints)
+        self._motors = tuple(motors) or tuple(joint.drive.motor for joint in arm.joints)
         self.name = arm.device.name
         self._flash = Flash(folder / f"{name}_flash.json", self.name, unwritten)
         self._memory = PositionStore(folder / f"{name}.json", self.name, unwritten)
@@ -137,7 +149,7 @@ class Board:
         is_known = count == len(boot_state.steps)
         device = CoreDevice(
             text or None,
-            boot_id=secrets.randbelow((1 << 32) - 1) + 1,
+            boot_id=self._clock.bits(32) or 1,
             steps=boot_state.steps if is_known else (0,) * count,
             referenced=boot_state.referenced and is_known,
             reset_cause=_cause(boot_state, reset_cause),

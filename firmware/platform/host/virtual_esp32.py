@@ -1,10 +1,9 @@
-"""A virtual board in real time: receives frames, advances the firmware by the clock, sends reports."""
+"""A virtual board: receives frames, advances the firmware by the clock, sends reports."""
 
 from __future__ import annotations
 
 import logging
 import queue
-import time
 from collections.abc import Callable
 from functools import partial
 
@@ -25,6 +24,7 @@ from firmware.platform.host.link import (
 from firmware.platform.host.slot_record import SlotRecord
 from firmware.platform.host.wires import Wires, say_event
 from schemas.device import InjectKind, InjectRequest
+from services.runtime.clock import SYSTEM, Clock
 from services.runtime.process.readiness import Readiness
 from services.runtime.process.unwritten import remedy_of
 from services.runtime.serial_frames import JsonFrame
@@ -55,7 +55,9 @@ class VirtualEsp32:
         inbox: queue.SimpleQueue[Item],
         readiness: Readiness,
         record: SlotRecord | None = None,
+        clock: Clock = SYSTEM,
     ) -> None:
+        self._time = clock
         self._advance_device: Passing = CoreDevice.advance if record is None else record.advance
         self._stand_still: Passing = CoreDevice.stand_still if record is None else record.stand_still
         self._board = board
@@ -63,7 +65,7 @@ class VirtualEsp32:
         self._inbox = inbox
         self._readiness = readiness
         self._device = self._boot()
-        self._advanced_to = time.monotonic()
+        self._advanced_to = self._time.monotonic()
         self._clock = DeviceClock(self._advanced_to)
         self._next_beat = 0.0
         self._later: list[tuple[float, Callable[[], None]]] = []  # [s] when, and what
@@ -71,11 +73,9 @@ class VirtualEsp32:
 
     def run(self) -> None:
         """Until a ShutdownRequested arrives in the inbox."""
-        self._announce()
-        self._join()
-        self._wires.listen()
+        self.begin()
         while self._running:
-            self._run_once()
+            self.turn(self._wait())
         self._stop_motion()
         self._readiness.not_ready()
         self._board.remember(self._device)
@@ -84,19 +84,25 @@ class VirtualEsp32:
     def _stop_motion(self) -> None:
         """Stops the motion, because the positions are valid over a restart only at rest."""
         self._device.halt()
-        deadline = time.monotonic() + LONGEST_STOP
-        while self._device.moving and time.monotonic() < deadline:
-            time.sleep(PAUSE_MOVING)
-            self._advance(time.monotonic())
-            self._wires.publish(self._device, time.monotonic())
+        deadline = self._time.monotonic() + LONGEST_STOP
+        while self._device.moving and self._time.monotonic() < deadline:
+            self._time.sleep(PAUSE_MOVING)
+            self._advance(self._time.monotonic())
+            self._wires.publish(self._device, self._time.monotonic())
 
-    def _run_once(self) -> None:
-        items = self._wait()
-        now = time.monotonic()
+    def begin(self) -> None:
+        """Says where the arm stands, and joins the network."""
+        self._announce()
+        self._join()
+        self._wires.listen()
+
+    def turn(self, items: list[Item]) -> None:
+        """Lets the board's time pass up to now, with what has arrived."""
+        now = self._time.monotonic()
         self._advance(now)
         for item in items:
             self._handle(item)
-        self._advance(time.monotonic())
+        self._advance(self._time.monotonic())
         self._board.remember(self._device)
         has_told = self._wires.publish(self._device, now)
         if self._device.subscribes_anew():
@@ -194,7 +200,7 @@ class VirtualEsp32:
 
     def _carry_out(self, request: InjectRequest) -> None:
         """Do it; what keeps the answer from being said is done a little later."""
-        now = time.monotonic()
+        now = self._time.monotonic()
         match request.kind:
             case InjectKind.REBOOT:
                 self._later.append((now + REPLY_TIME, partial(self._reboot, "reset_button")))
@@ -212,17 +218,17 @@ class VirtualEsp32:
         self._start_anew(cause)
 
     def _start_anew(self, cause: str) -> None:
-        self._wires.publish(self._device, time.monotonic())
+        self._wires.publish(self._device, self._time.monotonic())
         self._later.clear()
         before, self._device = self._device, self._boot(cause)
         self._device.inherit_environment(before)
-        self._clock.restart(time.monotonic())
+        self._clock.restart(self._time.monotonic())
         self._announce()
         self._join()
 
     def _boot(self, cause: str = "") -> CoreDevice:
         device = self._board.boot(cause)
-        self._booted = time.monotonic()
+        self._booted = self._time.monotonic()
         self._wires.attach(device)
         return device
 

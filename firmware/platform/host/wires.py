@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import logging
+from typing import Protocol
 
 from firmware.bindings.device import CoreDevice
 from firmware.bindings.frames import OutFrame
-from firmware.platform.host.network import Network
+from firmware.platform.host.flash import NetworkCredentials
 from firmware.platform.host.pty import SerialLine
 from services.runtime.serial_frames import JsonFrame
 
@@ -18,10 +19,30 @@ LOGGED_WITH_TIME = ("fault", "estop", "hold", "underrun")
 LOGGED = ("homed", "configured", "injected", "inject_refused")
 
 
+class BoardNetwork(Protocol):
+    """The board's way to its broker: `Network`, or that of a simulation."""
+
+    is_connected: bool
+
+    def join(self, device: CoreDevice, name: str, credentials: NetworkCredentials) -> None: ...
+
+    def break_off(self) -> None: ...
+
+    def leave(self) -> None: ...
+
+    def publish(self, frame: OutFrame) -> None: ...
+
+    def on_connected(self) -> None: ...
+
+    def on_disconnected(self, reason: str) -> None: ...
+
+    def on_denied(self, reason: str) -> None: ...
+
+
 class Wires:
     """The network and the line of one board; the device itself knows what goes where."""
 
-    def __init__(self, network: Network, line: SerialLine | None) -> None:
+    def __init__(self, network: BoardNetwork, line: SerialLine | None) -> None:
         self.network = network
         self._line = line
         self._next_shaft = 0.0

@@ -53,7 +53,7 @@ class SceneKeeper:
         self._what, self._is_unsaved = f"the scene in {self._file}, which a restart forgets otherwise,", False
         self._folders = (project_root(), arm.folder)
         self._scene, self._contacts = node.publisher(SCENE), node.publisher(CONTACTS)
-        self._store = SceneStore(arm, self._folders, self._restored())
+        self._store = SceneStore(arm, self._folders, self._restored(), node.clock)
         self._is_touching = False
         self._apart: float | None = None  # [m] of the jaws; None before the first word of them
         self.world = self._built(self._store.scene)
@@ -172,6 +172,6 @@ class SceneKeeper:
         if reasons:
             aside = put_aside(self._file)
             self._node.log.error(f"left out of the scene, as {aside} still has it: {'; '.join(reasons)}")
-            usable = msgspec.structs.replace(usable, epoch=drawn_epoch())
+            usable = msgspec.structs.replace(usable, epoch=drawn_epoch(self._node.clock))
             self._save(usable)
         return usable

@@ -5,7 +5,6 @@ Epoch 0 is the empty scene of before the first change, which draws an epoch: so 
 
 from __future__ import annotations
 
-import secrets
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -17,6 +16,7 @@ from services.planner.collision.scene_shapes import Folders, SceneError
 from services.planner.scene.grasp import find_grasp
 from services.planner.scene.scene_check import require_scene
 from services.planner.scene.scene_edit import LinkPoses, edited
+from services.runtime.clock import SYSTEM, Clock
 
 W = TypeVar("W")
 
@@ -24,8 +24,11 @@ W = TypeVar("W")
 class SceneStore:
     """Takes a change wholly or not at all; mesh files are looked for in `folders`."""
 
-    def __init__(self, arm: ArmDescription, folders: Folders = (), scene: PlanningScene | None = None) -> None:
+    def __init__(
+        self, arm: ArmDescription, folders: Folders = (), scene: PlanningScene | None = None, clock: Clock = SYSTEM
+    ) -> None:
         """Raises `SceneError` for a scene that cannot be."""
+        self._clock = clock
         self._arm, self._folders = arm, folders
         self.scene = scene or PlanningScene()
         require_scene(arm, self.scene, folders)
@@ -48,7 +51,7 @@ class SceneStore:
             changed = edited(self._arm, self.scene, request.edit, links, grasp)
             if changed != self.scene:
                 require_scene(self._arm, changed, self._folders)
-                epoch, version = self.scene.epoch or drawn_epoch(), self.scene.version + 1
+                epoch, version = self.scene.epoch or drawn_epoch(self._clock), self.scene.version + 1
                 self.scene = msgspec.structs.replace(changed, stamp=stamp, version=version, epoch=epoch)
         except SceneError as error:
             return SceneResponse(reason=str(error), version=self.scene.version)
@@ -73,6 +76,6 @@ def changed(
         return SceneResponse(reason=str(error), version=before.version), None
 
 
-def drawn_epoch() -> int:
+def drawn_epoch(clock: Clock) -> int:
     """Another epoch than any before: 62 random bits."""
-    return secrets.randbits(62) + 1
+    return clock.bits(62) + 1

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 
 from schemas.planning import PlanCode, PlanInputs, PlanPhase, PlanProgress, PlanRequest, PlanResponse, Refusal
+from services.runtime.clock import SYSTEM, Clock
 
 WORDS = {
     PlanPhase.WAITING: "waiting",
@@ -28,18 +28,21 @@ class Cancelled(Exception):
 class PendingPlan:
     """Answers exactly once; everything here may be called from any thread."""
 
-    def __init__(self, request_id: str, request: PlanRequest, answer: Answer, on_inputs: OnInputs) -> None:
+    def __init__(
+        self, request_id: str, request: PlanRequest, answer: Answer, on_inputs: OnInputs, clock: Clock = SYSTEM
+    ) -> None:
+        self._clock = clock
         self.request_id, self.request, self.on_inputs = request_id, request, on_inputs
         self.phase = PlanPhase.WAITING
         self._answer = answer
-        self._asked = time.monotonic()
+        self._asked = self._clock.monotonic()
         self._lock = threading.Lock()
         self._has_begun = self._is_over = self._is_cancelled = False
 
     @property
     def elapsed(self) -> float:
         """[s] since it was asked for."""
-        return time.monotonic() - self._asked
+        return self._clock.monotonic() - self._asked
 
     @property
     def words(self) -> str:

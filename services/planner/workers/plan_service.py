@@ -3,23 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 from msgspec.structs import replace
 
-from schemas.planning import PlanCancel, PlanCancelResult, PlanCode, PlanInputs, PlanRequest, PlanResponse
+from schemas.planning import PlanCancel, PlanCancelResult, PlanCode, PlanInputs, PlanProgress, PlanRequest, PlanResponse
 from schemas.topics import PLAN, PLAN_CANCEL, PLAN_INPUTS, PLAN_PROGRESS, PLANNED_PATH
 from services.planner.core import Planner
 from services.planner.scene.scene_keeper import SceneKeeper
-from services.planner.workers.workers import Workers
+from services.planner.workers.pending_plan import Answer, OnInputs
 from services.runtime.node import Node
 from services.runtime.requests.server import Pending
+
+
+class PlanMaker(Protocol):
+    """Makes plans: in processes of their own, or in this one."""
+
+    @property
+    def are_ready(self) -> bool:
+        """True if a plan need not wait for a process to start."""
+        ...
+
+    def plan(self, request: PlanRequest, answer: Answer, on_inputs: OnInputs = ...) -> None: ...
+
+    def cancel(self, request_id: str) -> PlanCancelResult: ...
+
+    def progress(self, now: int) -> list[PlanProgress]:
+        """Of every plan that is no short one; `now` [ns] UNIX."""
+        ...
+
+    def close(self) -> None: ...
 
 
 class PlanService:
     """Hands requests to the workers and their answers back, all in the node's thread of logic."""
 
     def __init__(
-        self, node: Node, workers: Workers, planner: Planner, keeper: SceneKeeper, is_recorded: Callable[[], bool]
+        self, node: Node, workers: PlanMaker, planner: Planner, keeper: SceneKeeper, is_recorded: Callable[[], bool]
     ) -> None:
         """`is_recorded` says if what answers were made from is published."""
         self._is_recorded = is_recorded

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -38,6 +38,10 @@ WAY, MOST_WAY = (
 )  # [s] to the process and back; of short times that share; chosen: a busy small computer
 GRACE = 1.0  # [s] after that answer in which a process ends its plan by itself; chosen: a new process costs more
 PATIENCE = 5.0  # [s] for a thread to see that its process is gone; chosen: only a broken machine needs more
+CHANGING, CHANGING_REMEDY = (
+    "the scene changes faster than a plan can be made in it",
+    "plan again when it stays as it is",
+)
 AGAIN = 3  # plans of one request, where the scene changes or the process dies meanwhile; chosen: then a person is told
 MOST_DEATHS = 1  # after which a plan is made again; chosen: one that ends two processes may end every one
 DIED_REMEDY = "plan again: new ones are started; the system's log may say what has ended them (out of memory?)"
@@ -76,7 +80,7 @@ class Workers:
         """
         with self._lock:
             request_id = request.request_id or f"planner-{next(self._numbers)}"
-            objection = self._objection(request_id)
+            objection = objection_to(request_id, self._pending_plans)
             if objection is None:
                 pending_plan = PendingPlan(
                     request_id, request, lambda response: self._end(request_id, response, answer), on_inputs
@@ -91,19 +95,15 @@ class Workers:
 
     def cancel(self, request_id: str) -> PlanCancelResult:
         """Ends a plan that waits now, one that is being made soon."""
-        if not request_id:
-            return PlanCancelResult(message="request_id is empty: give the one that the plan was asked for with")
         with self._lock:
             pending_plan = self._pending_plans.get(request_id)
-        if pending_plan is None or not pending_plan.cancel():
-            return PlanCancelResult(message=f'there is no plan "{request_id}": it has ended, or never began')
-        return PlanCancelResult(found=True, message=f'the plan "{request_id}" is cancelled {pending_plan.words}')
+        return cancelled(request_id, pending_plan)
 
     def progress(self, now: int) -> list[PlanProgress]:
         """Of every plan that is no short one; `now` [ns] UNIX."""
         with self._lock:
             pending_plans = list(self._pending_plans.values())
-        return [pending_plan.progress(now) for pending_plan in pending_plans if pending_plan.elapsed > SHORT]
+        return progress_of(pending_plans, now)
 
     def close(self) -> None:
         """Ends every process, in the midst of a plan too."""
@@ -112,18 +112,6 @@ class Workers:
             process.end()
         for thread in self._threads:
             thread.join(PATIENCE)
-
-    def _objection(self, request_id: str) -> Refusal | None:
-        if len(self._pending_plans) >= MOST_PLANS:
-            return _refused(
-                "plan", f"{MOST_PLANS} plans are waiting already", "plan again when some of them have ended"
-            )
-        remedy = "choose another request_id, or leave it empty"
-        if len(request_id) > LONGEST_ID:
-            return _refused("request_id", f"request_id has {len(request_id)} characters: at most {LONGEST_ID}", remedy)
-        if request_id in self._pending_plans:
-            return _refused("request_id", f'a plan "{request_id}" is being made already', remedy)
-        return None
 
     def _end(self, request_id: str, response: PlanResponse, answer: Answer) -> None:
         with self._lock:
@@ -185,7 +173,7 @@ class Workers:
                 job = Job(request=for_process(request), present=present, age=age)
                 began = time.monotonic()
                 response = process.plan(pending_plan, job, longest(request))
-                pending_plan.on_inputs(_inputs(job, scene, time.monotonic() - began))
+                pending_plan.on_inputs(inputs_of(job, scene, time.monotonic() - began))
             except Cancelled:
                 return None
             except TimeoutError:
@@ -194,11 +182,11 @@ class Workers:
                 deaths += 1
                 request = _with_what_is_left(request, began)
                 if deaths > MOST_DEATHS or request.allowed_time <= 0.0:
-                    return _failed(f"{deaths} worker processes of the planner have ended ({error})", DIED_REMEDY)
+                    return failed(f"{deaths} worker processes of the planner have ended ({error})", DIED_REMEDY)
                 continue
             if response.code is not PlanCode.SUCCESS or self._scene() is scene:
                 return response
-        return _failed("the scene changes faster than a plan can be made in it", "plan again when it stays as it is")
+        return failed(CHANGING, CHANGING_REMEDY)
 
     def _late(self, pending_plan: PendingPlan) -> PlanResponse:
         """It was stopped, for it did not stop by itself."""
@@ -217,7 +205,33 @@ class Workers:
         )
 
 
-def _inputs(job: Job, scene: PlanningScene, elapsed: float) -> PlanInputs:
+def objection_to(request_id: str, pending_plans: Mapping[str, PendingPlan]) -> Refusal | None:
+    """Why another plan of that id is not begun; None if it is."""
+    if len(pending_plans) >= MOST_PLANS:
+        return _refused("plan", f"{MOST_PLANS} plans are waiting already", "plan again when some of them have ended")
+    remedy = "choose another request_id, or leave it empty"
+    if len(request_id) > LONGEST_ID:
+        return _refused("request_id", f"request_id has {len(request_id)} characters: at most {LONGEST_ID}", remedy)
+    if request_id in pending_plans:
+        return _refused("request_id", f'a plan "{request_id}" is being made already', remedy)
+    return None
+
+
+def cancelled(request_id: str, pending_plan: PendingPlan | None) -> PlanCancelResult:
+    """Cancels the plan of that id, if there is one; the answer to who asked for it."""
+    if not request_id:
+        return PlanCancelResult(message="request_id is empty: give the one that the plan was asked for with")
+    if pending_plan is None or not pending_plan.cancel():
+        return PlanCancelResult(message=f'there is no plan "{request_id}": it has ended, or never began')
+    return PlanCancelResult(found=True, message=f'the plan "{request_id}" is cancelled {pending_plan.words}')
+
+
+def progress_of(pending_plans: Iterable[PendingPlan], now: int) -> list[PlanProgress]:
+    """Of every plan that is no short one; `now` [ns] UNIX."""
+    return [pending_plan.progress(now) for pending_plan in pending_plans if pending_plan.elapsed > SHORT]
+
+
+def inputs_of(job: Job, scene: PlanningScene, elapsed: float) -> PlanInputs:
     """What `job` was planned from, in `elapsed` [s]."""
     return PlanInputs(
         planned=True,
@@ -247,7 +261,7 @@ def _with_what_is_left(request: PlanRequest, began: float | None) -> PlanRequest
     return replace(request, allowed_time=request.allowed_time - spent)
 
 
-def _failed(message: str, remedy: str) -> PlanResponse:
+def failed(message: str, remedy: str) -> PlanResponse:
     refusal = Refusal(check="planner", subject="worker", message=message, remedy=remedy)
     return PlanResponse(code=PlanCode.FAILURE, refusal=refusal)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-import uuid
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
@@ -15,6 +13,7 @@ from schemas.topics import Action, Request, Topic
 from services.runtime.actions import keys as keys
 from services.runtime.actions.goal_handle import GoalHandle
 from services.runtime.bus.interface import Bus
+from services.runtime.clock import token
 from services.runtime.errors import GoalRefused, NoAnswer
 from services.runtime.loop.loop import Loop
 from services.runtime.requests import client as requests
@@ -45,7 +44,7 @@ class ActionClient(Generic[G, F, R]):
         self.action = action
         self._bus, self._loop, self._client = bus, loop, client
         self._handles: dict[str, GoalHandle[F, R]] = {}
-        self._ticked = time.monotonic()
+        self._ticked = bus.clock.monotonic()
         subscribe(keys.feedback_topic(action), self._on_feedback)
         subscribe(keys.status_topic(action), self._on_status)
 
@@ -60,10 +59,13 @@ class ActionClient(Generic[G, F, R]):
 
         An `attached` goal is cancelled by the server when this node disappears, by its end or by the network's.
         """
-        goal_id = uuid.uuid4().hex
+        goal_id = token(self._bus.clock)
         handle: GoalHandle[F, R] = GoalHandle(self.action, goal_id, self._bus, self._loop, on_feedback)
         self._handles[goal_id] = handle
-        end, number = time.monotonic() + timeout, self._bus.take_number()  # one for all: no try overtakes a stop
+        end, number = (
+            self._bus.clock.monotonic() + timeout,
+            self._bus.take_number(),
+        )  # one for all: no try overtakes a stop
         try:
             epoch = self._ask(keys.result_request(self.action), ResultRequest(), end).epoch
             request = GoalRequest(
@@ -89,7 +91,7 @@ class ActionClient(Generic[G, F, R]):
 
     def tick(self) -> None:
         """Checks that the server is alive; a pause of this process itself does not count."""
-        now = time.monotonic()
+        now = self._bus.clock.monotonic()
         slept = now - self._ticked > 5 * self.TICK
         self._ticked = now
         for handle in list(self._handles.values()):
@@ -102,13 +104,13 @@ class ActionClient(Generic[G, F, R]):
     def _ask(self, request: Request[Q, A], question: Q, end: float, number: int = 0) -> A:
         """Asks until it is answered; raises `NoAnswer` after `end` [s] monotonic. `number` as that of `Bus.ask`."""
         while True:
-            left = max(0.05, min(ATTEMPT, end - time.monotonic()))
+            left = max(0.05, min(ATTEMPT, end - self._bus.clock.monotonic()))
             try:
                 return requests.call(self._bus, request, question, left, number)
             except NoAnswer:
-                if time.monotonic() >= end - PAUSE:
+                if self._bus.clock.monotonic() >= end - PAUSE:
                     raise
-                time.sleep(PAUSE)  # the answer that none will come is there at once
+                self._bus.clock.sleep(PAUSE)  # the answer that none will come is there at once
 
     def _on_feedback(self, message: GoalFeedback) -> None:
         handle = self._handles.get(message.goal_id)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -55,7 +54,7 @@ class GoalHandle(Generic[F, R]):
         self._bus, self._loop, self._on_feedback = bus, loop, on_feedback
         self.lost: ServerLost | None = None  # why there will be no outcome
         self._accepted = 0  # [ns] UNIX of the server
-        self._heard = time.monotonic()
+        self._heard = bus.clock.monotonic()
         self._away: float | None = None  # [s] monotonic since when there is no router
         self._is_asking = False  # for the result
         self._wants_cancel = False
@@ -79,7 +78,7 @@ class GoalHandle(Generic[F, R]):
         Handles the node's task queue meanwhile, so not for handlers of a node that spins: those look at
         `outcome`. `on_tick` is called 20 times a second. A node asked to stop raises SystemExit.
         """
-        self._heard = time.monotonic()
+        self._heard = self._bus.clock.monotonic()
         is_over = self._loop.wait_for(lambda: self.is_over, timeout, on_tick)
         if self.outcome is not None:
             return self.outcome
@@ -101,7 +100,7 @@ class GoalHandle(Generic[F, R]):
 
     def heard(self) -> None:
         """The server lives."""
-        self._heard = time.monotonic()
+        self._heard = self._bus.clock.monotonic()
 
     def on_feedback(self, feedback: F) -> None:
         self.heard()

@@ -6,8 +6,6 @@ the server before it, and comes late or is said again, is void.
 
 from __future__ import annotations
 
-import secrets
-import time
 from dataclasses import dataclass, field
 
 import msgspec
@@ -21,6 +19,7 @@ from schemas.actions import (
     ResultRequest,
     ResultResponse,
 )
+from services.runtime.clock import SYSTEM, Clock
 from services.runtime.requests.server import Pending
 
 KEPT = 120.0  # [s] that a result can be asked for after the end
@@ -44,9 +43,9 @@ class GoalRecord:
     ended: float = 0.0  # [s] monotonic
     waiting: list[tuple[float, Pending[ResultResponse]]] = field(default_factory=list)  # until when, who
 
-    def end(self, status: GoalStatusCode, result: msgspec.Raw) -> None:
-        """Keeps the result and answers who waits for it."""
-        self.status, self.result, self.ended = status, result, time.monotonic()
+    def end(self, status: GoalStatusCode, result: msgspec.Raw, now: float) -> None:
+        """Keeps the result and answers who waits for it; `now` in [s] monotonic."""
+        self.status, self.result, self.ended = status, result, now
         for _, pending in self.waiting:
             pending.reply(ResultResponse(status=status, result=result))
         self.waiting.clear()
@@ -61,8 +60,9 @@ class GoalRecord:
 class GoalRegistry:
     """Goals by id, oldest first."""
 
-    def __init__(self) -> None:
-        self.epoch = secrets.randbits(EPOCH_BITS) + 1
+    def __init__(self, clock: Clock = SYSTEM) -> None:
+        self._clock = clock
+        self.epoch = clock.bits(EPOCH_BITS) + 1
         self._goals: dict[str, GoalRecord] = {}
         self._decided: dict[str, GoalResponse] = {}  # refused or forgotten, oldest first
 
@@ -99,11 +99,11 @@ class GoalRegistry:
         goals = tuple(
             GoalStatus(goal_id=goal.goal_id, client=goal.client, status=goal.status) for goal in self._goals.values()
         )
-        return GoalStatuses(stamp=time.time_ns(), goals=goals)
+        return GoalStatuses(stamp=self._clock.unix(), goals=goals)
 
     def forget_expired(self) -> None:
         """Forgets what was kept long enough, and answers who has waited long enough."""
-        now = time.monotonic()
+        now = self._clock.monotonic()
         ended = [goal for goal in self._goals.values() if goal.status.is_terminal]
         for index, goal in enumerate(ended):
             if now - goal.ended > KEPT or index < len(ended) - MAX_KEPT:
@@ -119,4 +119,4 @@ class GoalRegistry:
         elif goal.status.is_terminal or request.wait <= 0.0:
             pending.reply(ResultResponse(status=goal.status, result=goal.result))
         else:
-            goal.waiting.append((time.monotonic() + min(request.wait, MAX_RESULT_WAIT), pending))
+            goal.waiting.append((self._clock.monotonic() + min(request.wait, MAX_RESULT_WAIT), pending))

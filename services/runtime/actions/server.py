@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
@@ -24,6 +23,7 @@ from schemas.topics import Action
 from services.runtime.actions import keys as keys
 from services.runtime.actions.goal_registry import GoalRecord, GoalRegistry
 from services.runtime.client_watch import ClientWatch
+from services.runtime.clock import SYSTEM, Clock
 from services.runtime.errors import RequestRefused
 from services.runtime.requests.server import Pending, RequestServer
 from services.runtime.topics import Publisher, Warn
@@ -71,10 +71,12 @@ class ActionServer(Generic[G, F, R]):
         publisher: Callable[[Any], Publisher[Any]],
         clients: ClientWatch,
         warn: Warn,
+        clock: Clock = SYSTEM,
     ) -> None:
         self.action = action
+        self._clock = clock
         self._on_goal, self._on_cancel = on_goal, on_cancel
-        self._goals, self._clients, self._warn = GoalRegistry(), clients, warn
+        self._goals, self._clients, self._warn = GoalRegistry(clock), clients, warn
         self._cancelled_early: dict[str, float] = {}  # by goal that has not come yet: [s] monotonic
         self._feedback: Publisher[GoalFeedback] = publisher(keys.feedback_topic(action))
         self._status: Publisher[GoalStatuses] = publisher(keys.status_topic(action))
@@ -105,10 +107,10 @@ class ActionServer(Generic[G, F, R]):
         if goal.status.is_terminal:
             raise ValueError(f"goal {goal_id} has ended already, as {goal.status.name}")
         raw = msgspec.Raw(encode(result))
-        goal.end(status, raw)
+        goal.end(status, raw, self._clock.monotonic())
         self._clients.forget(goal_id)
         self._publish_status()
-        end = GoalEnd(stamp=time.time_ns(), goal_id=goal_id, client=goal.client, status=status, result=raw)
+        end = GoalEnd(stamp=self._clock.unix(), goal_id=goal_id, client=goal.client, status=status, result=raw)
         self._ended.put(end)
 
     def refuse_waiting(self, reason: str, asked: Mapping[str, int]) -> None:
@@ -130,7 +132,7 @@ class ActionServer(Generic[G, F, R]):
     def beat(self) -> None:
         """The server's sign of life; forgets what was kept long enough, and cancels goals whose client is gone."""
         self._goals.forget_expired()
-        for goal_id, client in self._clients.take_lost(time.monotonic()):
+        for goal_id, client in self._clients.take_lost(self._clock.monotonic()):
             self._cancel_lost(goal_id, client)
         self._publish_status()
 
@@ -145,7 +147,7 @@ class ActionServer(Generic[G, F, R]):
         if request.epoch in (0, self.epoch):
             return None
         why = f"it was sent to a {self.action.server} that was started anew since: ask again for what is wanted"
-        return GoalResponse(reason=why, stamp=time.time_ns())
+        return GoalResponse(reason=why, stamp=self._clock.unix())
 
     def _decide(self, request: GoalRequest, session: str) -> GoalResponse:
         if not request.goal_id:
@@ -156,8 +158,8 @@ class ActionServer(Generic[G, F, R]):
             raise RequestRefused(f"{self.action.key}: {error}", "bad request") from error
         if self._cancelled_early.pop(request.goal_id, None) is not None:
             reason = "it was cancelled before it was looked at"
-            return self._goals.refuse(request.goal_id, GoalResponse(reason=reason, stamp=time.time_ns()))
-        response = GoalResponse(accepted=True, stamp=time.time_ns())
+            return self._goals.refuse(request.goal_id, GoalResponse(reason=reason, stamp=self._clock.unix()))
+        response = GoalResponse(accepted=True, stamp=self._clock.unix())
         goal = GoalRecord(request.goal_id, request.client, response, session=session)
         self._goals.add(goal)
         decision = refuse(0, "the server failed")
@@ -165,10 +167,10 @@ class ActionServer(Generic[G, F, R]):
             decision = self._on_goal(request.goal_id, wanted)
         finally:
             if not decision.accepted:
-                refusal = GoalResponse(code=decision.code, reason=decision.reason, stamp=time.time_ns())
+                refusal = GoalResponse(code=decision.code, reason=decision.reason, stamp=self._clock.unix())
                 response = self._goals.refuse(request.goal_id, refusal)
         if decision.accepted and request.attached and not goal.status.is_terminal:
-            self._clients.add(request.goal_id, request.client, time.monotonic())
+            self._clients.add(request.goal_id, request.client, self._clock.monotonic())
         return response
 
     def _answer_cancel(self, request: CancelRequest, pending: Pending[CancelResponse]) -> None:
@@ -192,7 +194,7 @@ class ActionServer(Generic[G, F, R]):
         known = self._goals.get(goal_id)
         if known is not None:
             return f"it has ended as {known.status.name}"
-        now = time.monotonic()
+        now = self._clock.monotonic()
         self._cancelled_early = {key: at for key, at in self._cancelled_early.items() if now - at < EARLY_CANCEL_KEPT}
         if len(self._cancelled_early) < MAX_EARLY_CANCELS:
             self._cancelled_early[goal_id] = now

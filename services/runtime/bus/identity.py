@@ -6,15 +6,13 @@ its key, would stand for the tokens of others: whoever reads tokens ignores it, 
 
 from __future__ import annotations
 
-import os
 import re
-import socket
-import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from services.runtime.bus.branches import LOCAL, NAME, PRINCIPAL, address_of, principal_of
 from services.runtime.bus.interface import Bus
+from services.runtime.clock import SYSTEM, Clock
 from services.runtime.errors import NodeNameTaken
 
 STALE_AFTER = 1.5  # [s] within which the token of a frozen process vanishes (the lease is 1 s)
@@ -46,12 +44,12 @@ class Identity:
         return address_of(self.principal, self.name) or self.name
 
 
-def identify(name: str, common_name: str = "") -> Identity:
+def identify(name: str, common_name: str = "", clock: Clock = SYSTEM) -> Identity:
     """`common_name` is that of the certificate that is shown. Raises `ValueError` for a name that no key may hold."""
     if not NAME.fullmatch(name):
         raise ValueError(f'node name "{name}": lower-case letters, digits, "_" and "-" only')
-    host = re.sub(r"[^A-Za-z0-9_-]", "-", socket.gethostname())[:64]
-    return Identity(name, time.time_ns(), host, os.getpid(), principal_of(name, common_name))
+    host = re.sub(r"[^A-Za-z0-9_-]", "-", clock.host())[:64]
+    return Identity(name, clock.unix(), host, clock.process(), principal_of(name, common_name))
 
 
 def claim(bus: Bus, identity: Identity, warn: Warn = lambda text: None) -> None:
@@ -105,11 +103,11 @@ def _wait_until_alone(bus: Bus, identity: Identity, gives_way_before: str, warn:
 
     Of two that start together the younger gives way; where it did not see the older in time, the older does.
     """
-    give_up = time.monotonic() + STALE_AFTER
+    give_up = bus.clock.monotonic() + STALE_AFTER
     while bearers := _bearers(bus, identity, warn):
-        if min(bearers) < gives_way_before or time.monotonic() > give_up:
+        if min(bearers) < gives_way_before or bus.clock.monotonic() > give_up:
             raise NodeNameTaken(_taken(identity.name, min(bearers)))
-        time.sleep(0.1)
+        bus.clock.sleep(0.1)
 
 
 def _taken(name: str, key: str) -> str:

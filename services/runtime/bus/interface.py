@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from schemas.topics import Delivery
+from services.runtime.clock import Clock
 
 ENCODING = "application/msgpack"  # the schema's name follows after a semicolon
 
@@ -86,6 +87,11 @@ class Publication(Declaration, Protocol):
 
 class Bus(Protocol):
     """A connection to all other nodes of one robot."""
+
+    @property
+    def clock(self) -> Clock:
+        """That of everything which uses this bus."""
+        ...
 
     @property
     def is_connected(self) -> bool:

@@ -1,4 +1,4 @@
-"""A bus within one process, for tests: the same promises as Zenoh's, without a router."""
+"""A bus within one process, for simulations and tests: the same promises as Zenoh's, without a router."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from services.runtime.bus.memory_network import (
     MemoryToken,
     MemoryWatch,
 )
+from services.runtime.clock import Clock
 
 __all__ = ["MemoryBus", "MemoryNetwork"]
 
@@ -27,6 +28,11 @@ class MemoryBus:
         self.network = network
         self._declared: list[Declaration] = []
         self._numbers = itertools.count(1)
+        self._name = network.next_name()
+
+    @property
+    def clock(self) -> Clock:
+        return self.network.clock
 
     @property
     def is_connected(self) -> bool:
@@ -50,7 +56,7 @@ class MemoryBus:
     def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> MemoryPublication:
         publication = MemoryPublication(self, key, schema, delivery, writer)
         with self.network.lock:
-            self.network.publications.add(publication)
+            self.network.publications[publication] = None
         self._declared.append(publication)
         return publication
 
@@ -64,7 +70,7 @@ class MemoryBus:
     ) -> MemorySubscription:
         subscription = MemorySubscription(self, key, on_arrival, own)
         with self.network.lock:
-            self.network.subscriptions[key].add(subscription)
+            self.network.subscriptions[key][subscription] = None
             for publication in self.network.publications if delivery is Delivery.LATCHED else ():
                 if publication.key == key and publication.last and (own or publication.bus is not self):
                     on_arrival(publication.last)
@@ -105,8 +111,8 @@ class MemoryBus:
         if service is None:
             on_answer(UNREAD)
         else:
-            asked = MemoryQuery(Arrival(key, schema, payload), f"{id(self):x}", number, timeout, on_answer)
-            service.on_query(asked)
+            arrival = Arrival(key, schema, payload)
+            service.on_query(MemoryQuery(arrival, self._name, number, timeout, on_answer, self.clock))
 
     def declare_alive(self, key: str) -> MemoryToken:
         with self.network.lock:
@@ -118,7 +124,7 @@ class MemoryBus:
     def watch_alive(self, key: str, on_change: Callable[[bool], None]) -> MemoryWatch:
         watch = MemoryWatch(self, key, on_change)
         with self.network.lock:
-            self.network.watches.add(watch)
+            self.network.watches[watch] = None
             if self.network.tokens[key] > 0:
                 on_change(True)
         self._declared.append(watch)

@@ -6,6 +6,7 @@ wait, requests find nobody.
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections import Counter, defaultdict, deque
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from typing import Protocol
 from schemas.topics import Delivery
 from services.runtime.bus.branches import LOCAL
 from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Query
+from services.runtime.clock import SYSTEM, Clock
 
 KEPT = 1024  # messages that wait for the network to come back, as in Zenoh's publishers' cache
 
@@ -36,7 +38,7 @@ class MemorySubscription:
 
     def close(self) -> None:
         with self.bus.network.lock:
-            self.bus.network.subscriptions[self.key].discard(self)
+            self.bus.network.subscriptions[self.key].pop(self, None)
 
 
 @dataclass(eq=False)
@@ -69,7 +71,7 @@ class MemoryPublication:
 
     def close(self) -> None:
         with self.bus.network.lock:
-            self.bus.network.publications.discard(self)
+            self.bus.network.publications.pop(self, None)
 
 
 @dataclass(eq=False)
@@ -112,7 +114,7 @@ class MemoryWatch:
 
     def close(self) -> None:
         with self.bus.network.lock:
-            self.bus.network.watches.discard(self)
+            self.bus.network.watches.pop(self, None)
 
 
 class MemoryQuery:
@@ -121,16 +123,20 @@ class MemoryQuery:
     principal = LOCAL
 
     def __init__(
-        self, arrival: Arrival, client: str, number: int, timeout: float, on_answer: Callable[[BusReply | None], None]
+        self,
+        arrival: Arrival,
+        client: str,
+        number: int,
+        timeout: float,
+        on_answer: Callable[[BusReply | None], None],
+        clock: Clock = SYSTEM,
     ) -> None:
         """`timeout` in [s]; `on_answer` is called once, with None after it."""
         self.arrival, self.client, self.number = arrival, client, number
         self._on_answer = on_answer
         self._lock = threading.Lock()
         self._is_open = True
-        self._timer = threading.Timer(timeout, self._finish, (None,))
-        self._timer.daemon = True
-        self._timer.start()
+        self._timer = clock.later(timeout, lambda: self._finish(None))
 
     def reply(self, schema: str, payload: bytes) -> None:
         self._finish(BusReply(True, schema, payload))
@@ -150,17 +156,23 @@ class MemoryQuery:
 
 
 class MemoryNetwork:
-    """The state that the buses of one robot share."""
+    """The state that the buses of one robot share; dictionaries of None are sets in the order of their entries."""
 
-    def __init__(self) -> None:
-        self.lock = threading.RLock()
-        self.served = threading.Condition(self.lock)
-        self.subscriptions: defaultdict[str, set[MemorySubscription]] = defaultdict(set)
-        self.publications: set[MemoryPublication] = set()
+    def __init__(self, clock: Clock = SYSTEM) -> None:
+        self.clock = clock
+        self.served = clock.condition()
+        self.lock = self.served  # one for all
+        self.subscriptions: defaultdict[str, dict[MemorySubscription, None]] = defaultdict(dict)
+        self.publications: dict[MemoryPublication, None] = {}
         self.services: dict[str, MemoryQueryable] = {}
         self.tokens: Counter[str] = Counter()
-        self.watches: set[MemoryWatch] = set()
+        self.watches: dict[MemoryWatch, None] = {}
+        self._names = itertools.count(1)
         self._is_connected = True
+
+    def next_name(self) -> str:
+        """The name of another bus, under which it asks."""
+        return f"bus-{next(self._names)}"
 
     def count_token(self, key: str, change: int) -> None:
         """One more (1) or one less (-1) of the tokens `key`; tells who watches it. Call with the lock."""

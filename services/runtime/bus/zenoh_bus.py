@@ -53,6 +53,7 @@ from services.runtime.bus.zenoh_declarations import (
     schema_in,
     writer_in,
 )
+from services.runtime.clock import SYSTEM
 from services.runtime.errors import BusError
 
 # Messages of an EVERY key that survive while the router is away: chosen, a minute of what is said most often (commands
@@ -77,6 +78,8 @@ class BusNotOpen(BusError):
 
 class ZenohBus:
     """One node's session, and a second one where it serves urgent keys."""
+
+    clock = SYSTEM
 
     def __init__(self, router: RouterSection, robot: str, pace: Pace | None = None) -> None:
         """Raises `BusNotOpen` where the router does not take the session; `pace` is that of its requests."""

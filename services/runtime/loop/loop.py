@@ -6,12 +6,13 @@ message is handled after every step, so a slow step cannot starve the queue.
 
 from __future__ import annotations
 
+import math
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from services.runtime.clock import SYSTEM, Clock
 from services.runtime.loop.task_queue import Task, TaskQueue
 from services.runtime.process.shutdown import ShutdownRequest
 
@@ -68,13 +69,16 @@ class PeriodicTask:
 
 
 class Loop:
-    """Runs in one thread at a time."""
+    """Runs in one thread at a time: by `spin` and `wait`, or turn by turn by a clock of virtual time."""
 
-    def __init__(self, stop: ShutdownRequest) -> None:
+    def __init__(self, stop: ShutdownRequest, clock: Clock = SYSTEM) -> None:
+        self.clock = clock
         self.tasks = TaskQueue()
         self._periodic_tasks: list[PeriodicTask] = []
         self._thread: int | None = None
         self._schedule: Schedule | None = None
+        self._step: Callable[[int], object] = _nothing
+        self._is_driven = False  # by the clock
         self.stop = stop
         stop.on_set(self.tasks.wake)
 
@@ -82,6 +86,8 @@ class Loop:
         """`task` runs every `period` [s] while the loop does."""
         # A new list, because a task may add another one while the old list is iterated.
         self._periodic_tasks = [*self._periodic_tasks, PeriodicTask(period, task)]
+        if self._is_driven:
+            self.tasks.wake()
 
     def forget(self, task: Task) -> None:
         """Ends an `every`."""
@@ -93,17 +99,53 @@ class Loop:
 
     def spin(self, step: Callable[[int], object], rate: float) -> None:
         """Calls `step(now [ns UNIX])` at `rate` [Hz] until asked to stop."""
+        if self.clock.is_virtual:
+            self.begin(step, rate)
+            self.clock.wait_until(lambda: self.stop.is_set, None)
+            return
         with self._in_this_thread():
-            schedule = self._schedule = Schedule(rate, time.monotonic())
+            schedule = self._schedule = Schedule(rate, self.clock.monotonic())
+            self._step = step
             while not self.stop.is_set:
-                now = time.monotonic()
-                if now >= schedule.deadline:
-                    schedule.begin(now)
-                    step(time.time_ns())
-                    schedule.end(time.monotonic())
-                    self._run_once(now, now)
-                else:
-                    self._run_once(now, schedule.deadline)
+                now = self.clock.monotonic()
+                self._run_once(now, now if self._step_if_due(now) else schedule.deadline)
+
+    def begin(self, step: Callable[[int], object], rate: float) -> None:
+        """As `spin`, but the clock, of virtual time, has it run from now on: returns at once."""
+        self._schedule, self._step = Schedule(rate, self.clock.monotonic()), step
+        self._drive()
+
+    def due(self) -> float:
+        """[s] monotonic of the next thing to do; infinite once it was asked to stop."""
+        if self.stop.is_set:
+            return math.inf
+        if not self.tasks.is_empty:
+            return self.clock.monotonic()
+        deadlines = [each.due for each in self._periodic_tasks]
+        if self._schedule is not None:
+            deadlines.append(self._schedule.deadline)
+        return min(deadlines, default=math.inf)
+
+    def turn(self) -> None:
+        """Does what is due now: the step, the periodic tasks, and one queued task."""
+        now = self.clock.monotonic()
+        self._step_if_due(now)
+        self._run_once(now, now)
+
+    def on_task(self, wake: Task | None) -> None:
+        """`wake` is called after every task that is queued."""
+        self.tasks.on_put = wake
+
+    def end(self) -> None:
+        """The clock has it run no more."""
+        if self._is_driven:
+            self._is_driven = False
+            self.clock.release(self)
+
+    def _drive(self) -> None:
+        if not self._is_driven:
+            self._is_driven = True
+            self.clock.drive(self)
 
     def wait(self, seconds: float) -> None:
         """Handles queued tasks for `seconds` [s], or until shutdown is requested."""
@@ -114,13 +156,21 @@ class Loop:
 
         While another thread runs the loop, this one only checks `is_done`.
         """
-        end = time.monotonic() + timeout
+        if self.clock.is_virtual:
+            was_driven = self._is_driven
+            self._drive()
+            try:
+                return self._wait_for_clock(is_done, timeout, on_tick)
+            finally:
+                if not was_driven:
+                    self.end()
+        end = self.clock.monotonic() + timeout
         if self._thread is not None and self._thread != threading.get_ident():
             return self._wait_for_other_thread(is_done, end, on_tick)
         with self._in_this_thread():
-            tick = time.monotonic()
+            tick = self.clock.monotonic()
             while not is_done():
-                now = time.monotonic()
+                now = self.clock.monotonic()
                 if self.stop.is_set or now >= end:
                     return False
                 if on_tick is not None and now >= tick:
@@ -129,13 +179,33 @@ class Loop:
                 self._run_once(now, min(end, tick) if on_tick is not None else end)
         return True
 
-    def _wait_for_other_thread(self, is_done: Callable[[], bool], end: float, on_tick: Task | None) -> bool:
+    def _wait_for_clock(self, is_done: Callable[[], bool], timeout: float, on_tick: Task | None) -> bool:
+        end, pause = self.clock.monotonic() + timeout, TICK if on_tick is not None else timeout
         while not is_done():
-            if self.stop.is_set or time.monotonic() >= end:
+            left = end - self.clock.monotonic()
+            if self.stop.is_set or left <= 0.0:
                 return False
             if on_tick is not None:
                 on_tick()
-            time.sleep(TICK / 5)
+            self.clock.wait_until(lambda: is_done() or self.stop.is_set, min(left, pause))
+        return True
+
+    def _wait_for_other_thread(self, is_done: Callable[[], bool], end: float, on_tick: Task | None) -> bool:
+        while not is_done():
+            if self.stop.is_set or self.clock.monotonic() >= end:
+                return False
+            if on_tick is not None:
+                on_tick()
+            self.clock.sleep(TICK / 5)
+        return True
+
+    def _step_if_due(self, now: float) -> bool:
+        """Runs the step if its deadline is there at `now` [s] monotonic; True if it was."""
+        if self._schedule is None or now < self._schedule.deadline:
+            return False
+        self._schedule.begin(now)
+        self._step(self.clock.unix())
+        self._schedule.end(self.clock.monotonic())
         return True
 
     def _run_once(self, now: float, until: float) -> None:
@@ -159,3 +229,7 @@ class Loop:
             yield
         finally:
             self._thread = None
+
+
+def _nothing(_now: int) -> None:
+    pass

@@ -7,7 +7,6 @@ message that does not fit is counted.
 from __future__ import annotations
 
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from queue import Empty, SimpleQueue
 from typing import Protocol
 
 from services.runtime.bus.interface import Arrival
+from services.runtime.clock import SYSTEM, Clock
 
 EVERY_CAPACITY = 4096  # messages
 EVERY_BYTES = 64 * 1024 * 1024
@@ -37,9 +37,16 @@ class TaskQueue:
     def __init__(self) -> None:
         self._tasks: SimpleQueue[Task] = SimpleQueue()
         self._urgent: deque[Task] = deque()
+        self.on_put: Task | None = None  # called after every `put`
+
+    @property
+    def is_empty(self) -> bool:
+        return not self._urgent and self._tasks.empty()
 
     def put(self, task: Task) -> None:
         self._tasks.put(task)
+        if self.on_put is not None:
+            self.on_put()
 
     def put_first(self, task: Task) -> None:
         """`task` is taken before all that `put` has brought."""
@@ -48,7 +55,7 @@ class TaskQueue:
 
     def wake(self) -> None:
         """Lets `take` return; safe in a signal handler."""
-        self._tasks.put(_nothing)
+        self.put(_nothing)
 
     def take(self, timeout: float) -> Task | None:
         """The next task, or None after `timeout` [s]."""
@@ -143,14 +150,15 @@ class EveryQueue:
 class UnreadQueue:
     """The newest arrival, until somebody takes it: nobody is woken for it, and older ones are never decoded."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock = SYSTEM) -> None:
+        self._clock = clock
         self._lock = threading.Lock()
         self._waiting: Arrived | None = None
         self.dropped = 0
         self.passed_over = 0  # arrivals that nobody has looked at
 
     def on_arrival(self, arrival: Arrival) -> None:
-        arrived = Arrived(arrival, time.monotonic(), time.time_ns())
+        arrived = Arrived(arrival, self._clock.monotonic(), self._clock.unix())
         with self._lock:
             self.passed_over += self._waiting is not None
             self._waiting = arrived
@@ -172,13 +180,16 @@ def _nothing() -> None:
 
 
 class Worker:
-    """Runs tasks in order, in a thread that starts with the first."""
+    """Runs tasks in order, in a thread that starts with the first; in virtual time at once, in the caller's."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock = SYSTEM) -> None:
+        self._clock = clock
         self._tasks: SimpleQueue[Task | None] = SimpleQueue()
         self._thread: threading.Thread | None = None
 
     def put(self, task: Task) -> None:
+        if self._clock.is_virtual:
+            return task()
         self._tasks.put(task)
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, daemon=True, name="worker")

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 
 from schemas.system import LogLevel, LogRecord
+from services.runtime.clock import SYSTEM, Clock
 
 LEVELS = ("debug", "info", "warning", "error")
 MAX_TEXT = 8_000  # characters of one record on the bus
@@ -25,9 +26,9 @@ class LineFormatter(logging.Formatter):
 class BusHandler(logging.Handler):
     """Puts every record on the LOG topic."""
 
-    def __init__(self, put: Callable[[LogRecord], None]) -> None:
+    def __init__(self, put: Callable[[LogRecord], None], clock: Clock = SYSTEM) -> None:
         super().__init__()
-        self._put = put
+        self._put, self._clock = put, clock
         self._is_busy = False
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -39,7 +40,7 @@ class BusHandler(logging.Handler):
             if record.exc_info and record.exc_info[1] is not None:
                 text += f": {type(record.exc_info[1]).__name__}: {record.exc_info[1]}"
             level = max((each for each in LogLevel if each <= record.levelno), default=LogLevel.DEBUG)
-            stamp = int(record.created * 1e9)
+            stamp = self._clock.unix() if self._clock.is_virtual else int(record.created * 1e9)
             self._put(LogRecord(stamp=stamp, node=record.name, level=level, text=text[:MAX_TEXT]))
         except Exception:
             self.handleError(record)  # on stderr: a log that cannot be sent must not end a node

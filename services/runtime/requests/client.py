@@ -53,7 +53,7 @@ class PendingCall(Generic[Q, R]):
     def response(self) -> R:
         """Blocks up to the time-out; raises `RequestRefused` or `NoAnswer`."""
         try:
-            answer = self._answers.get(timeout=self._timeout + 1.0)
+            answer = self._bus.clock.take(self._answers, self._timeout + 1.0)
         except Empty:
             answer = None
         if answer is None:

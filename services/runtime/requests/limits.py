@@ -8,12 +8,12 @@ seen a moment ago share one client's limit. A flood under forged names gets no m
 from __future__ import annotations
 
 import threading
-import time
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from services.runtime.bus.pace import Rate, TokenBucket
+from services.runtime.clock import SYSTEM, Clock
 
 # Chosen. A panel and its programs ask some ten times a second; a script that only asks goes by its pace (bus/pace.py),
 # which stays below. A request that is dropped costs its server some 20 us, one that is answered 300.
@@ -85,22 +85,23 @@ class PrincipalRates:
 class RequestRates:
     """The rates of one node, over all keys that it serves; from any thread."""
 
-    def __init__(self, of_a_client: Rate = OF_A_CLIENT, of_refusals: Rate = OF_REFUSALS) -> None:
+    def __init__(self, of_a_client: Rate = OF_A_CLIENT, of_refusals: Rate = OF_REFUSALS, clock: Clock = SYSTEM) -> None:
+        self._clock = clock
         self._of_a_client = of_a_client
-        self._refusals = TokenBucket(of_refusals, time.monotonic())
+        self._refusals = TokenBucket(of_refusals, clock.monotonic())
         self._of: dict[tuple[str, bool], PrincipalRates] = {}  # by principal, and whether of its urgent requests
         self._lock = threading.Lock()
 
     def permit_request(self, principal: str, client: str, urgent: bool = False) -> bool:
         """True if `client` may ask once more now; its urgent requests are counted for themselves."""
-        now = time.monotonic()
+        now = self._clock.monotonic()
         with self._lock:
             return self._rates(principal, urgent, now).permit(client, now)
 
     def permit_refusal(self) -> bool:
         """True if one more request may be answered with why it is not carried out."""
         with self._lock:
-            return self._refusals.take(time.monotonic())
+            return self._refusals.take(self._clock.monotonic())
 
     def _rates(self, principal: str, urgent: bool, now: float) -> PrincipalRates:
         if (found := self._of.get((principal, urgent))) is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 import traceback
 from collections.abc import Callable, Mapping
 from typing import Generic, Protocol, TypeVar
@@ -17,6 +16,7 @@ from schemas.system import Exchange, Failure, TopicStatistics
 from schemas.topics import Request
 from services.runtime.bus.interface import Arrival, Bus, Query
 from services.runtime.bus.wire import from_arrival, schema_of, to_payload
+from services.runtime.clock import SYSTEM, Clock
 from services.runtime.errors import RequestRefused
 from services.runtime.loop.task_queue import Task
 from services.runtime.requests.limits import OF_A_CLIENT, RequestRates, WaitingRequests
@@ -39,9 +39,9 @@ Tell = Callable[[Exchange], None]
 class AnswerReport:
     """Publishes a question with its answer, after who asked has got it: nothing waits for a recording."""
 
-    def __init__(self, tell: Tell, question: bytes, arrived: float) -> None:
+    def __init__(self, tell: Tell, question: bytes, arrived: float, clock: Clock = SYSTEM) -> None:
         """`question` as it came, and readable; it `arrived` at [s] monotonic."""
-        self._tell, self._question, self._arrived = tell, question, arrived
+        self._tell, self._question, self._arrived, self._clock = tell, question, arrived, clock
 
     def answered(self, clients: tuple[str, ...], answer: bytes) -> None:
         self._put(clients, msgspec.Raw(answer), None)
@@ -52,8 +52,8 @@ class AnswerReport:
     def _put(self, clients: tuple[str, ...], answer: msgspec.Raw, failure: Failure | None) -> None:
         self._tell(
             Exchange(
-                stamp=time.time_ns(),
-                duration=time.monotonic() - self._arrived,
+                stamp=self._clock.unix(),
+                duration=self._clock.monotonic() - self._arrived,
                 clients=clients[:MAX_TOLD],
                 question=msgspec.Raw(self._question),
                 answer=answer,
@@ -174,6 +174,7 @@ class RequestServer(Generic[Q, R]):
     ) -> None:
         """`rates` are those of the node, which all its servers share; `tell` is told every question and answer."""
         self.request = request
+        self._clock = bus.clock
         self._put, self._tell = put, tell
         self._handler, self._warn, self._rates = handler, warn, rates
         self._received, self._refused, self._dropped, self._bad = 0, 0, 0, 0
@@ -194,7 +195,7 @@ class RequestServer(Generic[Q, R]):
 
         Those are what has arrived, and what the clients in `asked` (see `Pending.asked`) have asked for before.
         """
-        self._overtaken.stop(reason, asked, time.monotonic())
+        self._overtaken.stop(reason, asked, self._clock.monotonic())
 
     def _on_query(self, query: Query) -> None:
         """Nothing of a request is read before its client may ask at all."""
@@ -203,7 +204,7 @@ class RequestServer(Generic[Q, R]):
         elif refusal := self._waiting.refusal(query.principal, query.client):
             self._refuse(query, refusal)
         else:
-            arrived = time.monotonic()
+            arrived = self._clock.monotonic()
             self._put(lambda: self._take(query, arrived))
 
     def _drop(self, query: Query) -> None:
@@ -235,7 +236,7 @@ class RequestServer(Generic[Q, R]):
             self._handle(question, pending)
 
     def _report(self, question: bytes, arrived: float) -> AnswerReport | None:
-        return AnswerReport(self._tell, question, arrived) if self._tell is not None else None
+        return AnswerReport(self._tell, question, arrived, self._clock) if self._tell is not None else None
 
     def _question(self, query: Query) -> Q | None:
         """The decoded question; None where it cannot be decoded, after a refusal was sent."""
@@ -302,7 +303,7 @@ class UrgentServer(RequestServer[Q, R]):
             if group is None:
                 if refusal := self._waiting.refusal(query.principal, query.client):
                     return refusal
-                report = self._report(encode(question), time.monotonic())
+                report = self._report(encode(question), self._clock.monotonic())
                 group = self._groups[question] = PendingGroup(query.client, query.principal, self._answered, report)
             group.note(query, is_answered)
             self._queue(question, group, is_answered)
@@ -319,13 +320,13 @@ class UrgentServer(RequestServer[Q, R]):
         """Has the group handled, once; call with the lock."""
         if group.is_queued:
             return
-        is_repeated = time.monotonic() - self._taken.get(question, -math.inf) < REPEAT
+        is_repeated = self._clock.monotonic() - self._taken.get(question, -math.inf) < REPEAT
         if is_at_once or not is_repeated:
             group.is_queued = True
             self._put(lambda: self._take_group(question))
         elif group.is_new:
             group.is_new = False
-            threading.Timer(REPEAT, self._queue_late, (question, group)).start()
+            self._clock.later(REPEAT, lambda: self._queue_late(question, group))
 
     def _queue_late(self, question: Q, group: PendingGroup[R]) -> None:
         with self._lock:
@@ -337,7 +338,7 @@ class UrgentServer(RequestServer[Q, R]):
             self._waiting.leave(group.principal, group.client)
             if len(self._taken) >= MAX_TAKEN:
                 self._taken.clear()
-            self._taken[question] = time.monotonic()
+            self._taken[question] = self._clock.monotonic()
         self._handle(question, group)
 
     def _answered(self, count: int) -> None:

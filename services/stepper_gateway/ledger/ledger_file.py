@@ -11,6 +11,7 @@ from pathlib import Path
 
 import msgspec
 
+from services.runtime.clock import SYSTEM, Clock
 from services.runtime.process.unwritten import RETRY, UnwrittenFiles
 from services.stepper_gateway.ledger.record import LedgerRecord
 
@@ -28,32 +29,43 @@ def read_ledger(path: Path) -> tuple[LedgerRecord | None, str]:
         return None, f"{path} cannot be read ({error}): no joint counts as verified; `gemelo verify` starts it anew"
 
 
-def write_ledger(path: Path, record: LedgerRecord) -> None:
-    """Replaces the file; raises OSError and leaves the old one where that cannot be."""
+def write_ledger(path: Path, record: LedgerRecord, is_durable: bool = True) -> None:
+    """Replaces the file; raises OSError and leaves the old one where that cannot be. `is_durable`: even if the power
+    fails just after."""
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_suffix(".new")
     with fresh.open("wb") as file:
         file.write(msgspec.json.format(msgspec.json.encode(record), indent=1))
         file.flush()
-        os.fsync(file.fileno())
+        if is_durable:
+            os.fsync(file.fileno())
     fresh.replace(path)
 
 
 class LedgerFile:
     """Writes the newest record that it was given; of two that come while the disk is busy only the second."""
 
-    def __init__(self, run: Path, robot: str, unwritten: UnwrittenFiles) -> None:
-        """`unwritten` gets what the disk refuses, which is tried again every RETRY until there is a newer record."""
+    def __init__(self, run: Path, robot: str, unwritten: UnwrittenFiles, clock: Clock = SYSTEM) -> None:
+        """`unwritten` gets what the disk refuses, which is tried again every RETRY until there is a newer record.
+
+        In virtual time there is no thread: a disk takes none of it.
+        """
         self.path = run / f"{robot}.ledger.json"
         self._unwritten = unwritten
         self._news = threading.Condition()
         self._record: LedgerRecord | None = None
         self._is_open = True
-        self._thread = threading.Thread(target=self._run, name="ledger", daemon=True)
-        self._thread.start()
+        self._thread: threading.Thread | None = None
+        if not clock.is_virtual:
+            self._thread = threading.Thread(target=self._run, name="ledger", daemon=True)
+            self._thread.start()
 
     def keep(self, record: LedgerRecord | None) -> None:
         """Have it written soon; None is nothing to write."""
+        if self._thread is None:
+            if record is not None:
+                self._write(record)
+            return
         with self._news:
             self._record = record
             self._news.notify()
@@ -63,7 +75,8 @@ class LedgerFile:
         with self._news:
             self._is_open = False
             self._news.notify()
-        self._thread.join(LAST_WRITE)
+        if self._thread is not None:
+            self._thread.join(LAST_WRITE)
 
     def _run(self) -> None:
         refused: LedgerRecord | None = None
@@ -81,7 +94,7 @@ class LedgerFile:
 
     def _write(self, record: LedgerRecord) -> bool:
         try:
-            write_ledger(self.path, record)
+            write_ledger(self.path, record, is_durable=self._thread is not None)
         except OSError as error:
             self._unwritten.failed(UNKEPT, error)
             return False

@@ -1,0 +1,117 @@
+"""Plans in the planner's own process, for virtual time: each takes the same time, so that the same seed gives the same.
+
+A plan is made when it is asked for, and answered when its time is over; a cancel comes between the two as anywhere.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from contextlib import suppress
+
+from schemas.planning import PlanCancelResult, PlanCode, PlanProgress, PlanRequest, PlanResponse, Timing
+from services.planner.collision.sphere_check import cancel_flag
+from services.planner.collision.world import World
+from services.planner.core import Planner
+from services.planner.request.deadline import Stopwatch, endless
+from services.planner.timing.profile import NoProfile
+from services.planner.timing.toppra_speeds import load_toppra
+from services.planner.workers.jobs import Job
+from services.planner.workers.pending_plan import Answer, OnInputs, PendingPlan
+from services.planner.workers.process import nothing
+from services.planner.workers.workers import (
+    AGAIN,
+    CHANGING,
+    CHANGING_REMEDY,
+    Present,
+    Scene,
+    cancelled,
+    failed,
+    for_process,
+    inputs_of,
+    longest,
+    objection_to,
+    progress_of,
+)
+from services.runtime.clock import Clock
+
+COST = 0.01  # [s] of virtual time; chosen: about what a plan takes in a process of its own
+
+
+class PlansInProcess:
+    """As `Workers`; everything here runs in the thread of logic."""
+
+    are_ready = True
+
+    def __init__(self, clock: Clock, planner: Planner, present: Present, scene: Scene) -> None:
+        self._clock, self._planner, self._present, self._scene = clock, planner, present, scene
+        self._prepared: World | None = None
+        self._pending_plans: dict[str, PendingPlan] = {}
+        self._numbers = itertools.count(1)
+        self._prepare()
+
+    def plan(self, request: PlanRequest, answer: Answer, on_inputs: OnInputs = nothing) -> None:
+        """`answer` is called with the response when the plan's virtual time is over."""
+        request_id = request.request_id or f"planner-{next(self._numbers)}"
+        objection = objection_to(request_id, self._pending_plans)
+        if objection is not None:
+            return answer(PlanResponse(code=PlanCode.INVALID_GOAL_CONSTRAINTS, refusal=objection))
+
+        def end(response: PlanResponse) -> None:
+            del self._pending_plans[request_id]
+            answer(response)
+
+        pending_plan = PendingPlan(request_id, request, end, on_inputs, self._clock)
+        self._pending_plans[request_id] = pending_plan
+        pending_plan.begin()
+        self._make(pending_plan, AGAIN)
+
+    def cancel(self, request_id: str) -> PlanCancelResult:
+        """Ends a plan whose time is not over."""
+        pending_plan = self._pending_plans.get(request_id)
+        result = cancelled(request_id, pending_plan)
+        if pending_plan is not None:
+            pending_plan.end(None)
+        return result
+
+    def progress(self, now: int) -> list[PlanProgress]:
+        """Of every plan that is no short one; `now` [ns] UNIX."""
+        return progress_of(self._pending_plans.values(), now)
+
+    def close(self) -> None:
+        """There is nothing to end."""
+
+    def _make(self, pending_plan: PendingPlan, tries: int) -> None:
+        """Makes it in the scene as it is now, and once more where that has changed when its time is over."""
+        scene, (present, age) = self._scene(), self._present()
+        job = Job(request=for_process(pending_plan.request), present=present, age=age)
+        response = self._planned(job)
+        took = longest(pending_plan.request) if response.code is PlanCode.TIMED_OUT else COST
+
+        def answer() -> None:
+            if response.code is not PlanCode.SUCCESS or self._scene() is scene:
+                pending_plan.on_inputs(inputs_of(job, scene, took))
+                pending_plan.end(response)
+            elif tries > 1:
+                self._make(pending_plan, tries - 1)
+            else:
+                pending_plan.end(failed(CHANGING, CHANGING_REMEDY))
+
+        self._clock.later(took, answer)
+
+    def _planned(self, job: Job) -> PlanResponse:
+        """By the processor time of this thread it is late on no machine that has other work too."""
+        self._prepare()
+        if job.request.timing is Timing.TIME_OPTIMAL:
+            with suppress(NoProfile):  # which the plan itself will say
+                load_toppra()  # seconds, the first time, which are not the plan's
+        return self._planner.plan(
+            job.request, job.present, job.age, time.thread_time, cancel_flag(), Stopwatch(endless)
+        )
+
+    def _prepare(self) -> None:
+        """What a plan would otherwise do first."""
+        world = self._planner.checker.newest
+        if world is not self._prepared:
+            self._prepared = world
+            self._planner.prepare()

@@ -1,0 +1,135 @@
+"""One arm of a simulation: the real services as nodes of a bus in memory, and its board."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from msgspec.structs import replace
+
+from schemas.deployment import Deployment, PathsSection, RouterSection
+from schemas.robot import Motor
+from schemas.simulation import WireConditions
+from services.arm.device.device_config import device_config
+from services.arm.model.description import ArmDescription
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.node import Node
+from services.runtime.process.shutdown import ShutdownRequest
+from services.simulation.board import SimulatedBoard, keep_position
+from services.simulation.memory_wire import MemoryWire
+from services.simulation.virtual_clock import VirtualClock
+
+EXTRAS = {"planner": "planner", "camera": "eyes", "detector": "eyes"}  # of pyproject.toml, by service
+READY = 10.0  # [s] of virtual time in which gateway and planner must be ready
+
+
+class NotReady(Exception):
+    """The twin does not become ready; the text is what its services say."""
+
+
+class MissingPart(Exception):
+    """A library is not installed; the text names the extra that has it."""
+
+
+class Start(NamedTuple):
+    """How the twin stands when it is switched on."""
+
+    positions: Mapping[str, float] | None = None  # [rad] or [m] by joint; None: the reference pose
+    referenced: bool = True  # the board knows where the joints stand
+
+
+class ServiceNode(Node):
+    """A node of a service: the clock runs it."""
+
+    def spin(self, step: Callable[[int], object] = lambda now: None, rate: float = 50.0) -> None:
+        """Returns at once; the node goes on until it is closed."""
+        self.begin(step, rate)
+
+
+class Twin:
+    """Services, wire and board of one arm; files only below `folder`."""
+
+    def __init__(
+        self,
+        clock: VirtualClock,
+        arm: ArmDescription,
+        deployment: Deployment,
+        folder: Path,
+        *,
+        start: Start = Start(),  # noqa: B008 a tuple
+        motors: Sequence[Motor] = (),
+        wire: WireConditions = WireConditions(),  # noqa: B008 frozen
+        log_level: str = "error",
+    ) -> None:
+        self.clock, self.arm = clock, arm
+        self.deployment = _within(deployment, folder)
+        self.network = MemoryNetwork(clock)
+        self.wire = MemoryWire(clock, wire)
+        self._log_level = log_level
+        self._nodes: list[ServiceNode] = []
+        run = Path(self.deployment.paths.run)
+        keep_position(run, arm, start.positions, start.referenced)
+        self.board = SimulatedBoard(arm, run, clock, self.wire, motors)
+        try:
+            self._serve("state_publisher")
+            self._serve("planner")
+            self._serve("stepper_gateway", open_wire=lambda _deployment, _arm, wake: self.wire.link(wake))
+            if self.deployment.cell:
+                self._serve("camera")
+                self._serve("detector")
+            self._await_ready()
+        except BaseException:
+            self.close()
+            raise
+
+    def bus(self) -> MemoryBus:
+        """Another connection to the arm's bus."""
+        return MemoryBus(self.network)
+
+    def close(self) -> None:
+        """Ends the services, the last that was started first."""
+        while self._nodes:
+            self._nodes.pop().close()
+        self.board.close()
+
+    def _serve(self, name: str, **outside: Any) -> None:
+        """Runs the shell of a service; `outside` is what it would have from the world."""
+        run = _shell(name).run
+        node = ServiceNode(
+            name, self.deployment, self.arm.name, self.bus(), log_level=self._log_level, stop=ShutdownRequest()
+        )
+        self._nodes.append(node)
+        run(node, self.deployment, **outside)
+
+    def _await_ready(self) -> None:
+        def are_ready() -> bool:
+            return all(node.is_ready for node in self._nodes)
+
+        if not self.clock.wait_until(are_ready, READY):
+            problems = "; ".join(f"{node.name}: {node.info().problem}" for node in self._nodes if not node.is_ready)
+            raise NotReady(f"the simulated {self.arm.name} is not ready after {READY:g} s: {problems}")
+        self.clock.sleep(device_config(self.arm).enable_lead_ms * 1e-3)  # the drivers have just been switched on
+
+
+def _within(deployment: Deployment, folder: Path) -> Deployment:
+    """The same twin with files of its own below `folder`, where taught points and programs are copies."""
+    paths = PathsSection(run=str(folder / "run"), out=str(folder / "out"), programs=str(folder / "programs"))
+    if Path(deployment.paths.programs).is_dir():
+        shutil.copytree(deployment.paths.programs, paths.programs)
+    return replace(deployment, paths=paths, router=RouterSection(host="127.0.0.1", port=0))
+
+
+def _shell(name: str) -> Any:
+    """The module of a service's shell; raises `MissingPart` where a library is not installed."""
+    try:
+        return import_module(f"services.{name}.main")
+    except ModuleNotFoundError as error:
+        extra = EXTRAS.get(name, "")
+        raise MissingPart(
+            f'{error.name} is not installed, which a simulated {name} needs: pip install "gemelo[{extra}]"'
+            if extra
+            else f"{error.name} is not installed, which a simulated {name} needs"
+        ) from error

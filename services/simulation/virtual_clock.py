@@ -1,0 +1,308 @@
+"""Virtual time: it passes only while somebody waits, as fast as the machine computes.
+
+Everything that happens is an event with a time: a turn of a node's loop, or a timer. Whoever waits runs one event after
+another, in the order of their times, until what he waits for is there. Several threads may wait at once; one runs at a
+time, so that the same seed gives the same bytes, and time stands still while one of them is at work. A thread that does
+not come back within `GRACE` of real time (it has ended, or waits for something else) is waited for no longer.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+import random
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from queue import Empty, SimpleQueue
+from types import FrameType
+from typing import TypeVar
+
+from services.runtime.clock import DrivenLoop
+from services.simulation.baton import Baton, VirtualCondition
+
+T = TypeVar("T")
+
+UNIX = 1_700_000_000_000_000_000  # [ns] at the start of virtual time
+ZERO = 1000.0  # [s] of the monotonic clock at the start
+LOOK = 1_000_000  # [ns] that it takes to look at what changes by itself
+GRACE = 0.25  # [s] of real time
+BLINK = 0.05  # [s] of real time at most between two looks whether Ctrl-C was pressed
+
+
+class VirtualTimer:
+    """A task that is called later."""
+
+    def __init__(self, task: Callable[[], None]) -> None:
+        self.task: Callable[[], None] | None = task
+
+    def cancel(self) -> None:
+        self.task = None
+
+
+@dataclass(eq=False)
+class LoopTurns:
+    """One loop, and when its next turn is [ns]; None while none is planned."""
+
+    loop: DrivenLoop
+    at: int | None = None
+    is_busy: bool = False  # in a turn
+
+
+@dataclass(eq=False)
+class Wait:
+    """What one thread waits for, and until when [ns]."""
+
+    is_so: Callable[[], bool]
+    end: float
+
+
+@dataclass(eq=False)
+class Participant:
+    """A thread that has waited before."""
+
+    thread: threading.Thread
+    waits: list[Wait] = field(default_factory=list)  # one within the other, where a handler waits too
+    left_at: float = 0.0  # [s] of real time, when it went to work
+    is_at_work: bool = False
+
+
+class VirtualClock:
+    """The clock of one simulation; see `services.runtime.clock.Clock`."""
+
+    is_virtual = True
+
+    def __init__(self, seed: int = 1, time_scale: float | None = None) -> None:
+        """`time_scale`: virtual seconds in a real one; None is as fast as can be. Raises ValueError for 0 or less."""
+        if time_scale is not None and not 0.0 < time_scale < math.inf:
+            raise ValueError(f"time_scale={time_scale}: it must be above 0; 1.0 is real time, None as fast as can be")
+        self.now = 0  # [ns] since the start
+        self._scale, self._real_start = time_scale, time.monotonic()
+        self._random = random.Random(seed)
+        self._processes = itertools.count(1001)
+        self._order = itertools.count()
+        self._events: list[tuple[int, int, LoopTurns | VirtualTimer]] = []
+        self._loops: dict[DrivenLoop, LoopTurns] = {}
+        self.baton = Baton()
+        self._turns = threading.Condition(self.baton)  # type: ignore[arg-type]  # real: one thread at a time
+        self._participants: dict[threading.Thread, Participant] = {}
+        self._interrupts = 0
+
+    def monotonic(self) -> float:
+        return ZERO + self.now * 1e-9
+
+    def unix(self) -> int:
+        return UNIX + self.now
+
+    def cpu(self) -> float:
+        return 0.0
+
+    def sleep(self, seconds: float) -> None:
+        self.wait_until(lambda: False, seconds)
+
+    def look(self) -> None:
+        if self._scale is None:
+            self.wait_until(lambda: False, LOOK * 1e-9)
+        else:  # what was due while nobody waited
+            self.wait_until(lambda: self.now >= self._allowed(), None)
+
+    def later(self, seconds: float, task: Callable[[], None]) -> VirtualTimer:
+        timer = VirtualTimer(task)
+        with self.baton:
+            heapq.heappush(self._events, (self.now + _ns(seconds), next(self._order), timer))
+        return timer
+
+    def condition(self) -> threading.Condition:
+        return VirtualCondition(self.baton, self.wait_until)
+
+    def take(self, queue: SimpleQueue[T], timeout: float) -> T:
+        if not self.wait_until(lambda: not queue.empty(), timeout):
+            raise Empty
+        return queue.get_nowait()
+
+    def thread(self, target: Callable[[], object], name: str) -> threading.Thread:
+        def run() -> None:
+            self.wait_until(lambda: True, None)  # for its turn
+            try:
+                target()
+            finally:
+                self._end(thread)
+
+        thread = threading.Thread(target=run, name=name, daemon=True)
+        with self.baton:
+            self._participants[thread] = Participant(thread, is_at_work=True, left_at=time.monotonic())
+        return thread
+
+    def drive(self, loop: DrivenLoop) -> None:
+        with self.baton:
+            turns = self._loops[loop] = LoopTurns(loop)
+            loop.on_task(lambda: self._wake(turns))
+            self._plan(turns)
+
+    def release(self, loop: DrivenLoop) -> None:
+        with self.baton:
+            loop.on_task(None)
+            self._loops.pop(loop).at = None
+
+    def bits(self, count: int) -> int:
+        with self.baton:
+            return self._random.getrandbits(count)
+
+    def draw(self) -> float:
+        """A random number from 0 to 1."""
+        return self._random.random()
+
+    def process(self) -> int:
+        return next(self._processes)
+
+    def host(self) -> str:
+        return "simulation"
+
+    def wait_until(self, is_so: Callable[[], bool], timeout: float | None) -> bool:
+        with self.baton, self._interrupted_between_events():
+            me = self._me()
+            wait = Wait(is_so, math.inf if timeout is None else self.now + _ns(timeout))
+            me.waits.append(wait)
+            me.is_at_work = False
+            try:
+                while (first := self._first_to_work(me)) is not me:
+                    if first is None:
+                        self._go_on()
+                    else:
+                        self._let_work()
+                return wait.is_so()
+            finally:
+                me.waits.remove(wait)
+                me.is_at_work, me.left_at = not me.waits, time.monotonic()
+                self._turns.notify_all()
+
+    def _first_to_work(self, me: Participant) -> Participant | None:
+        """Who is at work, or may be as what it waits for is there; None where everybody waits for what comes."""
+        if len(self._participants) == 1:
+            return me if self._has_what_it_waits_for(me) else None
+        everybody = self._participants.values()
+        at_work = next((each for each in everybody if each is not me and self._is_waited_for(each)), None)
+        return at_work or next((each for each in everybody if self._has_what_it_waits_for(each)), None)
+
+    def _let_work(self) -> None:
+        self._turns.notify_all()
+        self._turns.wait(BLINK)
+        self._raise_interrupts()
+
+    def _has_what_it_waits_for(self, each: Participant) -> bool:
+        wait = each.waits[-1] if each.waits and not each.is_at_work else None
+        return wait is not None and (self.now >= wait.end or wait.is_so())
+
+    def _is_waited_for(self, each: Participant) -> bool:
+        has_ended = each.thread.ident is not None and not each.thread.is_alive()
+        return each.is_at_work and not has_ended and time.monotonic() - each.left_at < GRACE
+
+    def _go_on(self) -> None:
+        """Lets the next event happen, or time pass up to where somebody has waited long enough."""
+        until = min((each.waits[-1].end for each in self._participants.values() if each.waits), default=math.inf)
+        due = self._events[0][0] if self._events else math.inf
+        then = min(until, due)
+        if self._scale is not None and then > self._allowed():
+            self._turns.wait(min(BLINK, max(0.0, self._real(then) - time.monotonic())))
+            return self._raise_interrupts()
+        if due > until:
+            self.now = int(until)
+        elif due < math.inf:
+            self.now = max(self.now, int(due))
+            self._happen(heapq.heappop(self._events)[2])
+        else:
+            self._turns.wait(BLINK)  # nothing will happen by itself
+        self._raise_interrupts()
+        if self.baton.is_wanted:
+            self._turns.wait(0.001)
+
+    def _happen(self, event: LoopTurns | VirtualTimer) -> None:
+        if isinstance(event, VirtualTimer):
+            task, event.task = event.task, None
+            if task is not None:
+                task()
+        elif event.at is not None and event.at <= self.now and not event.is_busy:
+            event.at, event.is_busy = None, True
+            try:
+                event.loop.turn()
+            finally:
+                event.is_busy = False
+                self._plan(event)
+
+    def _plan(self, turns: LoopTurns) -> None:
+        if turns.loop in self._loops:
+            due = turns.loop.due()
+            if due < math.inf:
+                self._plan_at(turns, max(self.now, math.floor((due - ZERO) * 1e9) + 1))
+
+    def _wake(self, turns: LoopTurns) -> None:
+        with self.baton:
+            if not turns.is_busy:  # else it is looked at after its turn
+                self._plan_at(turns, self.now)
+
+    def _plan_at(self, turns: LoopTurns, at: int) -> None:
+        if turns.at is None or at < turns.at:
+            turns.at = at
+            heapq.heappush(self._events, (at, next(self._order), turns))
+
+    def _allowed(self) -> float:
+        """[ns] up to which virtual time may have passed by now."""
+        return (time.monotonic() - self._real_start) * (self._scale or math.inf) * 1e9
+
+    def _real(self, then: float) -> float:
+        """[s] of real time at the virtual time `then` [ns]."""
+        return self._real_start + then * 1e-9 / (self._scale or math.inf)
+
+    def _me(self) -> Participant:
+        thread = threading.current_thread()
+        if thread not in self._participants:
+            ended = [each for each in self._participants if each.ident is not None and not each.is_alive()]
+            for each in ended:
+                del self._participants[each]
+            self._participants[thread] = Participant(thread)
+        return self._participants[thread]
+
+    def _end(self, thread: threading.Thread) -> None:
+        with self.baton:
+            self._participants.pop(thread, None)
+            self._turns.notify_all()
+
+    @contextmanager
+    def _interrupted_between_events(self) -> Iterator[None]:
+        """Ctrl-C must not break off a service in the middle of an event, as it does not where they are processes."""
+        if threading.current_thread() is not threading.main_thread() or self._is_nested():
+            yield
+            return
+        before = signal.getsignal(signal.SIGINT)
+        if not callable(before):
+            yield
+            return
+        self._handler = before
+        signal.signal(signal.SIGINT, self._note_interrupt)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+    def _is_nested(self) -> bool:
+        me = self._participants.get(threading.current_thread())
+        return me is not None and bool(me.waits)
+
+    def _note_interrupt(self, _number: int, _frame: FrameType | None) -> None:
+        self._interrupts += 1
+
+    def _raise_interrupts(self) -> None:
+        if self._interrupts and threading.current_thread() is threading.main_thread() and self._is_outermost():
+            self._interrupts -= 1
+            self._handler(signal.SIGINT, None)
+
+    def _is_outermost(self) -> bool:
+        return len(self._participants[threading.current_thread()].waits) == 1
+
+
+def _ns(seconds: float) -> int:
+    return max(0, round(seconds * 1e9))
