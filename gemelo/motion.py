@@ -81,6 +81,7 @@ class Motion:
         >>> arm.move(named="left").status.name
         'SUCCEEDED'
         """
+        self._session.clock.look()
         return self._handle.status if self._handle is not None else GoalStatusCode.UNKNOWN
 
     @property
@@ -90,6 +91,7 @@ class Motion:
         >>> arm.move(named="left").is_over
         True
         """
+        self._session.clock.look()
         return self._handle is not None and self._handle.is_over
 
     @property

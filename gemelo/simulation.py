@@ -54,6 +54,7 @@ BUTTONS: dict[str, tuple[str, float | None]] = {
     "freeze": ("freeze", None),
     "drift": ("drift", None),
 }
+PRESSED = 0.05  # [s] after which the gateway knows what was pressed: the board says it within two states
 HELD = {"on": 1.0, "off": 0.0, "auto": -1.0}  # of a switch
 
 Motors = Mapping[str, float | Motor]  # by joint: its motor, or the share that is left of its pull-out torque
@@ -132,6 +133,7 @@ class Simulation:
         node = Node(name or "program", twin.deployment, robot=arm.name, bus=twin.bus(), log_level="warning")
         connected = SimulatedArm(Session(twin.deployment, arm, node), self, twin)
         self.arms.append(connected)
+        self._clock.keep_pace()
         return connected
 
     def close(self) -> None:
@@ -209,6 +211,7 @@ class SimulatedWorld:
         if len(rest) > 1 or any(not isinstance(each, str) for each in rest):
             raise BadArgument(f'press("{what}", ...): one name and one value at most, not {words!r}')
         self._arm.device.inject(kind, str(rest[0]) if rest else "", value)
+        self.sleep(PRESSED)
 
     def cut_wire(self) -> None:
         """Nothing goes between gateway and board any more, and the gateway knows it."""
@@ -270,11 +273,12 @@ def simulate(
 ) -> SimulatedArm | SimulatedArms:
     """A twin inside this process: the same `Arm` as that of `connect`, in virtual time.
 
-    `robots`: names of folders of urdf/, or paths, the deployment's if left out; several share one time. `seed`: the same one gives the same bytes.
-    `cell`: a cell.toml, with which cameras see. `motors`: by joint, the share that is left of its pull-out torque (0.3:
-    it loses steps early), or another motor. `wire`: delay [s], jitter [s] and loss between gateway and board. `start`:
-    a named state, joint values [rad] or [m], or "unreferenced"; else the arm is referenced in its reference pose. It is
-    armed in any case. `time_scale`: 1.0 is real time; as fast as the machine computes if left out.
+    `robots`: names of folders of urdf/, or paths, the deployment's if left out; several share one time. `seed`: the
+    same one gives the same bytes. `cell`: a cell.toml, with which cameras see. `motors`: by joint, the share that is
+    left of its pull-out torque (0.3: it loses steps early), or another motor. `wire`: delay [s], jitter [s] and loss
+    between gateway and board. `start`: a named state, joint values [rad] or [m], or "unreferenced"; if left out, the
+    reference pose, referenced. The arm is armed in any case. `time_scale`: 1.0 is real time; as fast as the machine
+    computes if left out.
 
     Raises `Error` where a part of the installation is missing or the twin does not become ready, and `BadArgument`.
 

@@ -64,10 +64,7 @@ class Clock(Protocol):
     def sleep(self, seconds: float) -> None: ...
 
     def look(self) -> None:
-        """Somebody looks at what changes by itself: in virtual time that takes a moment, else a loop would never end.
-
-        Call it without a lock.
-        """
+        """Somebody looks at what changes by itself: that takes a moment of virtual time, else a loop would never end."""
         ...
 
     def later(self, seconds: float, task: Callable[[], None]) -> Timer:

@@ -20,7 +20,8 @@ from services.simulation.memory_wire import MemoryWire
 from services.simulation.virtual_clock import VirtualClock
 
 NAME = "virtual_esp32"
-PERIOD = 0.01  # [s] between two turns of a board to which nothing comes; its states are due every 0.02 s
+PERIOD = 0.02  # [s] between two turns of a board to which nothing comes: as often its state is due
+PHASE = 0.0011  # [s] of a turn after its state is due: a slot of the firmware, and what begins it
 
 logging.getLogger(NAME).addHandler(logging.NullHandler())  # what it has to say comes as events
 
@@ -32,7 +33,9 @@ class SimulatedBoard:
         self, arm: ArmDescription, folder: Path, clock: VirtualClock, wire: MemoryWire, motors: Sequence[Motor]
     ) -> None:
         self._clock, self._wire = clock, wire
-        self._due = 0.0  # [s] monotonic
+        self._due = self._beat = (
+            clock.monotonic() + PHASE
+        )  # [s] monotonic, of the next turn and the next without a frame
         board, readiness = Board(arm, folder, NAME, motors, clock), Readiness(folder, NAME)
         self._esp32 = VirtualEsp32(board, Wires(wire, None), inbox=wire.inbox, readiness=readiness, clock=clock)
         self._esp32.begin()
@@ -43,7 +46,9 @@ class SimulatedBoard:
 
     def turn(self) -> None:
         now = self._clock.monotonic()
-        self._due = now + PERIOD
+        while self._beat <= now:
+            self._beat += PERIOD
+        self._due = self._beat
         self._esp32.turn(self._wire.take())
 
     def on_task(self, wake: object) -> None:

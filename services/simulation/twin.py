@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from schemas.deployment import Deployment, PathsSection, RouterSection
 from schemas.robot import Motor
 from schemas.simulation import WireConditions
+from schemas.system import ParameterValue
 from services.arm.device.device_config import device_config
 from services.arm.model.description import ArmDescription
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
@@ -23,6 +24,7 @@ from services.simulation.memory_wire import MemoryWire
 from services.simulation.virtual_clock import VirtualClock
 
 EXTRAS = {"planner": "planner", "camera": "eyes", "detector": "eyes"}  # of pyproject.toml, by service
+UNRECORDED: dict[str, ParameterValue] = {"record_inputs": False}  # nobody replays them, and they cost a fifth
 READY = 10.0  # [s] of virtual time in which gateway and planner must be ready
 
 
@@ -119,7 +121,13 @@ def _within(deployment: Deployment, folder: Path) -> Deployment:
     paths = PathsSection(run=str(folder / "run"), out=str(folder / "out"), programs=str(folder / "programs"))
     if Path(deployment.paths.programs).is_dir():
         shutil.copytree(deployment.paths.programs, paths.programs)
-    return replace(deployment, paths=paths, router=RouterSection(host="127.0.0.1", port=0))
+    parameters = {node: UNRECORDED | deployment.parameters.get(node, {}) for node in ("stepper_gateway", "planner")}
+    return replace(
+        deployment,
+        paths=paths,
+        router=RouterSection(host="127.0.0.1", port=0),
+        parameters={**deployment.parameters, **parameters},
+    )
 
 
 def _shell(name: str) -> Any:

@@ -81,7 +81,9 @@ class VirtualClock:
         if time_scale is not None and not 0.0 < time_scale < math.inf:
             raise ValueError(f"time_scale={time_scale}: it must be above 0; 1.0 is real time, None as fast as can be")
         self.now = 0  # [ns] since the start
-        self._scale, self._real_start = time_scale, time.monotonic()
+        self._scale: float | None = None
+        self._asked_scale = time_scale
+        self._anchor = (0.0, 0)  # real time [s] and virtual time [ns] at the same moment
         self._random = random.Random(seed)
         self._processes = itertools.count(1001)
         self._order = itertools.count()
@@ -91,6 +93,10 @@ class VirtualClock:
         self._turns = threading.Condition(self.baton)  # type: ignore[arg-type]  # real: one thread at a time
         self._participants: dict[threading.Thread, Participant] = {}
         self._interrupts = 0
+
+    def keep_pace(self) -> None:
+        """From now on time passes as `time_scale` says."""
+        self._scale, self._anchor = self._asked_scale, (time.monotonic(), self.now)
 
     def monotonic(self) -> float:
         return ZERO + self.now * 1e-9
@@ -105,6 +111,8 @@ class VirtualClock:
         self.wait_until(lambda: False, seconds)
 
     def look(self) -> None:
+        if self._is_nested():  # whoever waits looks all the time
+            return
         if self._scale is None:
             self.wait_until(lambda: False, LOOK * 1e-9)
         else:  # what was due while nobody waited
@@ -251,11 +259,13 @@ class VirtualClock:
 
     def _allowed(self) -> float:
         """[ns] up to which virtual time may have passed by now."""
-        return (time.monotonic() - self._real_start) * (self._scale or math.inf) * 1e9
+        real, virtual = self._anchor
+        return virtual + (time.monotonic() - real) * (self._scale or math.inf) * 1e9
 
     def _real(self, then: float) -> float:
         """[s] of real time at the virtual time `then` [ns]."""
-        return self._real_start + then * 1e-9 / (self._scale or math.inf)
+        real, virtual = self._anchor
+        return real + (then - virtual) * 1e-9 / (self._scale or math.inf)
 
     def _me(self) -> Participant:
         thread = threading.current_thread()

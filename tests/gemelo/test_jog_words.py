@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-import gemelo.jog
 from gemelo import Refused
 from gemelo.jog import BEGIN, PERIOD, JogCommands
 from schemas.planning import JogCommand, JogStatus
@@ -21,11 +20,11 @@ COMMAND = JogCommand(name=("a",), velocity=(0.1,))
 class Planner:
     """Its newest word, and the bus to it, on a clock of its own [s]."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self) -> None:
         self.now = 100.0
         self.said: list[JogCommand] = []
         self._tell: Callable[[JogStatus], None] = lambda status: None
-        monkeypatch.setattr(gemelo.jog.time, "monotonic", lambda: self.now)
+        self.clock = SimpleNamespace(monotonic=lambda: self.now)
         publisher = SimpleNamespace(put=self.said.append)
         self.node = SimpleNamespace(name="me", now=lambda: 0, publisher=lambda topic: publisher)
 
@@ -38,8 +37,8 @@ class Planner:
 
 
 @pytest.fixture
-def planner(monkeypatch: pytest.MonkeyPatch) -> Planner:
-    return Planner(monkeypatch)
+def planner() -> Planner:
+    return Planner()
 
 
 def commands(planner: Any) -> JogCommands:

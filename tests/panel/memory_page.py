@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
-from types import SimpleNamespace
+from typing import Any
 from unittest import mock
 
 import gemelo
@@ -124,6 +124,11 @@ class MemoryPage:
         return said
 
 
+def age(latest: topics.Latest[Any], now: int | None = None) -> float:
+    """What has come is as new as ever."""
+    return float("inf") if latest.message is None else 0.0
+
+
 @contextmanager
 def memory_page(robot: str | Path, folder: Path) -> Iterator[MemoryPage]:
     """A page of the robot, one of ours by its name or another's folder, with one browser that has got all of it."""
@@ -142,10 +147,8 @@ def memory_page(robot: str | Path, folder: Path) -> Iterator[MemoryPage]:
         Node("planner", deployment, bus=MemoryBus(network), robot=arm.name) as planner,
     ):
         gateway = Gateway(node, planner, arm)
-        began = time.monotonic()
-        stopped = SimpleNamespace(monotonic=lambda: began, time_ns=time.time_ns)
         with (
-            mock.patch.object(topics, "time", stopped),  # what is said does not grow old on a machine under load
+            mock.patch.object(topics.Latest, "age", age),  # what is said does not grow old on a machine under load
             spinning(node, lambda now: gateway.say()),
             gemelo.Arm(Session(deployment, arm, Node("panel", deployment, arm.name, MemoryBus(network)))) as connected,
         ):

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from services.runtime import endpoints
 from services.runtime.bus.identity import identify
+from services.runtime.clock import SystemClock
 from services.runtime.loop import loop as loop_module
 from services.runtime.loop.loop import Loop, LoopFigures, Schedule
 from services.runtime.loop.task_queue import Task, TaskQueue
@@ -60,8 +61,8 @@ def test_a_rate_must_be_above_zero(rate: float) -> None:
         Schedule(rate, 0.0)
 
 
-class CountedClock:
-    """Stands for `time`: it goes on only where something waits or says how long it took."""
+class CountedClock(SystemClock):
+    """A clock that goes on only where something waits or says how long it took."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -69,10 +70,10 @@ class CountedClock:
     def monotonic(self) -> float:
         return self.now
 
-    def process_time(self) -> float:
+    def cpu(self) -> float:
         return self.now / 4.0
 
-    def time_ns(self) -> int:
+    def unix(self) -> int:
         return round(self.now * 1e9)
 
     def spend(self, seconds: float) -> None:
@@ -96,8 +97,6 @@ class CountedQueue(TaskQueue):
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> CountedClock:
     clock = CountedClock()
-    monkeypatch.setattr(loop_module, "time", clock)
-    monkeypatch.setattr(endpoints, "time", clock)
     monkeypatch.setattr(loop_module, "TaskQueue", lambda: CountedQueue(clock))
     return clock
 
@@ -117,13 +116,13 @@ def steps_of(loop: Loop, clock: CountedClock, rate: float, until: float, slow: d
 
 
 def test_the_rate_is_exact_and_a_slow_step_does_not_shift_it(clock: CountedClock) -> None:
-    begins = steps_of(Loop(ShutdownRequest()), clock, 50.0, until=1.0, slow={20: 0.055})
+    begins = steps_of(Loop(ShutdownRequest(), clock), clock, 50.0, until=1.0, slow={20: 0.055})
     grid = [k / 50.0 for k in range(51) if k not in (21, 22)]  # 20 lasts until 0.455: two deadlines are slept through
     assert begins == pytest.approx(grid, abs=1e-9)
 
 
 def test_a_flood_does_not_starve_the_step(clock: CountedClock) -> None:
-    loop = Loop(ShutdownRequest())
+    loop = Loop(ShutdownRequest(), clock)
     for _ in range(2000):
         loop.tasks.put(lambda: clock.spend(0.0005))
     begins = steps_of(loop, clock, 50.0, until=0.6, slow={})
@@ -133,7 +132,7 @@ def test_a_flood_does_not_starve_the_step(clock: CountedClock) -> None:
 
 
 def test_slow_steps_and_slow_messages_take_turns(clock: CountedClock) -> None:
-    loop = Loop(ShutdownRequest())
+    loop = Loop(ShutdownRequest(), clock)
     turns: list[str] = []
 
     def handle() -> None:
@@ -153,7 +152,7 @@ def test_slow_steps_and_slow_messages_take_turns(clock: CountedClock) -> None:
 
 
 def test_statistics_say_the_rate_since_the_report_before(clock: CountedClock) -> None:
-    statistics = endpoints.LoopStatistics(identify("planner"))
+    statistics = endpoints.LoopStatistics(identify("planner"), clock)
     clock.spend(0.4)
     assert statistics.report(LoopFigures(20, 0.0), ()) is None
     clock.spend(0.6)

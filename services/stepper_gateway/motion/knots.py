@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from schemas.message import Vector
@@ -68,9 +69,12 @@ def whole_steps(q8: int) -> int:
     return (q8 + 128) >> 8
 
 
-def stop_time(knot: Knot, joints: tuple[Joint, ...]) -> float:
-    """[s] that braking from this knot to rest takes at the acceleration limits."""
-    return max(abs(v) / joint.acceleration for joint, v in zip(joints, knot.velocity, strict=True))
+def longest_stop(knots: Sequence[Knot], joints: tuple[Joint, ...]) -> float:
+    """[s] the longest that braking from one of these knots to rest takes at the acceleration limits; 0 for none."""
+    if not knots:
+        return 0.0
+    by_joint: Iterable[Vector] = zip(*(knot.velocity for knot in knots), strict=True)
+    return max(max(map(abs, each)) / joint.acceleration for joint, each in zip(joints, by_joint, strict=True))
 
 
 class Limits(NamedTuple):
