@@ -21,6 +21,7 @@ SECTIONS = (  # title, names
     ("The scene", ("Scene", "load_mesh")),
     ("The device", ("Device",)),
     ("Who may move the arm", ("Control", "Hold")),
+    ("A twin for your tests", ("simulate", "SimulatedArm", "SimulatedWorld", "SimulatedArms", "Simulation")),
     ("Errors", ("Error", "BadArgument", "Refused", "Aborted", "Canceled", "Lost", "Interrupted")),
     ("Units and poses", ("deg", "mm", "Pose")),
 )

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from gemelo.scene import Scene
     from gemelo.scene_files import load_mesh
     from gemelo.seeing import Seen
-    from gemelo.simulation import SimulatedArm, SimulatedArms, Simulation, simulate
+    from gemelo.simulation import SimulatedArm, SimulatedArms, SimulatedWorld, Simulation, simulate
     from gemelo.units import Pose, deg, mm
     from gemelo.verification import Verification
     from schemas import topics
@@ -73,6 +73,7 @@ __all__ = [
     "Seen",
     "SimulatedArm",
     "SimulatedArms",
+    "SimulatedWorld",
     "Simulation",
     "StopKind",
     "Target",
@@ -106,7 +107,7 @@ MODULES = {
     "gemelo.scene": ("Scene",),
     "gemelo.scene_files": ("load_mesh",),
     "gemelo.seeing": ("Seen",),
-    "gemelo.simulation": ("SimulatedArm", "SimulatedArms", "Simulation", "simulate"),
+    "gemelo.simulation": ("SimulatedArm", "SimulatedArms", "SimulatedWorld", "Simulation", "simulate"),
     "gemelo.units": ("Pose", "deg", "mm"),
     "gemelo.verification": ("Verification",),
     "schemas.actions": ("GoalStatusCode",),

@@ -117,7 +117,12 @@ class Simulation:
         start: str | Joints | None = None,
         name: str = "",
     ) -> SimulatedArm:
-        """Another arm, ready to move; see `simulate`. `name`: of the node of this connection."""
+        """Another arm, ready to move; see `simulate`. `name`: of the node of this connection.
+
+        >>> with gemelo.Simulation() as simulation:
+        ...     simulation.add("rm1", start="left").joints["brazo_joint"] > 0.5
+        True
+        """
         found = robot if isinstance(robot, Robot) else load_robot(str(robot))
         deployment = replace(found.deployment, robot=str(found.description.folder), arms="")
         deployment = replace(deployment, cell=str(Path(cell).resolve()) if cell else "")
@@ -137,7 +142,10 @@ class Simulation:
         return connected
 
     def close(self) -> None:
-        """Ends it whole; may be called twice."""
+        """Ends it whole; may be called twice.
+
+        >>> gemelo.Simulation().close()
+        """
         try:
             while self.arms:
                 self.arms.pop()._leave()
@@ -159,14 +167,23 @@ class Simulation:
 
 
 class SimulatedArm(Arm):
-    """An `Arm` whose twin is simulated; `sim` is what only a simulation has."""
+    """An `Arm` whose twin is simulated; `sim` is what only a simulation has.
+
+    >>> with gemelo.simulate("rm1") as simulated:
+    ...     simulated.sim.press("estop")
+    ...     simulated.device.mode.name
+    'ESTOP'
+    """
 
     def __init__(self, session: Session, simulation: Simulation, twin: Twin) -> None:
         super().__init__(session)
         self.sim = SimulatedWorld(self, simulation, twin)
 
     def close(self) -> None:
-        """Ends the connection, and the simulation with its last arm."""
+        """Ends the connection, and the simulation with its last arm.
+
+        >>> gemelo.simulate("rm1").close()
+        """
         simulation = self.sim.simulation
         self._leave()
         if self in simulation.arms:
@@ -179,24 +196,49 @@ class SimulatedArm(Arm):
 
 
 class SimulatedWorld:
-    """What only a simulation has: its time, and hands and accidents at the virtual device."""
+    """What only a simulation has: its time, and hands and accidents at the virtual device.
+
+    >>> with gemelo.simulate("rm1") as simulated:
+    ...     simulated.sim.cut_wire()
+    ...     simulated.sim.sleep(1.0)
+    ...     simulated.device.status.online
+    False
+    """
 
     def __init__(self, arm: Arm, simulation: Simulation, twin: Twin) -> None:
         self._arm, self.simulation, self._twin = arm, simulation, twin
 
     @property
     def now(self) -> float:
-        """[s] of virtual time since the beginning."""
+        """[s] of virtual time since the beginning.
+
+        >>> with gemelo.simulate("rm1") as simulated:
+        ...     0.0 < simulated.sim.now < 1.0
+        True
+        """
         return self.simulation.now
 
     def sleep(self, seconds: float) -> None:
-        """Lets so much virtual time pass [s]."""
+        """Lets so much virtual time pass [s].
+
+        >>> with gemelo.simulate("rm1") as simulated:
+        ...     motion = simulated.start(named="left")
+        ...     simulated.sim.sleep(0.5)
+        ...     0.0 < motion.progress < 1.0
+        True
+        """
         self.simulation.sleep(seconds)
 
     def press(self, what: str, *words: str | float) -> None:
         """As `gemelo device press`: "estop", "release", "block" JOINT, "free" JOINT, "slip" JOINT STEPS, "switch" INPUT
         "on" | "off" | "auto", "sensor" SENSOR VALUE, "object" WIDTH [m], "reboot", "offline" [s], "freeze" [s],
-        "drift" [ppm]. Raises `BadArgument`, or `Refused` with the device's reason."""
+        "drift" [ppm]. Raises `BadArgument`, or `Refused` with the device's reason.
+
+        >>> with gemelo.simulate("rm1") as simulated:
+        ...     simulated.sim.press("sensor", "ultra", 0.25)
+        ...     simulated.sensors["ultra"]
+        0.25
+        """
         if what not in BUTTONS:
             raise BadArgument(f'there is no "{what}" to press{suggestion(what, BUTTONS)}')
         kind, value = BUTTONS[what]
@@ -214,16 +256,30 @@ class SimulatedWorld:
         self.sleep(PRESSED)
 
     def cut_wire(self) -> None:
-        """Nothing goes between gateway and board any more, and the gateway knows it."""
+        """Nothing goes between gateway and board any more, and the gateway knows it.
+
+        >>> with gemelo.simulate("rm1") as simulated:
+        ...     simulated.sim.cut_wire()
+        """
         self._twin.wire.cut()
 
     def restore_wire(self) -> None:
-        """Ends `cut_wire`."""
+        """Ends `cut_wire`.
+
+        >>> with gemelo.simulate("rm1") as simulated:
+        ...     simulated.sim.cut_wire()
+        ...     simulated.sim.restore_wire()
+        """
         self._twin.wire.restore()
 
 
 class SimulatedArms(tuple[SimulatedArm, ...]):
-    """Several arms of one simulation, as a context that ends it."""
+    """Several arms of one simulation, as a context that ends it.
+
+    >>> with gemelo.simulate("rm1", "parol6") as (first, second):
+    ...     first.name, second.name
+    ('rm1', 'parol6')
+    """
 
     def __enter__(self) -> Self:
         return self

@@ -64,7 +64,7 @@ class Clock(Protocol):
     def sleep(self, seconds: float) -> None: ...
 
     def look(self) -> None:
-        """Somebody looks at what changes by itself: that takes a moment of virtual time, else a loop would never end."""
+        """Somebody looks at what changes by itself: a moment of virtual time, for else a loop would never end."""
         ...
 
     def later(self, seconds: float, task: Callable[[], None]) -> Timer:
