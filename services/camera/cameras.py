@@ -20,7 +20,7 @@ from services.arm.cell.camera_model import believed_info, exact_info
 from services.arm.cell.cell_file import Cell
 from services.arm.model.description import ArmDescription
 from services.camera.core import CameraCore
-from services.camera.reader import ImageReader
+from services.camera.reader import ClockedReader, ImageReader
 from services.camera.sources.source import CameraSource, EncodedImage
 from services.camera.sources.stored import FolderOfImages, Video
 from services.camera.sources.v4l2 import V4l2Camera
@@ -71,7 +71,12 @@ class _Camera:
         source = self._source(record, cell)
         self._core = CameraCore(record.name, record.fps, source.is_live, node.now())
         self._said, self._reopened = "", 0
-        self.reader = ImageReader(source, lambda: node.post(self._take), name=record.name)
+        wake = lambda: node.post(self._take)  # noqa: E731
+        self.reader = (
+            ClockedReader(source, wake, record.name, node.clock)
+            if node.clock.is_virtual
+            else ImageReader(source, wake, record.name)
+        )
         self.reader.start()
 
     def step(self, now: int) -> None:
@@ -112,16 +117,17 @@ class _Camera:
             self._node.publisher(camera_truth(self._record.name)).put(truth)
 
     def _source(self, record: CameraRecord, cell: Cell) -> CameraSource:
+        clock = self._node.clock
         match record.source:
             case V4l2Source():
                 return V4l2Camera(record, record.source)
             case FolderSource():
-                return FolderOfImages(record, cell.path_of(record.source.path), record.source.loop)
+                return FolderOfImages(record, cell.path_of(record.source.path), record.source.loop, clock)
             case FileSource():
-                return Video(record, cell.path_of(record.source.path), record.source.loop)
+                return Video(record, cell.path_of(record.source.path), record.source.loop, clock)
             case VirtualSource():
                 assert self._world is not None  # there is one for every cell with a virtual camera
-                return VirtualCamera(record, record.source, self._exact, self._world.snapshot)
+                return VirtualCamera(record, record.source, self._exact, self._world.snapshot, clock)
 
 
 def _watched_world(node: Node, arm: ArmDescription, cell: Cell) -> CameraWorld | None:

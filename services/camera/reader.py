@@ -1,4 +1,4 @@
-"""The thread that reads one source: it keeps the newest image only, and opens again what has failed."""
+"""The reader of one source, a thread of its own: it keeps the newest image only, and opens again what has failed."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import cv2
 
 from schemas.camera import CameraCondition
 from services.camera.sources.source import CameraFault, CameraSource, EncodedImage
+from services.runtime.clock import Clock
 
 RETRY = 0.5  # [s] between two attempts to open
 
@@ -87,3 +88,45 @@ class ImageReader:
                 self.frame = event
         if is_first:
             self._wake()
+
+
+class ClockedReader(ImageReader):
+    """As `ImageReader`, without a thread: a clock of virtual time has it read."""
+
+    def __init__(self, source: CameraSource, wake: Callable[[], None], name: str, clock: Clock) -> None:
+        super().__init__(source, wake, name)
+        self._clock, self._is_open = clock, False
+
+    def start(self) -> None:
+        self._clock.later(0.0, self._read)
+
+    def stop(self, timeout: float = 1.0) -> None:
+        """Closes the source."""
+        self._stop.set()
+        self._close()
+
+    def _read(self) -> None:
+        """One image, and the next when it is due."""
+        if self._stop.is_set():
+            return
+        pause = RETRY
+        try:
+            if self._anew.is_set():
+                self._close()
+            if not self._is_open:
+                self._anew.clear()
+                self._source.open()
+                self._is_open = True
+            self._put(self._source.read())
+            pause = self._source.period
+        except CameraFault as fault:
+            self._put(fault)
+            self._close()
+            if fault.condition is CameraCondition.ENDED:
+                return
+        self._clock.later(pause, self._read)
+
+    def _close(self) -> None:
+        if self._is_open:
+            self._is_open = False
+            self._source.close()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import cv2
 from schemas.camera import CameraCondition
 from schemas.cell import CameraRecord
 from services.camera.sources.source import CameraFault, EncodedImage, encoded
+from services.runtime.clock import SYSTEM, Clock
 
 PICTURES = {".jpg", ".jpeg", ".png"}
 
@@ -20,7 +20,8 @@ class FolderOfImages:
 
     is_live = False
 
-    def __init__(self, record: CameraRecord, folder: Path, loop: bool) -> None:
+    def __init__(self, record: CameraRecord, folder: Path, loop: bool, clock: Clock = SYSTEM) -> None:
+        self._clock = clock
         self.period = 1.0 / record.fps
         self._record, self._folder, self._loop = record, folder, loop
         self._waiting: list[Path] = []
@@ -38,7 +39,7 @@ class FolderOfImages:
             if not self._loop:
                 raise _fault(self._record, CameraCondition.ENDED, f"{self._folder} is at its end")
             self._waiting = self._pictures()
-        return picture(self._record, self._waiting.pop(0))
+        return picture(self._record, self._waiting.pop(0), self._clock)
 
     def close(self) -> None:
         pass
@@ -57,7 +58,8 @@ class Video:
 
     is_live = False
 
-    def __init__(self, record: CameraRecord, path: Path, loop: bool) -> None:
+    def __init__(self, record: CameraRecord, path: Path, loop: bool, clock: Clock = SYSTEM) -> None:
+        self._clock = clock
         self.period = 1.0 / record.fps
         self._record, self._path, self._loop = record, path, loop
         self._capture: Any = None
@@ -75,14 +77,14 @@ class Video:
     def read(self) -> EncodedImage:
         """Raises `CameraFault` at the end, and for another size than the cell file's."""
         if self._capture is None:
-            return picture(self._record, self._path)
+            return picture(self._record, self._path, self._clock)
         is_there, image = self._capture.read()
         if not is_there and self._loop:
             self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0)
             is_there, image = self._capture.read()
         if not is_there:
             raise _fault(self._record, CameraCondition.ENDED, f"{self._path} is at its end")
-        return _frame(self._record, self._path, image, encoded(image))
+        return _frame(self._record, self._path, image, encoded(image), self._clock.unix())
 
     def close(self) -> None:
         if self._capture is not None:
@@ -90,7 +92,7 @@ class Video:
             self._capture = None
 
 
-def picture(record: CameraRecord, path: Path) -> EncodedImage:
+def picture(record: CameraRecord, path: Path, clock: Clock = SYSTEM) -> EncodedImage:
     """A picture as a frame, a JPEG as it is; raises `CameraFault`."""
     try:
         content = path.read_bytes()
@@ -99,16 +101,16 @@ def picture(record: CameraRecord, path: Path) -> EncodedImage:
     image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if image is None:
         raise _fault(record, CameraCondition.REFUSED, f"{path} is no picture that OpenCV can read")
-    return _frame(record, path, image, content if path.suffix.lower() != ".png" else encoded(image))
+    return _frame(record, path, image, content if path.suffix.lower() != ".png" else encoded(image), clock.unix())
 
 
-def _frame(record: CameraRecord, path: Path, image: Any, content: bytes) -> EncodedImage:
+def _frame(record: CameraRecord, path: Path, image: Any, content: bytes, stamp: int) -> EncodedImage:
     height, width = image.shape[:2]
     if (width, height) != record.size:
         wish = f"{record.size[0]} x {record.size[1]}"
         said = f"{path} is {width} x {height}, not {wish}: write size = [{width}, {height}]"
         raise _fault(record, CameraCondition.REFUSED, said)
-    return EncodedImage(time.time_ns(), width, height, content)
+    return EncodedImage(stamp, width, height, content)
 
 
 def _fault(record: CameraRecord, condition: CameraCondition, text: str) -> CameraFault:

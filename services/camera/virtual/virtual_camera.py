@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
@@ -16,6 +15,7 @@ from services.arm.frames.transforms import Rigid, compose, from_message, inverse
 from services.camera.sources.source import EncodedImage, encoded
 from services.camera.virtual.render import Image, Optics, expose, render
 from services.camera.virtual.world import WorldSnapshot
+from services.runtime.clock import SYSTEM, Clock
 
 FRESH = 500_000_000  # [ns] a joint state that is older says nothing of the time of an image
 
@@ -26,11 +26,16 @@ class VirtualCamera:
     is_live = False
 
     def __init__(
-        self, record: CameraRecord, source: VirtualSource, info: CameraInfo, look: Callable[[], WorldSnapshot]
+        self,
+        record: CameraRecord,
+        source: VirtualSource,
+        info: CameraInfo,
+        look: Callable[[], WorldSnapshot],
+        clock: Clock = SYSTEM,
     ) -> None:
         """`info` is exact, whatever is believed of the camera."""
         self.period = 1.0 / record.fps
-        self._info, self._look = info, look
+        self._info, self._look, self._clock = info, look, clock
         self._optics = Optics(samples=source.samples, blur=source.blur, noise=source.noise)
         self.calm: tuple[object, Image] | None = None  # the newest image without noise, and of what
         self._count = 0
@@ -41,7 +46,7 @@ class VirtualCamera:
     def read(self) -> EncodedImage:
         """The image of this moment; it has the joint state's stamp, since that is the instant that it shows."""
         snapshot = self._look()
-        now = time.time_ns()
+        now = self._clock.unix()
         image = self.image(snapshot)
         stamp = snapshot.stamp if 0 <= now - snapshot.stamp <= FRESH else now
         return EncodedImage(stamp, self._info.width, self._info.height, encoded(cv2.cvtColor(image, cv2.COLOR_RGB2BGR)))
