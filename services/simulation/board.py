@@ -16,6 +16,7 @@ from schemas.robot import Motor
 from services.arm.device.device_config import reference_steps
 from services.arm.model.description import ArmDescription
 from services.runtime.process.readiness import Readiness
+from services.runtime.process.unwritten import UnwrittenFiles
 from services.simulation.memory_wire import MemoryWire
 from services.simulation.virtual_clock import VirtualClock
 
@@ -23,7 +24,8 @@ NAME = "virtual_esp32"
 PERIOD = 0.02  # [s] between two turns of a board to which nothing comes: as often its state is due
 PHASE = 0.0011  # [s] of a turn after its state is due: a slot of the firmware, and what begins it
 
-logging.getLogger(NAME).addHandler(logging.NullHandler())  # what it has to say comes as events
+log = logging.getLogger(NAME)
+log.addHandler(logging.NullHandler())  # what it has to say comes as events
 
 
 class SimulatedBoard:
@@ -36,7 +38,8 @@ class SimulatedBoard:
         self._due = self._beat = (
             clock.monotonic() + PHASE
         )  # [s] monotonic, of the next turn and the next without a frame
-        board, readiness = Board(arm, folder, NAME, motors, clock), Readiness(folder, NAME)
+        unwritten = UnwrittenFiles(log.warning)
+        board, readiness = Board(arm, folder, NAME, unwritten, motors, clock), Readiness(folder, NAME, unwritten)
         self._esp32 = VirtualEsp32(board, Wires(wire, None), inbox=wire.inbox, readiness=readiness, clock=clock)
         self._esp32.begin()
         clock.drive(self)

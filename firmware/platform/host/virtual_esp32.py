@@ -237,7 +237,7 @@ class VirtualEsp32:
             self._wires.network.join(self._device, self._board.device_name, self._board.credentials)
         except OSError as error:
             log.warning("the network cannot be joined (%s): %s; it is tried again", error, remedy_of(error))
-            self._later.append((time.monotonic() + REJOIN, self._join))
+            self._later.append((self._time.monotonic() + REJOIN, self._join))
 
     def _announce(self) -> None:
         self._board.remember(self._device)
