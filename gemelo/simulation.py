@@ -300,7 +300,8 @@ def simulate(
     wire: Wire | None = None,
     start: str | Joints | None = None,
     time_scale: float | None = None,
-) -> SimulatedArm: ...
+) -> SimulatedArm:
+    """One arm; `time_scale` as below."""
 
 
 @overload
@@ -315,7 +316,8 @@ def simulate(
     wire: Wire | None = None,
     start: str | Joints | None = None,
     time_scale: float | None = None,
-) -> SimulatedArms: ...
+) -> SimulatedArms:
+    """Several arms; `time_scale` as below."""
 
 
 def simulate(

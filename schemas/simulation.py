@@ -1,4 +1,4 @@
-"""What a simulated twin is asked to be like."""
+"""The wish for how a simulated twin is to be."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ class ClockedReader(ImageReader):
         self._clock.later(0.0, self._read)
 
     def stop(self, timeout: float = 1.0) -> None:
-        """Closes the source."""
+        """Closes the source; there is nothing to wait `timeout` [s] for."""
         self._stop.set()
         self._close()
 

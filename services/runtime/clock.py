@@ -1,4 +1,4 @@
-"""What differs from one run of a process to the next: time, random numbers, the process's own number.
+"""The clock of a process, with all that differs from one run to the next: time, random numbers, its own number.
 
 Everything in `services.runtime` and `gemelo` takes them from the clock of its bus. `SYSTEM` is that of every real
 process; a simulation has one of virtual time (`services/simulation/virtual_clock.py`), in which the same seed gives

@@ -85,7 +85,7 @@ class Node:
         """Waits for the router; raises `NodeNameTaken` where `name` lives already. `overrides` are parameters, `rates`
         how much of what is asked is taken, if not as much as usual."""
         self.clock: Clock = SYSTEM if bus is None else bus.clock
-        self._identity = identity.identify(name, self.clock)
+        self._identity = identity.identify(name, clock=self.clock)
         self.name = name
         self.deployment = deployment if deployment is not None else load_deployment()
         self.robot = robot or robot_name(self.deployment)
@@ -323,7 +323,7 @@ class Node:
                 self._readiness.not_ready()
 
     def begin(self, step: Callable[[int], object] = lambda now: None, rate: float = 50.0) -> None:
-        """As `spin`, in virtual time only: returns at once, and the clock runs the node whenever somebody waits."""
+        """As `spin` at `rate` [Hz], in virtual time only: returns at once; the clock runs the node while somebody waits."""
         self._loop.every(BEAT, self._beat)
         self._loop.begin(step, rate)
 

@@ -47,7 +47,7 @@ class ServiceNode(Node):
     """A node of a service: the clock runs it."""
 
     def spin(self, step: Callable[[int], object] = lambda now: None, rate: float = 50.0) -> None:
-        """Returns at once; the node goes on until it is closed."""
+        """Returns at once; the node goes on, at `rate` [Hz], until it is closed."""
         self.begin(step, rate)
 
 

@@ -111,7 +111,7 @@ class Loop:
                 self._run_once(now, now if self._step_if_due(now) else schedule.deadline)
 
     def begin(self, step: Callable[[int], object], rate: float) -> None:
-        """As `spin`, but the clock, of virtual time, has it run from now on: returns at once."""
+        """As `spin` at `rate` [Hz], but the clock, of virtual time, has it run from now on: returns at once."""
         self._schedule, self._step = Schedule(rate, self.clock.monotonic()), step
         self._drive()
 
