@@ -301,7 +301,7 @@ def simulate(
     start: str | Joints | None = None,
     time_scale: float | None = None,
 ) -> SimulatedArm:
-    """One arm; `time_scale` as below."""
+    """One arm; `time_scale` [s/s] as below."""
 
 
 @overload
@@ -317,7 +317,7 @@ def simulate(
     start: str | Joints | None = None,
     time_scale: float | None = None,
 ) -> SimulatedArms:
-    """Several arms; `time_scale` as below."""
+    """Several arms; `time_scale` [s/s] as below."""
 
 
 def simulate(

@@ -105,6 +105,9 @@ class MemoryWire:
     def on_denied(self, reason: str) -> None:
         """There is no ACL here."""
 
+    def subscribe_anew(self) -> None:
+        """No subscription is ever lost here."""
+
     def take(self) -> list[Item]:
         """What has arrived for the board, oldest first."""
         items = []

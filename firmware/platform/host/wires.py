@@ -38,6 +38,8 @@ class BoardNetwork(Protocol):
 
     def on_denied(self, reason: str) -> None: ...
 
+    def subscribe_anew(self) -> None: ...
+
 
 class Wires:
     """The network and the line of one board; the device itself knows what goes where."""
