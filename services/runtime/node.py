@@ -323,7 +323,7 @@ class Node:
                 self._readiness.not_ready()
 
     def begin(self, step: Callable[[int], object] = lambda now: None, rate: float = 50.0) -> None:
-        """As `spin` at `rate` [Hz], in virtual time only: returns at once; the clock runs the node while others wait."""
+        """As `spin` at `rate` [Hz], in virtual time only: returns at once; the clock runs it while others wait."""
         self._loop.every(BEAT, self._beat)
         self._loop.begin(step, rate)
 
