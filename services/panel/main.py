@@ -19,7 +19,8 @@ from schemas.deployment import Deployment
 from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
 from services.panel.view.arm_pages import arm_pages
-from services.panel.view.own_pages import own_pages_only
+from services.panel.view.broken_connections import BrokenConnections
+from services.panel.view.own_pages import OwnServer, own_pages_only
 from services.panel.view.page import Page
 from services.panel.view.world import DrawnWorld
 from services.runtime.deployment import DeploymentError, exposure, load_deployment
@@ -44,8 +45,10 @@ class Panel:
         self._lock = threading.Lock()
         self._texts_at = -1.0 / TEXTS  # [s] monotonic
         self.operator = Operator(arm)
-        with contextlib.redirect_stdout(None), own_pages_only(deployment.panel.host):  # without its own greeting
-            self.server = viser.ViserServer(deployment.panel.host, deployment.panel.port, verbose=False)
+        self._broken = BrokenConnections(log.warning)
+        own_pages = own_pages_only(deployment.panel.host, self._broken, deployment.panel.name)
+        with contextlib.redirect_stdout(None), own_pages:  # without its own greeting
+            self.server = OwnServer(deployment.panel.host, deployment.panel.port, verbose=False)
         self.world = DrawnWorld(self.server, self.operator)
         self.server.on_client_connect(self._open)
         self.server.on_client_disconnect(self._close)
@@ -67,6 +70,7 @@ class Panel:
     def draw(self, now: float) -> None:
         """One picture at `now` [s] monotonic, and the texts when their time has come."""
         bus = self.operator.bus
+        self._broken.report(now)
         self._arm.node.set_ready(bus.is_live, "" if bus.is_live else "no fresh joint_states")
         joints = bus.joints
         with self.server.atomic():  # one message for all of it

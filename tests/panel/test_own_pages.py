@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from urllib.error import HTTPError
 
+import msgspec
 import pytest
 import viser
 from websockets.exceptions import InvalidStatus
@@ -13,17 +14,19 @@ from websockets.sync.client import connect
 
 from schemas.deployment import Deployment, PanelSection
 from services.panel.main import run
-from services.panel.view.own_pages import objection, own_names, own_pages_only
+from services.panel.view.broken_connections import BrokenConnections
+from services.panel.view.own_pages import OwnServer, objection, own_names, own_pages_only
 from services.runtime.process.logs import line_logger
 from services.runtime.process.shutdown import ShutdownRequest
+from tests.panel.person import until
 
 PROTOCOL = [f"viser-v{viser.__version__}"]
 
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    with own_pages_only("127.0.0.1"):
-        server = viser.ViserServer("127.0.0.1", 0, verbose=False)
+    with own_pages_only("127.0.0.1", BrokenConnections(print)):
+        server = OwnServer("127.0.0.1", 0, verbose=False)
     yield f"127.0.0.1:{server.get_port()}"
     server.stop()
 
@@ -52,12 +55,64 @@ def test_a_name_that_somebody_else_points_here_is_refused(address: str) -> None:
         urllib.request.urlopen(request, timeout=10.0)
 
 
-@pytest.mark.parametrize(
-    "host", ["localhost:8088", "[::1]:8088", "192.168.1.7:8088", "lab-pc:8088", "LAB-PC", "lab-pc.local"]
-)
+@pytest.mark.parametrize("host", ["localhost:8088", "[::1]:8088", "192.168.1.7:8088", "lab-pc:8088", "LAB-PC"])
 def test_this_machine_goes_by_its_names_and_addresses(host: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("socket.gethostname", lambda: "lab-pc")
     assert objection(host, f"http://{host}", own_names("0.0.0.0")) == ""
+
+
+def test_a_name_in_the_local_domain_counts_where_the_deployment_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever answers first to a question in the local network has such a name."""
+    monkeypatch.setattr("socket.gethostname", lambda: "lab-pc")
+    assert "[panel] name" in objection("lab-pc.local", None, own_names("0.0.0.0"))
+    assert objection("lab-pc.local:8088", "http://lab-pc.local:8088", own_names("0.0.0.0", "Lab-PC.local")) == ""
+    monkeypatch.setattr("socket.gethostname", lambda: "lab-pc.local")
+    assert objection("lab-pc.local", None, own_names("0.0.0.0")) != ""
+
+
+def answers(address: str) -> list[tuple[int, Mapping[str, str]]]:
+    """Status and headers of a page, of one that is not there, of a refusal, and of a browser's connection."""
+    found = []
+    for path, headers in (("", {}), ("/none", {}), ("", {"Host": "rebound.example"})):
+        try:
+            answer = urllib.request.urlopen(urllib.request.Request(f"http://{address}{path}", headers=headers))
+        except HTTPError as refused:
+            answer = refused
+        with answer:
+            found.append((answer.status, answer.headers))
+    with connect(f"ws://{address}", subprotocols=PROTOCOL) as page:
+        assert page.response is not None
+        found.append((page.response.status_code, page.response.headers))
+    return found
+
+
+def test_no_answer_may_be_shown_within_another_page(address: str) -> None:
+    bare = viser.ViserServer("127.0.0.1", 0, verbose=False)
+    try:
+        assert not any("X-Frame-Options" in headers for _, headers in answers(f"127.0.0.1:{bare.get_port()}"))
+    finally:
+        bare.stop()
+    said = answers(address)
+    assert [status for status, _ in said] == [200, 404, 403, 101]
+    for _, headers in said:
+        assert headers["Content-Security-Policy"] == "frame-ancestors 'none'"
+        assert headers["X-Frame-Options"] == "DENY"
+
+
+def test_no_browser_gets_a_tunnel_through_a_server_of_others(address: str, capfd: pytest.CaptureFixture[str]) -> None:
+    """viser asks for one as soon as any browser says so, and says it on its output."""
+    bare = viser.ViserServer("127.0.0.1", 0, verbose=False)
+    request = msgspec.msgpack.encode({"type": "ShareUrlDisconnect"})
+    try:
+        for at in (f"127.0.0.1:{bare.get_port()}", address):
+            with connect(f"ws://{at}", subprotocols=PROTOCOL) as page:
+                page.recv(timeout=10.0)
+                page.send(request)
+                page.ping().wait(10.0)
+            said = until(lambda: capfd.readouterr().out, bool) if at != address else capfd.readouterr().out
+            assert ("share URL" in said) is (at != address)
+    finally:
+        bare.stop()
 
 
 @pytest.mark.parametrize("host", [None, "", "[", "evil.example", "127.0.0.1.evil.example"])

@@ -1,7 +1,9 @@
 """The few lines of JavaScript that viser's page lacks, and what they tell of the browser.
 
 Space is Stop wherever the focus is but in a text field: a focused button would else be pressed by it, and a number
-field would swallow it. The arrow keys hold the jog buttons that name them, and press them when they are let go. The
+field would swallow it. The arrow keys hold the jog buttons that name them, and press them when they are let go: only of
+a person's own keyboard, after a click or the Tab key on this page since it had the focus last, and never in a frame of
+another page. The
 browser's language, its wish for dark colours, its frame rate and the newest header that it has drawn come back through
 a hidden text field: with each header that bears a new mark, and when the rate has changed; a page on which nothing
 changes says nothing. A click into the image of a camera comes at once: a press and its release are taken for it, since
@@ -61,6 +63,10 @@ SCRIPT = """
     && !['range', 'checkbox', 'radio', 'button'].includes(t.type) && !['decimal', 'numeric'].includes(t.inputMode));
   const isNumber = (t) => t.tagName === 'INPUT' || (t.getAttribute && t.getAttribute('role') === 'slider');
   const held = {};
+  let isGiven = false;
+  window.addEventListener('pointerdown', (e) => { if (e.isTrusted) isGiven = true; }, true);
+  window.addEventListener('keydown', (e) => { if (e.isTrusted && e.code === 'Tab') isGiven = true; }, true);
+  const mayJog = (e) => e.isTrusted && isGiven && window.top === window && document.hasFocus();
   const point = (button, kind) => button.dispatchEvent(
     new PointerEvent(kind, {bubbles: true, button: 0, pointerId: 1, isPrimary: true}));
   const take = (e) => { e.preventDefault(); e.stopImmediatePropagation(); };
@@ -69,7 +75,7 @@ SCRIPT = """
     if (e.code === 'Space') {
       take(e);
       if (!e.repeat) callStop();
-    } else if (keys[e.code] && !isNumber(e.target)) {
+    } else if (keys[e.code] && !isNumber(e.target) && mayJog(e)) {
       const button = buttons().find((b) => b.offsetParent && b.textContent.includes(keys[e.code]));
       if (!button) return;
       take(e);
@@ -83,7 +89,7 @@ SCRIPT = """
     const button = release(e.code);
     if (button) button.click();
   }, true);
-  window.addEventListener('blur', () => Object.keys(held).forEach(release));
+  window.addEventListener('blur', () => { isGiven = false; Object.keys(held).forEach(release); });
   let pressed = null, clicked = null, clicks = 0;
   window.addEventListener('pointerdown', (e) => {
     const camera = e.isPrimary && !e.button && e.target.getAttribute && e.target.getAttribute('CAMERA_MARK');

@@ -1,10 +1,12 @@
 """Only the page's own browsers are served: else any web site that somebody looks at could move the arm.
 
-A browser lets a page of any site connect to this machine, and tells whose page it is only by the Origin header.
+A browser lets a page of any site connect to this machine, and tells whose page it is only by the Origin header; and it
+lets one show this page within its own, unless each answer says that it may not.
 """
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
 import socket
 from collections.abc import Callable, Iterator
@@ -13,32 +15,54 @@ from http import HTTPStatus
 from typing import Any
 from urllib.parse import urlsplit
 
+import viser
 from websockets.asyncio import server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
+from services.panel.view.broken_connections import BrokenConnections
 from services.panel.view.own_pace import PacedConnection
 
 Handler = Callable[[ServerConnection, Request], Response | None]
 
 
+NOT_WITHIN_OTHERS = {"Content-Security-Policy": "frame-ancestors 'none'", "X-Frame-Options": "DENY"}
+
+
+class OwnServer(viser.ViserServer):
+    """viser's server without the tunnel through a server of others that any browser may ask it for."""
+
+    def request_share_url(self, verbose: bool = True) -> str | None:
+        """None: the page is this machine's alone."""
+        return None
+
+    def disconnect_share_url(self) -> None:
+        """There is nothing to end."""
+
+
 @contextmanager
-def own_pages_only(host: str) -> Iterator[None]:
-    """A server that viser starts meanwhile refuses the pages of other sites, and sends none more than it reads; `host`
-    is the name that it listens on.
+def own_pages_only(host: str, broken: BrokenConnections, name: str = "") -> Iterator[None]:
+    """A server that viser starts meanwhile refuses the pages of other sites, sends none more than it reads, and may not
+    be shown within another page; `host` is what it listens on, `name` by what other machines may call it besides.
 
-    viser has no option for either, so the function that opens its port is wrapped.
+    What is no browser's is counted in `broken`. viser has no option for these, so the function that opens its port is
+    wrapped.
     """
-    serve, names = server.serve, own_names(host)
+    serve, names = server.serve, own_names(host, name)
 
-    def guarded(*arguments: Any, process_request: Handler | None = None, **options: Any) -> Any:
+    def guarded(handler: Any, *arguments: Any, process_request: Handler | None = None, **options: Any) -> Any:
         def answer(connection: ServerConnection, request: Request) -> Response | None:
             reason = objection(request.headers.get("Host"), request.headers.get("Origin"), names)
             if reason:
                 return connection.respond(HTTPStatus.FORBIDDEN, f"{reason}\n")
             return None if process_request is None else process_request(connection, request)
 
-        return serve(*arguments, process_request=answer, create_connection=PacedConnection, **options)
+        def mark(connection: ServerConnection, request: Request, response: Response) -> None:
+            response.headers.update(NOT_WITHIN_OTHERS)
+
+        asyncio.get_running_loop().set_exception_handler(broken.on_lost_exception)
+        options |= {"process_request": answer, "process_response": mark, "create_connection": PacedConnection}
+        return serve(broken.guarded(handler), *arguments, logger=broken.logger, **options)
 
     server.serve = guarded  # type: ignore[assignment,misc]
     try:
@@ -47,10 +71,14 @@ def own_pages_only(host: str) -> Iterator[None]:
         server.serve = serve  # type: ignore[misc]
 
 
-def own_names(host: str) -> frozenset[str]:
-    """What this machine is called where somebody opens the page; addresses are understood besides."""
-    name = socket.gethostname().lower()
-    return frozenset({"localhost", host.lower(), name, f"{name}.local"})
+def own_names(host: str, name: str = "") -> frozenset[str]:
+    """What this machine is called where somebody opens the page, with the `name` of the deployment; addresses are
+    understood besides. A name that ends with .local is anybody's who answers first, so it counts only as that `name`.
+    """
+    own = {"localhost", host.lower(), name.lower(), socket.gethostname().lower()}
+    return frozenset(
+        each for each in own if each and (not each.endswith(".local") or each in (name.lower(), host.lower()))
+    )
 
 
 def objection(host: str | None, origin: str | None, names: frozenset[str]) -> str:
@@ -58,7 +86,10 @@ def objection(host: str | None, origin: str | None, names: frozenset[str]) -> st
     called = _name_of(f"//{host}") if host else ""
     if not (called in names or _is_address(called)):  # a site's name may point at this machine
         known = ", ".join(sorted(names))
-        return f'this is not "{called}": open the page by this machine\'s address or as {known}'
+        return (
+            f'this is not "{called}": open the page by this machine\'s address or as {known}; '
+            "another name of its own stands in the deployment file, as [panel] name"
+        )
     if origin is not None and urlsplit(origin).netloc.lower() != (host or "").lower():
         return f"a page of {origin} may not lead the arm: open http://{host}"
     return ""

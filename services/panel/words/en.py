@@ -80,7 +80,7 @@ ENGLISH: dict[str, str] = {
     "tool_axes": "the tool",
     "tool": "Tool",
     "joints": "Joints",
-    "keys_note": "Keys: arrows, page up and page down.",
+    "keys_note": "Keys: arrows, page up and page down, after a click on this page.",
     "jogging": "{share} % of the speed is left",
     # device
     "device": "Device",

@@ -80,7 +80,7 @@ SPANISH: dict[str, str] = {
     "tool_axes": "la herramienta",
     "tool": "Herramienta",
     "joints": "Articulaciones",
-    "keys_note": "Teclas: flechas, avance y retroceso de página.",
+    "keys_note": "Teclas: flechas, avance y retroceso de página, tras un clic en esta página.",
     "jogging": "Queda el {share} % de la velocidad",
     # device
     "device": "Equipo",

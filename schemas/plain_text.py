@@ -1,0 +1,19 @@
+"""Text of others as it may be printed: a terminal obeys control characters, which can even write its clipboard."""
+
+from __future__ import annotations
+
+import re
+
+# C0 but tab and newline, DEL and C1; marks and overrides of the writing direction; line and paragraph separators.
+CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+COLOUR = re.compile("(\x1b\\[[0-9;]*m)")  # the only sequence that a command of ours prints
+
+
+def escaped(text: str) -> str:
+    """The text with each control character as Python writes it, as `\\x1b`; tab and newline stay."""
+    return CONTROLS.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def escaped_but_colours(text: str) -> str:
+    """As `escaped`, and the sequences that choose a colour stay: they move nothing, and write nothing."""
+    return "".join(part if index % 2 else escaped(part) for index, part in enumerate(COLOUR.split(text)))
