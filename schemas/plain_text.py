@@ -10,8 +10,11 @@ COLOUR = re.compile("(\x1b\\[[0-9;]*m)")  # the only sequence that a command of 
 
 
 def escaped(text: str) -> str:
-    """The text with each control character as Python writes it, as `\\x1b`; tab and newline stay."""
-    return CONTROLS.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+    """The text with each control character as JSON and YAML write it, as `\\u001b`; tab and newline stay.
+
+    A JSON text has none but within its strings, so it means the same afterwards.
+    """
+    return CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def escaped_but_colours(text: str) -> str:

@@ -18,6 +18,7 @@ from schemas.topics import camera_detections, camera_image, camera_info, camera_
 from services.arm.cell.cell_file import Cell, deployed_cell
 from services.arm.errors import DescriptionError
 from services.cli.errors import CommandError, ExitCode, unknown, usage
+from services.cli.output import print_coloured
 from services.cli.parser import Choices, Options, Parser, json_option
 from services.cli.session import CommandSession, connect, load_robot
 from services.cli.text_table import table
@@ -171,7 +172,7 @@ def _show(seen: CameraReport, name: str, save: str) -> None:
         Path(save).write_bytes(picture)
     elif sys.stdout.isatty():
         columns, rows = shutil.get_terminal_size()
-        print(on_terminal(picture, columns, rows - 3))
+        print_coloured(on_terminal(picture, columns, rows - 3))
     found = ", ".join(f"{each.name} ± {each.sigma * 1e3:.2f} mm" for each in seen.found.items) if seen.found else ""
     rate = f", {seen.status.fps:.0f} Hz" if seen.status is not None else ""
     where = f" -> {save}" if save else ""

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from schemas.plain_text import escaped
+
 BLANK = 0x2800  # the braille character without a dot; each dot is a bit of its number
 DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # of a character, by row and column
 ACROSS, DOWN = 2, 4  # dots of a character
@@ -61,7 +63,7 @@ def chart(
 
 
 def _headline(curve: ChartCurve, unit: str, colour: str) -> str:
-    name = f"{colour}{curve.name}\x1b[0m" if colour else curve.name
+    name = f"{colour}{escaped(curve.name)}\x1b[0m" if colour else curve.name
     of = f" [{unit}]" if unit else ""
     values = curve.values
     if not values:

@@ -9,6 +9,7 @@ import msgspec
 
 import gemelo
 from services.cli.errors import CommandError, ExitCode, in_commands, usage
+from services.cli.output import control
 from services.cli.parser import Choices, Options, Parser, json_option
 from services.cli.session import connect_arm, load_robot
 from services.cli.units import LENGTH, parse_quantity
@@ -66,7 +67,7 @@ def grip(arm: Arm, to: Grip, max_effort: float, as_json: bool) -> ExitCode:
 
     def show(feedback: GripperCommandFeedback) -> None:
         if is_live:
-            print(f"\r{feedback.position * 1000:6.1f} mm", end="", file=sys.stderr, flush=True)
+            control(f"\r{feedback.position * 1000:6.1f} mm", sys.stderr)
 
     try:
         gripped = arm.grip(to, max_effort=max_effort, on_progress=show)
@@ -74,7 +75,7 @@ def grip(arm: Arm, to: Grip, max_effort: float, as_json: bool) -> ExitCode:
         raise CommandError(in_commands(str(error))) from error
     finally:
         if is_live:
-            print("\r", end="", file=sys.stderr, flush=True)
+            control("\r", sys.stderr)
     print(msgspec.json.encode(gripped._asdict()).decode() if as_json else f"gripper: {gripped}")
     return ExitCode.OK
 

@@ -10,6 +10,7 @@ from typing import NoReturn
 
 from services.cli.commands import COMMANDS, GROUPS
 from services.cli.errors import CommandError, ExitCode, unknown, usage
+from services.cli.output import escaped_output
 from services.cli.parser import Options, build
 from services.runtime.process.leaving import end_process
 
@@ -64,8 +65,13 @@ def robot_folder(name: str) -> str:
 
 
 def run(arguments: Sequence[str] | None = None) -> ExitCode:
-    """Runs one command line, by default that of the process; prints every failure as one sentence on stderr."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    """Runs one command line, by default that of the process; prints every failure as one sentence on stderr, and
+    nothing with control characters of others."""
+    with escaped_output():
+        return _run(list(sys.argv[1:] if arguments is None else arguments))
+
+
+def _run(given: list[str]) -> ExitCode:
     try:
         options = parse(with_robot(given))
         code: ExitCode = options.command.load("run")(options)

@@ -170,7 +170,7 @@ def plot(
             node.stop()
         if block.is_live and time - drawn >= 1.0 / RATE:
             drawn = time
-            block.draw(_picture(curves, time, is_live=True))
+            block.draw(_picture(curves, time, is_live=True), is_coloured=True)
 
     for key in dict.fromkeys(field.topic.key for field in fields):
         parts = [field for field in fields if field.topic.key == key]
@@ -178,7 +178,7 @@ def plot(
     node.spin(step, rate=4.0 * RATE)
     if faults:
         raise faults[0]
-    block.say(_picture(curves, node.monotonic(), block.is_live))
+    block.say(_picture(curves, node.monotonic(), block.is_live), is_coloured=True)
     return ExitCode.OK
 
 

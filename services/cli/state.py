@@ -25,6 +25,7 @@ from schemas.topics import (
 from services.arm.frames.frame_buffer import FrameBuffer, FrameError
 from services.cli.device_snapshot import OPEN_LOOP
 from services.cli.errors import CommandError, ExitCode
+from services.cli.output import control
 from services.cli.parser import Options, Parser
 from services.cli.session import CommandSession, connect, other_robots
 from services.cli.text_table import table
@@ -300,7 +301,8 @@ def _watch(session: CommandSession, view: StateView, as_json: bool) -> ExitCode:
     clear = "\x1b[H\x1b[2J" if sys.stdout.isatty() and not as_json else ""
 
     def step(now: int) -> None:
-        print(clear + _render(view, as_json), flush=True)
+        control(clear)
+        print(_render(view, as_json), flush=True)
 
     session.node.spin(step, rate=1.0 / REFRESH)
     return ExitCode.OK

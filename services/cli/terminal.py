@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 import signal
 import sys
@@ -10,10 +9,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from schemas.plain_text import COLOUR
 from services.cli.errors import CommandError, ExitCode, usage
+from services.cli.output import control, print_coloured, unescaped
 
 UP_AND_CLEAR = "\x1b[{}F\x1b[J"
-COLOUR = re.compile("(\x1b\\[[0-9;]*m)")
 PLAIN_EVERY = 0.25  # of the whole motion
 CANCELLING = "cancelling: the arm slows down on its path (Ctrl-C again leaves without waiting)"
 ShowProgress = Callable[[float, float], None]  # elapsed [s], duration [s]
@@ -26,13 +26,13 @@ class LiveBlock:
         self.is_live = sys.stdout.isatty() if is_live is None else is_live
         self._height = 0
 
-    def say(self, *lines: str) -> None:
+    def say(self, *lines: str, is_coloured: bool = False) -> None:
         """Prints lines that stay, and removes the block until it is drawn again."""
         self._clear()
         if lines:
-            print("\n".join(lines), flush=True)
+            _print("\n".join(lines), is_coloured)
 
-    def draw(self, text: str) -> None:
+    def draw(self, text: str, is_coloured: bool = False) -> None:
         """Replaces the block by `text`; prints nothing in a pipe."""
         if not self.is_live:
             return
@@ -40,13 +40,20 @@ class LiveBlock:
         # A line that wraps, or a block that scrolls, could not be drawn over.
         shown = [cut(line, columns - 1) for line in text.splitlines()[: lines - 1]]
         self._clear()
-        print("\n".join(shown), flush=True)
+        _print("\n".join(shown), is_coloured)
         self._height = len(shown)
 
     def _clear(self) -> None:
         if self._height:
-            print(UP_AND_CLEAR.format(self._height), end="", flush=True)
+            control(UP_AND_CLEAR.format(self._height))
             self._height = 0
+
+
+def _print(text: str, is_coloured: bool) -> None:
+    if is_coloured:
+        print_coloured(text)
+    else:
+        print(text, flush=True)
 
 
 def cut(line: str, columns: int) -> str:
@@ -78,10 +85,11 @@ def motion_progress(duration: float, quiet: bool = False) -> Iterator[ShowProgre
 
 @contextmanager
 def _bar(duration: float) -> Iterator[ShowProgress]:
-    from rich.progress import BarColumn, Progress, TextColumn  # slow to load, for a terminal alone
+    from rich.console import Console  # slow to load, for a terminal alone
+    from rich.progress import BarColumn, Progress, TextColumn
 
     columns = (TextColumn("moving"), BarColumn(40), TextColumn("{task.completed:.1f} of {task.total:.1f} s"))
-    with Progress(*columns, transient=True) as bar:
+    with Progress(*columns, console=Console(file=unescaped(sys.stdout)), transient=True) as bar:
         task = bar.add_task("move", total=duration)
         yield lambda elapsed, whole: bar.update(task, completed=min(elapsed, whole), total=whole)
 

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 
+from schemas.plain_text import escaped
 from schemas.system import LogLevel, LogRecord
 from services.runtime.clock import SYSTEM, Clock
 
@@ -15,12 +16,12 @@ MAX_TEXT = 8_000  # characters of one record on the bus
 
 
 class LineFormatter(logging.Formatter):
-    """`12:00:01.234 planner INFO text`, in local time."""
+    """`12:00:01.234 planner INFO text`, in local time; control characters of others are escaped."""
 
     def format(self, record: logging.LogRecord) -> str:
         clock = time.strftime("%H:%M:%S", time.localtime(record.created))
         line = f"{clock}.{int(record.msecs):03d} {record.name} {record.levelname} {record.getMessage()}"
-        return f"{line}\n{self.formatException(record.exc_info)}" if record.exc_info else line
+        return escaped(f"{line}\n{self.formatException(record.exc_info)}" if record.exc_info else line)
 
 
 class BusHandler(logging.Handler):
