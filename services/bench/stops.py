@@ -32,7 +32,7 @@ from schemas.topics import DEVICE_CONFIGURE, DEVICE_INJECT, DEVICE_STOP, FOLLOW_
 from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
 from services.bench.latency import sharp_start
 from services.bench.stack import Running, Stacks, families
-from services.bench.traffic import OURS, connected, flood
+from services.bench.traffic import FORGED, OURS, connected, flood
 from services.mqtt.client import stop_loop
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.zenoh_bus import ZenohBus
@@ -46,6 +46,8 @@ RAMP = 0.8  # [s] of acceleration: the arm is stopped during it
 SPEED = 0.01  # [rad/s] below which the arm stands
 PATIENCE = 3.0  # [s]
 FLOOD_SECONDS = 60.0  # at the most
+FLOODS = ("requests", "commands", "holds", f"{FORGED}requests", f"{FORGED}holds")
+NEVER_MOVING = ("planner frozen", "flood of holds", f"flood of {FORGED}holds")  # conditions in which no move begins
 SLEEP = 0.002  # [s] of the thread that measures how late the bench itself wakes
 
 
@@ -184,7 +186,7 @@ def stop_ms(stacks: Stacks) -> Figure:
     caller = StopCaller(running)
     under: dict[str, AbstractContextManager[None]] = {
         "idle": nullcontext(),
-        **{f"flood of {what}": flood(what, router, robot, FLOOD_SECONDS) for what in ("requests", "commands", "holds")},
+        **{f"flood of {what}": flood(what, router, robot, FLOOD_SECONDS) for what in FLOODS},
         "loop of commands, by a client of ours": flood(OURS, router, robot, FLOOD_SECONDS),
         "flood of targets": flood("targets", router, robot, FLOOD_SECONDS),
         "flood of MQTT": flood("mqtt", broker, running.arm.device.name, FLOOD_SECONDS),
@@ -199,7 +201,7 @@ def stop_ms(stacks: Stacks) -> Figure:
                 with WakeUps() as wake_ups:
                     wire[name] = caller.stops(CALLS)
                 late[name] = wake_ups.late
-                if name not in ("planner frozen", "flood of holds"):
+                if name not in NEVER_MOVING:
                     rest[name] = caller.stops_of_moves()
         wire["device frozen, configure and 20 presses unanswered"] = _to_a_frozen_device(running, caller)
         to_answer, after_thaw = _to_a_frozen_broker(running, caller)

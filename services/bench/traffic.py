@@ -74,6 +74,7 @@ REQUESTS: dict[str, tuple[tuple[str, Message], ...]] = {
     "commands": ((DEVICE_COMMAND.key, DeviceCommandRequest(command=SpeedCommand())),),
     "holds": ((DEVICE_STOP.key, DeviceStopRequest(kind=StopKind.HOLD)),),
 }
+FORGED = "forged "  # before one of these: each request under another name
 
 
 def main() -> None:
@@ -87,7 +88,7 @@ def main() -> None:
     echo.add_argument("--rate", type=float, required=True, help="[Hz]")
     echo.add_argument("--count", type=int, required=True)
     flood = kinds.add_parser("flood")
-    flood.add_argument("what", choices=[*REQUESTS, "targets", "mqtt"])
+    flood.add_argument("what", choices=[*REQUESTS, *(FORGED + what for what in REQUESTS), "targets", "mqtt"])
     flood.add_argument("--port", type=int, required=True, help="of the router; for mqtt of the broker")
     flood.add_argument("--robot", required=True)
     flood.add_argument("--rate", type=float, default=RATE, help="[1/s]")
@@ -191,10 +192,14 @@ def _bus(what: str, options: argparse.Namespace) -> Callable[[], None]:
         publication = bus.publish(JOINT_TARGETS.key, JointTargets.__name__, JOINT_TARGETS.delivery)
         payload = encode(JointTargets())
         return lambda: publication.put(payload)
-    asked = itertools.cycle([(key, type(message).__name__, encode(message)) for key, message in REQUESTS[what]])
+    asked = itertools.cycle(
+        [(key, type(message).__name__, encode(message)) for key, message in REQUESTS[what.removeprefix(FORGED)]]
+    )
 
     def ask() -> None:
         key, schema, payload = next(asked)
+        if what.startswith(FORGED):
+            bus.take_new_name()
         bus.ask(key, schema, payload, 1.0, lambda answer: None)
 
     return ask

@@ -39,6 +39,23 @@ AFTERWARDS: dict[str, str] = {
 }
 
 
+def stop_options(parser: Parser) -> None:
+    """Adds --ready."""
+    parser.add_argument(
+        "--ready", action="store_true", help="connect now, and stop the arm on each Enter or space; q leaves"
+    )
+
+
+def run_stop(options: Options) -> ExitCode:
+    """Stops the arm, now or at each key."""
+    if options.ready:
+        from services.cli.stop_ready import wait_ready  # for this one alone
+
+        with connect_arm() as arm:
+            return wait_ready(arm)
+    return run(options)
+
+
 def run(options: Options) -> ExitCode:
     """Sends the command that the last word names."""
     with connect_arm() as arm:

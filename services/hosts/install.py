@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path, PurePosixPath
 
 from schemas.site import Site
+from services.hosts.firewall import UNIT_NAME, ports
 from services.hosts.layout import robots
 from services.hosts.site_file import SiteError
 from services.hosts.units import TARGET
@@ -40,7 +41,7 @@ def commands(site: Site, host: str, folder: Path) -> tuple[Command, ...]:
         f"! grep -qs '^# Written by .gemelo deploy render {site.name} ' \"$unit\" || "
         f'{{ systemctl stop "$unit" && rm "$unit"; }} || exit 1; done; '
         f"install -m 644 {config}/systemd/* /etc/systemd/system/ && systemctl daemon-reload "
-        f"&& systemctl enable --now {TARGET}"
+        f"&& systemctl enable --now {TARGET}" + (f" && systemctl restart {UNIT_NAME}" if ports(site, host) else "")
     )
     return (
         ("ssh", f"root@{address}", prepare),
@@ -60,6 +61,8 @@ def _look(site: Site, host: str) -> str:
             f"{site.user} cannot run {program} on {host}: {remedy}",
         "command -v rsync >/dev/null": f"rsync is missing on {host}: apt-get install rsync",
     }  # fmt: skip
+    if ports(site, host):
+        wanted["command -v nft >/dev/null"] = f"nft is missing on {host}: apt-get install nftables"
     for robot in robots(site, host):
         for file in filter(None, (f"{site.robots[robot].folder}/robot.toml", site.robots[robot].cell)):
             there, target = f"{site.project}/{file}", f"root@{_bracketed(site.hosts[host].address)}:{site.project}/"

@@ -8,13 +8,14 @@ from pathlib import Path
 from schemas.site import Site
 from services.hosts import deployments
 from services.hosts.containers import compose, containerfile, process_compose
+from services.hosts.firewall import FILE, firewall, ports
 from services.hosts.layout import listening, principals, robots
 from services.hosts.units import units
 from services.mqtt.secure_folder import lines, mosquitto_conf
 from services.runtime.bus.zenoh_config import locked_router
 from services.runtime.permissions import access_control
 
-OF_A_PLACE = ("router.json5", "mosquitto.conf")  # of a host where router or broker run
+OF_A_PLACE = ("router.json5", "mosquitto.conf", FILE)  # of a host where router or broker run
 
 
 def rendered(site: Site, host: str) -> dict[str, str]:
@@ -26,6 +27,8 @@ def rendered(site: Site, host: str) -> dict[str, str]:
         files["router.json5"] = router(site)
     if host == site.broker.host:
         files["mosquitto.conf"] = mosquitto(site)
+    if ports(site, host):
+        files[FILE] = firewall(site, host)
     files |= {f"systemd/{name}": text for name, text in units(site, host).items()}
     return files | {
         "process-compose.yaml": process_compose(site, host),

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from schemas.deployment import Wire
 from schemas.site import Site
+from services.hosts import firewall
 from services.hosts.deployments import environment
+from services.hosts.firewall import FILE, UNIT_NAME, ports
 from services.hosts.layout import FILES, TASKS, Process, processes
 from services.hosts.quoting import systemd
 from services.runtime.process.priority import AHEAD
@@ -81,6 +83,9 @@ WantedBy=multi-user.target
 def units(site: Site, host: str) -> dict[str, str]:
     """The files of /etc/systemd/system by name."""
     files = {f"{process.unit}.service": _unit(site, host, process) for process in processes(site, host)}
+    if ports(site, host):
+        text = firewall.UNIT.format(site=site.name, host=host, target=TARGET, file=systemd(f"{site.config}/{FILE}"))
+        files[UNIT_NAME] = text
     return files | {TARGET: WHOLE.format(site=site.name, host=host, units=" ".join(files))}
 
 

@@ -22,7 +22,7 @@ from schemas.device import (
     InjectRequest,
     StopKind,
 )
-from services.cli import device, device_config, device_monitor, device_status
+from services.cli import device, device_config, device_monitor, device_status, stop_ready
 from services.cli.device_press import PRESSES, press, request_of
 from services.cli.errors import CommandError, ExitCode
 from services.cli.forms import csv_lines, json_line
@@ -337,3 +337,31 @@ def test_a_wrong_name_is_said_before_the_stack_is_asked(words, reason, capsys, m
     monkeypatch.setenv("GEMELO_ROUTER_PORT", "1")
     assert run(words) is ExitCode.USAGE
     assert reason in capsys.readouterr().err
+
+
+def test_a_stop_that_waits_ready_stops_at_each_enter_or_space_and_leaves_at_q(connected, rm1_device, capsys):
+    typed = iter(("", "x", " ", "", "\n", "q"))
+    assert stop_ready.watch(connected, lambda timeout: next(typed)) is ExitCode.OK
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "ready: Enter or space stops rm1, q leaves"
+    assert [line.split(" after ")[0] for line in lines[1:]] == ["stop done", "stop done"]
+    assert rm1_device.asked == [StopKind.STOP, StopKind.STOP]
+
+
+def test_a_stop_that_waits_ready_tells_when_it_could_not_stop_and_waits_on(connected, network, rm1_device, capsys):
+    def read(timeout: float) -> str:
+        network.is_connected = not network.is_connected
+        return next(typed)
+
+    typed = iter(("", "", "q"))
+    assert stop_ready.watch(connected, read) is ExitCode.OK
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(":")[0] for line in lines] == ["ready", "NOT READY", "ready"]
+
+
+def test_a_stop_that_is_not_confirmed_says_so_and_what_to_do(connected, network, capsys):
+    typed = iter((" ", "q"))
+    assert stop_ready.watch(connected, lambda timeout: next(typed)) is ExitCode.OK
+    said = capsys.readouterr()
+    assert "stop was NOT confirmed: press again, or use the emergency stop" in said.out
+    assert "nobody serves device/stop" in said.err

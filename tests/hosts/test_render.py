@@ -145,7 +145,7 @@ def test_whatever_a_person_writes_is_refused_or_stays_one_value(tmp_path, writte
     look = next(command[2] for command in install_commands(lab, "brain", tmp_path) if "rsync" in command[2])
     assert f"{lab.project}/.venv/bin/gemelo" in shlex.split(look)
     assert f"{lab.project}/urdf/rm1/robot.toml" in shlex.split(look)
-    assert shlex.split(look).count("exit") == 3
+    assert shlex.split(look).count("exit") == 4
     wire = '[robots.rm1]\nwire = "serial"' if "serial" in written else "[robots.rm1]"
     require_nothing_injected(lab, site(tmp_path, "[robots.rm1]", wire))
     require_readable(lab, tmp_path)

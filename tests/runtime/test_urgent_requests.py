@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import threading
+from pathlib import Path
 
 import msgspec
+import pytest
 
 from schemas.actions import CancelRequest, CancelResponse, GoalRequest, GoalResponse
 from schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
@@ -19,10 +22,13 @@ from services.runtime.actions.server import accept
 from services.runtime.bus.interface import Bus, BusReply, Query
 from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.bus.zenoh_declarations import QUERIES
+from services.runtime.errors import NoAnswer
+from services.runtime.node import Node
 from services.runtime.requests.limits import MAX_WAITING_OF_A_CLIENT, RequestRates
 from services.runtime.requests.server import MAX_UNANSWERED, Pending
 from tests.runtime.support import Buses, RouterProcess, hear, spinning, until
 
+FROZEN = 1.5  # [s] of the router: longer than the lease of its links
 FLOOD = 400  # requests at once: within a client's burst, above what may wait
 
 Answers = list[BusReply | None]
@@ -209,3 +215,34 @@ def test_a_flood_of_stops_that_are_not_read_in_time_fills_no_link_but_its_own(ro
         is_released.set()
         for bus in (server, flooder, client):
             bus.close()
+
+
+def test_a_stop_is_sent_again_until_a_router_that_was_frozen_passes_it_on(tmp_path: Path) -> None:
+    router = RouterProcess(tmp_path)
+    handled: list[StopKind] = []
+    with (
+        Node("stepper_gateway", router.deployment, robot="rm1") as server,
+        Node("client", router.deployment, robot="rm1") as client,
+        spinning(server),
+    ):
+        server.serve(DEVICE_STOP, lambda asked: handled.append(asked.kind) or DeviceCommandResponse(accepted=True))
+        assert client.call(DEVICE_STOP, DeviceStopRequest(), timeout=5.0).accepted
+        router.process.send_signal(signal.SIGSTOP)
+        thaw = threading.Timer(FROZEN, router.process.send_signal, (signal.SIGCONT,))
+        thaw.start()
+        assert client.call(DEVICE_STOP, DeviceStopRequest(kind=StopKind.HOLD), timeout=15.0).accepted
+        thaw.join()
+    assert StopKind.HOLD in handled
+    router.stop()
+
+
+def test_a_stop_that_nobody_answers_says_what_is_known(buses: Buses) -> None:
+    server, client = buses.open(), buses.node("client")
+    served = server.serve(DEVICE_STOP.key, lambda query: query.drop(), urgent=True)
+    assert client.is_served(DEVICE_STOP) or until(lambda: client.is_served(DEVICE_STOP))
+    with pytest.raises(NoAnswer, match=r"within 0.3 s, sent [3-9] times: it is alive, and carries out what arrives"):
+        client.call(DEVICE_STOP, DeviceStopRequest(), timeout=0.3)
+    call = client.ask(DEVICE_STOP, DeviceStopRequest(), 0.5, lambda: None)
+    served.close()
+    with pytest.raises(NoAnswer, match=r"nobody serves it now .* whether it was carried out is not known"):
+        call.response()

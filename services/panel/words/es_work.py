@@ -259,9 +259,12 @@ _SILENT: dict[str, str] = {
     "{server} did not answer {key}: it has just ended (`gemelo node list`), or dropped it unread: it takes {most} of "
     "one client, and nothing of one that asks for more; ask again after {pause}": "{server} no respondió: acaba de "
     "terminar, o se le pide demasiado a la vez. Pruebe en {pause}.",
-    "{server} did not answer {key}: it has just ended (`gemelo node list`), or was asked too often: it answers {most} "
-    "of that kind of one client, and carries out the others all the same; ask again after {pause}": "{server} no "
-    "respondió: acaba de terminar, o se le pide demasiado a la vez. Pruebe en {pause}.",
+    "{server} did not answer {key} within {timeout} s, sent {tries} times: nobody serves it now (`gemelo node list`), "
+    "and whether it was carried out is not known": "{server} no respondió en {timeout} s, y ya no está. No se sabe si "
+    "lo hizo.",
+    "{server} did not answer {key} within {timeout} s, sent {tries} times: it is alive, and carries out what arrives, "
+    "but answers {most} of that kind of one client; ask again after {pause}": "{server} hace lo que le llega, pero se "
+    "le pide demasiado a la vez y no respondió. Pruebe en {pause}.",
     "{key}: the router is away; start it with `make up`": "Falta el router: arranque todo con `make up`.",
     "nobody serves {key}: is {server} running? `gemelo node list` shows who is": "Nadie responde: ¿está en marcha "
     "{server}?",

@@ -269,6 +269,10 @@ class ZenohBus:
             attachment=asked_by(self._secret, number),
         )
 
+    def take_new_name(self) -> None:
+        """Asks from now on as another client: what whoever floods under ever new names does."""
+        self._secret = secrets.token_hex(MAX_SECRET // 2)
+
     def _asked_under(self, key: str) -> str:
         return asked_under(key, self._common_name or LOCAL)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from queue import Empty, SimpleQueue
 from typing import Generic, TypeVar
 
@@ -17,11 +19,16 @@ from services.runtime.requests.limits import DEBT, OF_A_CLIENT
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 
+PAUSE = 0.05  # [s] until an urgent request is sent again; chosen: below what a server answers of one client
 SERVER_APPEARANCE_TIMEOUT = 1.0  # [s] that a client waits for a server to appear
 
 
 class PendingCall(Generic[Q, R]):
-    """A request that was sent, and its reply."""
+    """A request that was sent, and its reply.
+
+    An urgent one that ends without a reply is sent again, with the same number, until its time is over: a link that
+    broke on the way says nothing of the server, and repeating a stop does no harm.
+    """
 
     def __init__(
         self,
@@ -38,12 +45,13 @@ class PendingCall(Generic[Q, R]):
         Raises `NoAnswer` where no node serves the request within `appearance` [s]; with 0 it is sent in any case.
         """
         self._bus, self._request, self._wake = bus, request, wake
-        self._timeout = timeout
+        self._timeout, self._tries = timeout, 0
         self._answers: SimpleQueue[BusReply | None] = SimpleQueue()
-        payload, number = to_payload(question), number or bus.take_number()
+        self._payload, self._number = to_payload(question), number or bus.take_number()
         if appearance and not bus.wait_served(request.key, min(timeout, appearance)):
             raise NoAnswer(_nobody(bus, request))
-        bus.ask(request.key, schema_of(request.request), payload, timeout, self._on_answer, request.urgent, number)
+        self._end = time.monotonic() + timeout
+        self._send()
 
     @property
     def is_over(self) -> bool:
@@ -59,10 +67,30 @@ class PendingCall(Generic[Q, R]):
         if answer is None:
             raise NoAnswer(_silent(self._bus, self._request, self._timeout))
         if answer == UNREAD:
-            raise NoAnswer(_unread(self._bus, self._request))
+            raise NoAnswer(_unread(self._bus, self._request, self._timeout, self._tries))
         return response_in(self._request, answer)
 
+    def _send(self) -> None:
+        self._tries += 1
+        schema, left = schema_of(self._request.request), max(PAUSE, self._end - time.monotonic())
+        urgent = self._request.urgent
+        self._bus.ask(self._request.key, schema, self._payload, left, self._on_answer, urgent, self._number)
+
+    def _send_again(self) -> None:
+        try:
+            self._send()
+        except Exception:  # of a bus that was closed meanwhile, in whatever words
+            self._put(UNREAD)
+
     def _on_answer(self, answer: BusReply | None) -> None:
+        if answer == UNREAD and self._request.urgent and time.monotonic() + PAUSE < self._end:
+            again = threading.Timer(PAUSE, self._send_again)
+            again.daemon = True
+            again.start()
+        else:
+            self._put(answer)
+
+    def _put(self, answer: BusReply | None) -> None:
         self._answers.put(answer)
         self._wake()
 
@@ -91,16 +119,18 @@ def _silent(bus: Bus, request: Request[Q, R], timeout: float) -> str:
     return f"{request.server} did not answer {request.key} within {timeout:g} s: is it busy, or gone?"
 
 
-def _unread(bus: Bus, request: Request[Q, R]) -> str:
-    """The text for a request that was not read: its server has ended before it answered, or has dropped it."""
+def _unread(bus: Bus, request: Request[Q, R], timeout: float, tries: int) -> str:
+    """The text for a request that ended without a reply: its server or a link has ended before, or it was dropped."""
     if not bus.is_connected:
         return _away(request)
     most, pause = f"{OF_A_CLIENT.per_second:g} requests a second", f"{DEBT / OF_A_CLIENT.per_second:g} s"
     if request.urgent:
+        asked = f"{request.server} did not answer {request.key} within {timeout:g} s, sent {tries} times"
+        if not bus.wait_served(request.key, 0.0):
+            return f"{asked}: nobody serves it now (`gemelo node list`), and whether it was carried out is not known"
         return (
-            f"{request.server} did not answer {request.key}: it has just ended (`gemelo node list`), or was asked too "
-            f"often: it answers {most} of that kind of one client, and carries out the others all the same; ask again "
-            f"after {pause}"
+            f"{asked}: it is alive, and carries out what arrives, but answers {most} of that kind of one client; ask "
+            f"again after {pause}"
         )
     return (
         f"{request.server} did not answer {request.key}: it has just ended (`gemelo node list`), or dropped it unread: "
