@@ -18,6 +18,7 @@ from services.recordings.channels import Entry
 from services.recordings.incidents import BLACK_BOX, Incident, IncidentKind, incident_metadata
 from services.recordings.mcap_file import McapFile
 from services.recordings.view_layout import layout_metadata, layout_of
+from services.runtime.process.own_files import own_folder
 
 SECOND = 1_000_000_000  # [ns]
 AFTERWARDS = 3 * SECOND  # [ns] that are waited for what follows an incident
@@ -124,7 +125,7 @@ def write_black_box(
     folder: Path, robot: str, metadata: dict[str, dict[str, str]], incident: Incident, entries: tuple[Entry, ...]
 ) -> Path:
     """Writes the file; raises OSError."""
-    folder.mkdir(parents=True, exist_ok=True)
+    own_folder(folder)
     path = folder / (stem_of(robot, incident.stamp) + MCAP)
     file = McapFile(path, {**metadata, **incident_metadata(incident)})
     try:

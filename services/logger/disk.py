@@ -16,6 +16,7 @@ from msgspec import Meta
 from services.logger.core import Batch, Logger
 from services.logger.files import is_due, prune, stem_of
 from services.logger.recording import Recording
+from services.runtime.process.own_files import own_folder
 
 
 class LoggerParameters(msgspec.Struct, frozen=True, kw_only=True):
@@ -94,7 +95,7 @@ class RecordingWriter:
         if self.recording is not None and self._is_over(self.recording, folder, parameters, monotonic):
             self.close()
         if self.recording is None:
-            folder.mkdir(parents=True, exist_ok=True)
+            own_folder(folder)
             stem = stem_of(self.robot, now)
             prune(
                 folder, self.robot, parameters.keep_files, (*(path.stem for path in self.files), stem)

@@ -15,6 +15,7 @@ from services.logger.files import CSV, MCAP
 from services.recordings.channels import Entry
 from services.recordings.mcap_file import McapFile
 from services.recordings.table import recorded_topics
+from services.runtime.process.own_files import created
 
 
 class Recording:
@@ -61,7 +62,7 @@ class Recording:
         """A table begins with its first command, when the joints are known; other joints get one of their own."""
         number = f"_{len(self._tables) + 1}" if self._tables else ""
         path = self.csv_path.with_name(self.csv_path.stem + number + CSV)
-        table = self._tables[joints] = path.open("x", encoding="utf-8", newline="")
+        table = self._tables[joints] = io.TextIOWrapper(created(path), encoding="utf-8", newline="")
         table.write(_csv([header(joints)]))
         return table
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from services.recordings.reader import RecordingReader
 from services.recordings.rerun_file import write_rerun
 from services.recordings.series import Series, series_of
+from services.runtime.process.own_files import own_file, own_folder
 
 Written = tuple[Path, int]  # a file, and its rows
 
@@ -45,10 +46,10 @@ def file_name(topic: str) -> str:
 
 
 def _csv(reader: RecordingReader, series: dict[str, Series], folder: Path) -> Iterator[Written]:
-    folder.mkdir(parents=True, exist_ok=True)
+    own_folder(folder)
     for each in series.values():
         path = folder / f"{file_name(each.topic)}.csv"
-        with path.open("x", encoding="utf-8", newline="") as file:
+        with open(path, "x", encoding="utf-8", newline="", opener=own_file) as file:
             writer = csv.DictWriter(file, list(each.columns), restval="", lineterminator="\n")
             writer.writeheader()
             writer.writerows(each.rows)
@@ -59,11 +60,11 @@ def _parquet(reader: RecordingReader, series: dict[str, Series], folder: Path) -
     import pyarrow  # slow to load; it comes with rerun-sdk
     import pyarrow.parquet
 
-    folder.mkdir(parents=True, exist_ok=True)
+    own_folder(folder)
     for each in series.values():
         path = folder / f"{file_name(each.topic)}.parquet"
         columns = {name: pyarrow.array(_column(each, name)) for name in each.columns}
-        with path.open("xb") as file:
+        with open(path, "xb", opener=own_file) as file:
             pyarrow.parquet.write_table(pyarrow.table(columns), file)
         yield path, len(each.rows)
 
@@ -79,7 +80,7 @@ def _column(series: Series, name: str) -> list[object]:
 
 
 def _rerun(reader: RecordingReader, series: dict[str, Series], file: Path) -> Iterator[Written]:
-    with file.open("xb"):  # the name is free, and the disk takes it
+    with open(file, "xb", opener=own_file):  # the name is free, and the disk takes it
         pass
     write_rerun(reader, series, file)
     yield file, 0

@@ -19,6 +19,7 @@ from schemas.system import NodeRecord
 from schemas.topics import Topic
 from services.recordings import foxglove
 from services.recordings.channels import MESSAGE_ENCODING, SCHEMA_ENCODING, Channel, Entry, channel_of
+from services.runtime.process.own_files import created
 
 # [B] uncompressed; more than the batch of one write (measured: 110 kB), so that each becomes one chunk: the writer
 # keeps 2 kB of index for every chunk until the file ends.
@@ -48,7 +49,7 @@ class McapFile:
         self._sequences: dict[int, int] = {}
         self._clocks: dict[str, str] = {}
         self._twin = foxglove.FoxgloveTwin()
-        self._file: IO[bytes] = path.open("xb")
+        self._file: IO[bytes] = created(path)
         self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=compression)
         try:
             self._derived = self._begin(metadata, topics)

@@ -11,6 +11,7 @@ from mcap.writer import CompressionType, Writer
 
 from services.recordings.mcap_file import CHUNK_SIZE, PROFILE
 from services.recordings.reader import Damage, RecordingReader
+from services.runtime.process.own_files import own_file
 
 
 @dataclass
@@ -40,7 +41,7 @@ def repair(source: Path, target: Path) -> Repaired:
     """Writes `target`; raises `BadRecording` where `source` is none, FileExistsError, or OSError of the disk."""
     reader = RecordingReader(source)
     repaired = Repaired(target, reader.damage)
-    with target.open("xb") as file:
+    with open(target, "xb", opener=own_file) as file:
         writer = Writer(file, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
         writer.start(profile=PROFILE)
         copy = _Copy(writer, repaired)

@@ -31,6 +31,7 @@ from services.recordings.reader import BadRecording, RecordingReader, Row
 from services.recordings.shadow import recorded_robot, shadow_folder, write_shadow
 from services.recordings.view_layout import LAYOUT, ViewLayout
 from services.runtime.deployment import DeploymentError, load_deployment, project_root
+from services.runtime.process.own_files import make_own
 from services.visualizer.core import Visualizer
 from services.visualizer.feeds import feeds
 from services.visualizer.model.mesh_files import scene_mesh
@@ -66,6 +67,7 @@ def write_view(file: Path, rrd: Path, shadow: Path) -> Incident | None:
         raise BadRecording(f'"{file}": its robot cannot be drawn: {error}') from error
     stream = rr.RecordingStream(APPLICATION, recording_id=file.stem)
     rrd.parent.mkdir(parents=True, exist_ok=True)
+    make_own(rrd)
     stream.save(rrd)
     moment = None if incident is None else OpeningMoment(incident.stamp, story_text(incident))
     layout = blueprint(ArmLayout(core.model, chosen.window, chosen.trail, cameras), moment)

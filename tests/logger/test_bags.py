@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import random
 import subprocess
 from io import BytesIO
@@ -18,6 +19,8 @@ from schemas.joints import JointState
 from schemas.message import decode, encode
 from schemas.system import LogRecord
 from schemas.topics import DESCRIPTION, JOINT_STATES, LOG, PLAN
+from services.logger.command_log import CommandRow
+from services.logger.recording import Recording
 from services.recordings.channels import Entry
 from services.recordings.contents import contents_of
 from services.recordings.export import NothingToExport, chosen, export
@@ -164,6 +167,26 @@ def test_rerun_reads_the_curves_of_its_file(bag, tmp_path):
     ((path, _),) = export(bag, "rerun", [], tmp_path / "bag.rrd")
     done = subprocess.run([rerun_binary(), "rrd", "print", "-v", path], capture_output=True, text=True, check=True)
     assert "position[0]" in done.stdout.replace("\\", "")
+
+
+def test_a_recording_and_what_is_made_of_it_are_its_owners_alone(bag, tmp_path):
+    """Whatever the umask: another user of the host reads none of it."""
+    before = os.umask(0)
+    try:
+        (tmp_path / "plain").write_text("")
+        assert (tmp_path / "plain").stat().st_mode & 0o777 == 0o666, "what a file gets without our care"
+        own = Recording(tmp_path, "own", {})
+        own.write_lines([CommandRow(("a",), ("",))])
+        own.abandon()
+        repair(bag, tmp_path / "repaired.mcap")
+        made = [tmp_path / "repaired.mcap", own.path, own.csv_path]
+        for form, where in (("csv", "tables"), ("parquet", "columns"), ("rerun", "bag.rrd")):
+            made += [path for path, _ in export(bag, form, ["joint_*"], tmp_path / where)]
+    finally:
+        os.umask(before)
+    assert len(made) == 6
+    assert {oct(path.stat().st_mode & 0o777) for path in made} == {"0o600"}
+    assert oct((tmp_path / "tables").stat().st_mode & 0o777) == "0o700"
 
 
 def test_a_pattern_that_matches_nothing_is_named_with_what_there_is(bag):

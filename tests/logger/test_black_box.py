@@ -419,6 +419,8 @@ def test_a_file_is_read_by_another_reader_and_listed_by_its_story(rig, tmp_path)
     writer.wait()
     found = black_boxes(tmp_path / "box", "rm1")
     assert [each.incident.stamp - incident.stamp for each in found] == [3 * SECOND, 2 * SECOND, SECOND]
+    assert oct((tmp_path / "box").stat().st_mode & 0o777) == "0o700"
+    assert {oct(path.stat().st_mode & 0o777) for path in (tmp_path / "box").glob("**/*.mcap")} == {"0o600"}
     assert not black_boxes(tmp_path / "box", "parol6")
     assert len(said) == 4
     assert "`gemelo blackbox open`" in said[0]

@@ -258,6 +258,7 @@ def test_the_file_is_replaced_as_a_whole_and_read_back(tmp_path: Path, rig: Virt
     file.close()
     assert read_ledger(file.path) == (rig.core.ledger_record(), "")
     assert [path.name for path in file.path.parent.iterdir()] == ["rm1.ledger.json"]
+    assert oct(file.path.stat().st_mode & 0o777) == "0o600"
     assert complaints == []
 
 

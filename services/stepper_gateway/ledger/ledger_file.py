@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 
 from services.runtime.clock import SYSTEM, Clock
+from services.runtime.process.own_files import own_file
 from services.runtime.process.unwritten import RETRY, UnwrittenFiles
 from services.stepper_gateway.ledger.record import LedgerRecord
 
@@ -34,7 +35,7 @@ def write_ledger(path: Path, record: LedgerRecord, is_durable: bool = True) -> N
     fails just after."""
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_suffix(".new")
-    with fresh.open("wb") as file:
+    with open(fresh, "wb", opener=own_file) as file:
         file.write(msgspec.json.format(msgspec.json.encode(record), indent=1))
         file.flush()
         if is_durable:

@@ -12,6 +12,7 @@ from msgspec import Meta
 
 from schemas.deployment import ViewerMode, ViewerSection
 from services.recordings.view_layout import SECONDS
+from services.runtime.process.own_files import make_own
 from services.visualizer.core import Visualizer
 from services.visualizer.program.viewer_connection import ViewerConnection
 from services.visualizer.render.arms_layout import SharedView, arms_blueprint
@@ -81,6 +82,7 @@ class Outputs:
         stream = rr.RecordingStream(APPLICATION, recording_id=_own_recording(core))
         try:
             self._recording_path.parent.mkdir(parents=True, exist_ok=True)
+            make_own(self._recording_path)
             stream.save(str(self._recording_path))
         except (OSError, RuntimeError) as error:
             self._problem = f"cannot write the recording {self._recording_path}: {error}"
