@@ -11,11 +11,13 @@ import pytest
 from msgspec.structs import replace
 
 from firmware.platform.host.flash import NetworkCredentials
-from firmware.platform.host.link import Connected, Denied, DeviceLink, Disconnected, Item
+from firmware.platform.host.link import Connected, Denied, DeviceLink, Disconnected, Item, MqttMessage
 from firmware.platform.host.network import AddressError, broker_address
+from schemas.device_topics import topic
 from services.credentials.authority import Authority
 from services.mqtt import secure_folder
-from services.mqtt.access import BrokerAccess, device_access
+from services.mqtt.access import BrokerAccess, device_access, gateway_access
+from services.mqtt.client import MqttClient
 from tests.stepper_gateway.locked import Mosquitto, locked, renew
 
 WATCHED = 2.5  # [s] attempts at 0, 1 and 3 s
@@ -130,3 +132,25 @@ def test_what_the_acl_denies_is_said_with_its_topic(section):
         link.break_off()
     assert isinstance(said, (Denied, Disconnected))
     assert 'user "rm1"' in said.reason
+
+
+def test_two_devices_of_one_name_do_not_end_each_others_connections(section):
+    links, inboxes = [], []
+    try:
+        for _ in range(2):
+            inboxes.append(queue.SimpleQueue())
+            links.append(DeviceLink(told(section), "rm1", b"gone", inboxes[-1]))
+            links[-1].start()
+            assert isinstance(inboxes[-1].get(timeout=10.0), Connected)
+        gateway = MqttClient(gateway_access(section), "one-command")
+        gateway.connect("127.0.0.1", section.port)
+        gateway.loop_start()
+        gateway.publish(topic("rm1", "cmd"), b"\0\0\x03", qos=1, retain=True)  # for whoever has yet to subscribe
+        for inbox in inboxes:  # nothing was lost before it
+            assert isinstance(inbox.get(timeout=10.0), MqttMessage)
+        gateway.publish(topic("rm1", "cmd"), b"", qos=1, retain=True).wait_for_publish(10.0)
+        gateway.disconnect()
+        gateway.loop_stop()
+    finally:
+        for link in links:
+            link.break_off()

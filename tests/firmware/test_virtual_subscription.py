@@ -20,16 +20,18 @@ from tests.stepper_gateway.processes import DEVICE, Processes
 pytestmark = pytest.mark.full
 
 NAME = "rm1"
+CONNECT = 0x10
 SUBSCRIBE = 0x82  # first byte of the packet, MQTT 3.1.1, 3.8.1
 SOON = 10.0  # [s] 4 s of silence, and a start on a loaded machine
 
 
 class Proxy:
-    """Between a device and its broker; swallows the first `swallowed` SUBSCRIBE packets."""
+    """Between a device and its broker; swallows the first `swallowed` SUBSCRIBE packets, and keeps the client id."""
 
     def __init__(self, broker: int, swallowed: int) -> None:
         self._broker, self._left = broker, swallowed
         self.swallowed = 0
+        self.client_id = ""
         self._listening = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._listening.getsockname()[1]
         self._open: list[socket.socket] = []
@@ -58,10 +60,18 @@ class Proxy:
                     length += packets.read(1)
                     size |= (length[-1] & 0x7F) << 7 * (len(length) - 1)
                 body = packets.read(size)
+                if head[0] == CONNECT:
+                    self.client_id = _client_id(body)
                 if head[0] == SUBSCRIBE and self.swallowed < self._left:
                     self.swallowed += 1
                 else:
                     broker.sendall(head + length + body)
+
+
+def _client_id(connect: bytes) -> str:
+    """Behind protocol, flags and keep-alive (10 bytes) and the properties of MQTT 5, fewer than 128 bytes."""
+    at = 10 + (1 + connect[10] if connect[6] == 5 else 0)
+    return connect[at + 2 : at + 2 + int.from_bytes(connect[at : at + 2])].decode()
 
 
 def _copy(source: socket.socket, target: socket.socket) -> None:
@@ -114,10 +124,10 @@ def test_a_device_whose_subscription_was_lost_subscribes_anew(broker: Processes)
 
 
 def test_a_device_receives_again_after_a_second_client_has_taken_over_its_id(broker: Processes) -> None:
-    with closing(Asker(broker.port)) as asker:
-        broker.start(DEVICE)
+    with closing(Proxy(broker.port, swallowed=0)) as proxy, closing(Asker(broker.port)) as asker:
+        broker.start(DEVICE, environment={"GEMELO_MQTT_PORT": str(proxy.port)})
         assert asker.wait(lambda: asker.answers > 0), broker.log
-        other = paho.Client(CallbackAPIVersion.VERSION2, client_id=f"gemelo-device-{NAME}")
+        other = paho.Client(CallbackAPIVersion.VERSION2, client_id=proxy.client_id)
         other.connect("127.0.0.1", broker.port)
         other.loop_start()
         assert asker.wait(lambda: "lost the broker" in broker.log), broker.log

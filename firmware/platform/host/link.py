@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import queue
+import secrets
 import socket
 import threading
 import time
@@ -86,7 +87,10 @@ class DeviceLink:
     def __init__(self, broker: BrokerAccess, device: str, will: bytes, inbox: queue.SimpleQueue[Item]) -> None:
         self._topic = topic(device, "")
         self._inbox = inbox
-        self._client = MqttClient(broker, f"gemelo-device-{device}", reconnect_on_failure=True)
+        # Random, so that two devices of one name do not end each other's connections; one for all of a boot, so that a
+        # connection ends the one before, whose last will then does not come late.
+        client_id = f"gemelo-device-{device}-{secrets.token_hex(6)}"
+        self._client = MqttClient(broker, client_id, reconnect_on_failure=True)
         self._client.will_set(self._topic + "status", will, qos=1, retain=True)
         self._client.on_connect = self._on_connect
         self._client.on_connect_fail = self._on_connect_fail

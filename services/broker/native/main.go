@@ -22,7 +22,7 @@ import (
 
 const (
 	memoryLimit = 128 << 20       // [bytes] above which garbage is collected at once; the unit of a host ends it at 256 MiB
-	largest     = 256 << 10       // [bytes] of a packet; the firmware's largest has 4 KiB
+	largest     = 256 << 10       // [bytes] of a packet; the largest chunk has 8,228
 	queue       = 1024            // messages that one client may have unacknowledged, or waiting while it is away
 	closingTime = 2 * time.Second // for the last packets to the clients
 )

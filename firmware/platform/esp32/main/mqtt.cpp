@@ -1,7 +1,10 @@
 #include "mqtt.h"
 
+#include <string.h>
+
 #include "board.h"
 #include "esp_err.h"
+#include "esp_random.h"
 #include "esp_timer.h"
 #include "json.h"
 #include "lwip/sockets.h"
@@ -22,6 +25,18 @@ size_t write_will(const Credentials& credentials, uint32_t boot_id, JsonWriter* 
     return json->close();
 }
 
+// gemelo-device-<name>-<digits>
+void write_client_id(const char* device, char* text) {
+    strcpy(text, kClientIdPrefix);
+    strcat(text, device);
+    char* end = text + strlen(text);
+    *end++ = '-';
+    uint64_t random = (static_cast<uint64_t>(esp_random()) << 32) | esp_random();
+    for (size_t digit = 0; digit < Mqtt::kRandomDigits; ++digit, random >>= 4)
+        *end++ = "0123456789abcdef"[random & 0xF];
+    *end = 0;
+}
+
 // Without it Nagle's algorithm and delayed acknowledgements cost 20 to 40 ms a frame.
 void send_at_once(esp_transport_handle_t transport) {
     const int on = 1;
@@ -38,7 +53,10 @@ void Mqtt::begin(const Credentials& credentials, uint32_t boot_id) {
     JsonWriter will;
     esp_mqtt_client_config_t config = {};
     config.broker.address.uri = credentials.mqtt_uri;
-    config.credentials.client_id = credentials.device;
+    // Random, so that two devices of one name do not end each other's connections; one for all of a boot, so that a
+    // connection ends the one before, whose last will then does not come late.
+    write_client_id(credentials.device, client_id_);
+    config.credentials.client_id = client_id_;
     if (credentials.mqtt_user[0] != 0) config.credentials.username = credentials.mqtt_user;
     if (credentials.mqtt_password[0] != 0) config.credentials.authentication.password = credentials.mqtt_password;
     config.session.last_will.topic = said_.full("status");

@@ -13,8 +13,11 @@
 
 namespace gemelo {
 
+constexpr char kClientIdPrefix[] = "gemelo-device-";
+
 class Mqtt {
   public:
+    static constexpr size_t kRandomDigits = 12;  // hexadecimal, at the end of the client id
     // Once; connects, and again for as long as it takes, in esp-mqtt's task. `credentials` must stay.
     void begin(const Credentials& credentials, uint32_t boot_id);
     bool is_connected() const { return __atomic_load_n(&is_connected_, __ATOMIC_ACQUIRE); }
@@ -31,6 +34,7 @@ class Mqtt {
     void receive(const esp_mqtt_event_t& event);
     void deliver();
 
+    char client_id_[sizeof kClientIdPrefix + sizeof Credentials::device + 1 + kRandomDigits] = {};
     // The largest chunk has 8,228 bytes, the longest configuration 8,220.
     static constexpr size_t kLargest = 8240;
 

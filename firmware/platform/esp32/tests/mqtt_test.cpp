@@ -55,6 +55,11 @@ class Connected {
 
 }  // namespace
 
+TEST(Esp32Mqtt, ItsClientIdHasTheDevicesNameAndARandomPart) {
+    Connected connected;
+    EXPECT_STREQ(chip.mqtt.credentials.client_id, "gemelo-device-rm1-400000004000");  // the random number here is 4
+}
+
 TEST(Esp32Mqtt, TheBrokerKeepsALastWillThatSaysWhoIsGone) {
     Connected connected;
     EXPECT_EQ(chip.will, R"(gemelo/v1/rm1/status {"online": false, "device": "rm1", "boot_id": 305419896})");
