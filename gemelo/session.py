@@ -130,7 +130,7 @@ class Session:
         self, is_so: Callable[[], bool], timeout: float | None, on_news: Callable[[], None] | None = None
     ) -> bool:
         """Sleeps until `is_so()`, looking after every message; False after `timeout` [s]. `on_news` runs in between."""
-        if self._thread is not None and threading.current_thread() is self._thread:
+        if self._node.is_in_turn or (self._thread is not None and threading.current_thread() is self._thread):
             raise Error("this waits for messages, so it cannot be called where messages are handled")
         end = None if timeout is None else self.clock.monotonic() + timeout
         while True:

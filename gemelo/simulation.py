@@ -229,15 +229,26 @@ class SimulatedWorld:
         """
         self.simulation.sleep(seconds)
 
+    def connect(self, name: str = "") -> Arm:
+        """Another connection to the same arm, as another program has it; `name`: of its node.
+
+        >>> with gemelo.simulate("rm1") as simulated, simulated.sim.connect("second") as second:
+        ...     second.joints == simulated.joints
+        True
+        """
+        twin = self._twin
+        node = Node(name or "other", twin.deployment, robot=twin.arm.name, bus=twin.bus(), log_level="warning")
+        return Arm(Session(twin.deployment, twin.arm, node))
+
     def press(self, what: str, *words: str | float) -> None:
         """As `gemelo device press`: "estop", "release", "block" JOINT, "free" JOINT, "slip" JOINT STEPS, "switch" INPUT
         "on" | "off" | "auto", "sensor" SENSOR VALUE, "object" WIDTH [m], "reboot", "offline" [s], "freeze" [s],
         "drift" [ppm]. Raises `BadArgument`, or `Refused` with the device's reason.
 
         >>> with gemelo.simulate("rm1") as simulated:
-        ...     simulated.sim.press("sensor", "ultra", 0.25)
-        ...     simulated.sensors["ultra"]
-        0.25
+        ...     simulated.sim.press("sensor", "ultra", 25.0)
+        ...     round(simulated.sensors["ultra"])
+        25
         """
         if what not in BUTTONS:
             raise BadArgument(f'there is no "{what}" to press{suggestion(what, BUTTONS)}')

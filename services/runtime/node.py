@@ -322,6 +322,11 @@ class Node:
             if self._readiness is not None:
                 self._readiness.not_ready()
 
+    @property
+    def is_in_turn(self) -> bool:
+        """True where this is called by a step or a handler that virtual time runs."""
+        return self._loop.is_in_turn
+
     def begin(self, step: Callable[[int], object] = lambda now: None, rate: float = 50.0) -> None:
         """As `spin` at `rate` [Hz], in virtual time only: returns at once; the clock runs it while others wait."""
         self._loop.every(BEAT, self._beat)

@@ -79,6 +79,7 @@ class Loop:
         self._schedule: Schedule | None = None
         self._step: Callable[[int], object] = _nothing
         self._is_driven = False  # by the clock
+        self._turn_thread = 0  # in which a turn runs now
         self.stop = stop
         stop.on_set(self.tasks.wake)
 
@@ -128,9 +129,17 @@ class Loop:
 
     def turn(self) -> None:
         """Does what is due now: the step, the periodic tasks, and one queued task."""
-        now = self.clock.monotonic()
-        self._step_if_due(now)
-        self._run_once(now, now)
+        now, self._turn_thread = self.clock.monotonic(), threading.get_ident()
+        try:
+            self._step_if_due(now)
+            self._run_once(now, now)
+        finally:
+            self._turn_thread = 0
+
+    @property
+    def is_in_turn(self) -> bool:
+        """True where this is called in a turn of this loop, by the step or a task."""
+        return self._turn_thread == threading.get_ident()
 
     def on_task(self, wake: Task | None) -> None:
         """`wake` is called after every task that is queued."""
