@@ -1,29 +1,26 @@
-"""Pick and place through the whole stack, on both arms: to the step, around the post, and tidied up."""
+"""Pick and place on both arms, simulated: to the step, around the post, and tidied up."""
 
 from __future__ import annotations
 
+import runpy
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from schemas.device import ShaftPositions
+import gemelo
+from gemelo.simulation import SimulatedArm
 from schemas.frames import Transform
-from schemas.scene import BoxShape, PlanningScene, SceneAdd, SceneObject, SceneRequest
-from schemas.topics import DEVICE_SHAFT, SCENE, SCENE_EDIT, STEP_ERRORS
+from schemas.joints import JointState
+from schemas.scene import BoxShape, PlanningScene, SceneAdd, SceneObject
+from schemas.topics import DEVICE_SHAFT, JOINT_STATES, SCENE, STEP_ERRORS
 from services.arm.kinematics.kinematics import Kinematics
-from services.stack.stack import Stack
-from tests.stack.person import Operator, jumps
-from tests.stacks.shared import BROKER
+from tests.simulated import found_by_connect, is_moving
+from tests.stack.person import jumps
 
 pytestmark = pytest.mark.full
 
-NEEDED = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner")
-LONGEST = 90.0  # [s]
 MOVES = ["above the part", "down", "up", "around the post", "down", "up", "home"]
 HALF_STEPS = 0.004  # [m] that half a step of every joint may turn the part away, and the tool with it
 SHELF = SceneObject(
@@ -31,22 +28,14 @@ SHELF = SceneObject(
 )
 
 
+EXAMPLE = "examples/09_pick_and_place.py"
+
+
 @pytest.fixture(scope="module", params=["rm1", "parol6"])
-def operator(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Operator]:
-    environment, out = {"GEMELO_ROBOT": f"urdf/{request.param}"}, tmp_path_factory.mktemp("out")
-    with Stack(broker=BROKER, out=out, processes=NEEDED, environment=environment) as stack:
-        person = Operator(stack)
-        assert person.node.call(SCENE_EDIT, SceneRequest(edit=SceneAdd(object=SHELF))).accepted
-        yield person
-        person.close()
-
-
-def example(operator: Operator) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, Path("examples/09_pick_and_place.py")],
-        cwd=operator.stack.root, env=operator.stack.environment, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
+def arm(request: pytest.FixtureRequest) -> Iterator[SimulatedArm]:
+    with gemelo.simulate(request.param) as simulated, found_by_connect(simulated):
+        simulated.scene.edit(SceneAdd(object=SHELF))
+        yield simulated
 
 
 def is_as_found(scene: PlanningScene) -> bool:
@@ -58,21 +47,19 @@ def parts(scenes: list[PlanningScene]) -> list[SceneObject]:
     return [item for scene in scenes for item in scene.objects if item.name == "part"]
 
 
-def test_the_part_stands_where_it_was_to_go_and_no_step_is_lost(operator: Operator) -> None:
+def test_the_part_stands_where_it_was_to_go_and_no_step_is_lost(
+    arm: SimulatedArm, capsys: pytest.CaptureFixture[str]
+) -> None:
     scenes: list[PlanningScene] = []
     errors: list[float] = []
-    shafts: list[ShaftPositions] = []
-    operator.node.subscribe(SCENE, scenes.append)
-    operator.node.subscribe(STEP_ERRORS, lambda message: errors.append(max(map(abs, message.error))))
-    operator.node.subscribe(DEVICE_SHAFT, shafts.append)
-    operator.seen.clear()
-    process = example(operator)
-    try:
-        assert operator.wait_for(lambda: process.poll() is not None, LONGEST)
-        output, complaint = process.communicate(timeout=5.0)
-    finally:
-        process.kill()
-    assert (process.returncode, complaint) == (0, "")
+    seen: list[JointState] = []
+    arm.node.subscribe(SCENE, scenes.append)
+    arm.node.subscribe(STEP_ERRORS, lambda message: errors.append(max(map(abs, message.error))))
+    arm.node.subscribe(JOINT_STATES, seen.append)
+    shaft = arm.node.latest(DEVICE_SHAFT)
+    runpy.run_path(EXAMPLE)
+    output, complaint = capsys.readouterr()
+    assert complaint == ""
     moves = [line for line in output.splitlines() if "steps lost" in line]
     assert [line.split(":")[0] for line in moves] == MOVES
     assert all(line.endswith(" 0 steps lost") for line in moves)
@@ -82,39 +69,40 @@ def test_the_part_stands_where_it_was_to_go_and_no_step_is_lost(operator: Operat
     assert grips[1].endswith("holds part")
     assert grips[2].endswith("has let go of part")
 
-    assert operator.wait_for(lambda: len(shafts) > 0 and shafts[-1].steps == shafts[-1].shaft, 3.0)
+    assert arm.wait_for(lambda: shaft.message is not None and shaft.message.steps == shaft.message.shaft, 3.0)
     assert max(errors) <= 0.5 + 1e-9
-    assert not jumps(operator.arm, operator.seen)
+    assert not jumps(arm.description, seen)
 
-    assert operator.wait_for(lambda: is_as_found(scenes[-1]), 3.0)
+    assert arm.wait_for(lambda: is_as_found(scenes[-1]), 3.0)
     first, last = parts(scenes)[0], parts(scenes)[-1]
     carried = next(item for item in reversed(parts(scenes)) if item.attached)
     assert (first.attached, carried.attached, last.attached) == (False, True, False)
     assert (first.gripped, carried.gripped, last.gripped) == (False, True, False)
-    assert carried.frame == operator.arm.tool_frame
+    assert carried.frame == arm.tool_frame
     assert last.frame == ""
     moved = np.subtract(last.pose.translation, first.pose.translation)
-    assert np.allclose(moved, way_of_the_tool(operator), atol=HALF_STEPS)
+    assert np.allclose(moved, way_of_the_tool(arm), atol=HALF_STEPS)
 
 
-def way_of_the_tool(operator: Operator) -> np.ndarray:
+def way_of_the_tool(arm: SimulatedArm) -> np.ndarray:
     """[m] from the state where the part is picked to the one where it is placed."""
-    kinematics, states = Kinematics(operator.arm), operator.arm.named_states
+    kinematics, states = Kinematics(arm.description), arm.description.named_states
     return kinematics.tool(states["ready"]).position - kinematics.tool(states["left"]).position
 
 
-def test_ctrl_c_stops_the_arm_and_tidies_up(operator: Operator) -> None:
-    scene = operator.node.latest(SCENE)
-    assert operator.wait_for(lambda: scene.message is not None and is_as_found(scene.message), 3.0)
-    process = example(operator)
-    try:
-        assert operator.wait_for(operator.is_moving, 20.0)
-        process.send_signal(signal.SIGINT)
-        assert operator.wait_for(lambda: process.poll() is not None, 10.0)
-        _, complaint = process.communicate(timeout=5.0)
-    finally:
-        process.kill()
-    assert process.returncode == 1
-    assert complaint.splitlines()[-1].startswith("gemelo.errors.Interrupted: stopped by Ctrl-C: <Motion")
-    assert "canceled in" in complaint.splitlines()[-1]
-    assert operator.wait_for(lambda: is_as_found(scene.message) and not operator.is_moving(), 3.0)
+def test_ctrl_c_stops_the_arm_and_tidies_up(arm: SimulatedArm) -> None:
+    assert is_as_found(arm.scene.present)
+    presses: list[float] = []
+
+    def press_once(state: JointState) -> None:
+        if not presses and any(abs(speed) > 1e-3 for speed in state.velocity):
+            presses.append(arm.sim.now)
+            signal.raise_signal(signal.SIGINT)
+
+    pressing = arm.node.subscribe(JOINT_STATES, press_once)
+    with pytest.raises(gemelo.Interrupted, match=r"^stopped by Ctrl-C: <Motion .* canceled in"):
+        runpy.run_path(EXAMPLE)
+    pressing.close()
+    assert presses
+    assert not is_moving(arm)
+    assert is_as_found(arm.scene.present)

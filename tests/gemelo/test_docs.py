@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from services.stack.stack import Stack
 from tests.gemelo.public import documented, own_names
 
 
@@ -28,9 +27,7 @@ def test_the_readme_leads_to_the_api_page(root: Path) -> None:
     assert "(docs/api.md)" in (root / "README.md").read_text()
 
 
-def test_the_script_of_the_readme_runs(
-    twin: Stack, arm: gemelo.Arm, root: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_script_of_the_readme_runs(arm: gemelo.Arm, root: Path, capsys: pytest.CaptureFixture[str]) -> None:
     [code] = re.findall(r"```python\n(.*?)```", (root / "README.md").read_text(), flags=re.DOTALL)
     exec(compile(code, "README.md", "exec"), {})
     said = capsys.readouterr().out

@@ -9,9 +9,9 @@ from playwright.sync_api import Browser
 
 import gemelo
 from services.stack.stack import Stack
-from tests.gemelo.conftest import make_ready
 from tests.panel.person import Person
 from tests.panel.served import Served, served_page
+from tests.simulated import make_ready
 from tests.stacks.browser import SIZE
 from tests.stacks.shared import found_by_scripts
 

@@ -12,9 +12,9 @@ import gemelo
 from gemelo.programs import Go, Program
 from services.panel.words.en import ENGLISH
 from services.stack.stack import Stack
-from tests.gemelo.conftest import make_ready
 from tests.panel.person import until
 from tests.panel.served import Served, passed, rests
+from tests.simulated import make_ready
 from tests.stacks.shared import found_by_scripts
 
 ARM = "brazo_joint"

@@ -9,8 +9,8 @@ import pytest
 import gemelo
 from services.bench.bare_browser import bare_browser
 from services.stack.stack import Stack
-from tests.gemelo.conftest import make_ready
 from tests.panel.person import until
+from tests.simulated import make_ready
 
 ARM = "brazo_joint"
 VICTIMS = ("router", "broker", "planner", "state_publisher", "stepper_gateway", "virtual_esp32")

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
+import gemelo
 from tests.stack.person import Operator
+from tests.stacks.shared import found_by_scripts
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -27,3 +29,17 @@ def operator(stack):
     person = Operator(stack)
     yield person
     person.close()
+
+
+@pytest.fixture(scope="module")
+def twin(rm1_stack):
+    """The same; what connects in this process or in one that it starts finds it."""
+    with found_by_scripts(rm1_stack):
+        yield rm1_stack
+
+
+@pytest.fixture
+def arm(twin):
+    """At home, as a script has it."""
+    with gemelo.connect(timeout=10.0) as connected:
+        yield connected

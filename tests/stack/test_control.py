@@ -16,8 +16,8 @@ from schemas.control import ControlState
 from schemas.joints import JointState
 from services.stack.stack import Stack
 from services.stepper_gateway.parameters import GatewayParameters
-from tests.gemelo.scripts import said, script
 from tests.stack.person import jumps
+from tests.stack.scripts import said, script
 
 LONGEST = 30.0  # [s] of one command
 AT_REST = 1e-3  # [rad/s] or [m/s]

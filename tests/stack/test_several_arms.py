@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import gemelo as api
 from schemas.actions import GoalStatusCode
 from services.recordings.mcap_file import METADATA
 from services.recordings.reader import RecordingReader
@@ -83,6 +84,14 @@ def test_both_move_at_once_and_lose_no_step(people):
         assert outcome.status is GoalStatusCode.SUCCEEDED, outcome
         assert outcome.result.executed_steps == outcome.result.commanded_steps
         assert not jumps(person.arm, person.seen)
+
+
+def test_a_script_finds_each_by_its_deployment_file(stack):
+    files = [deployment_of_arm(name, stack.environment) for name in ARMS]
+    with api.connect(deployment=files[0]) as first, api.connect("parol6", deployment=files[1]) as second:
+        assert (first.name, second.name) == ARMS
+        motions = [arm.start(named="left", speed=0.5) for arm in (first, second)]
+        assert [motion.wait().status for motion in motions] == [GoalStatusCode.SUCCEEDED] * 2
 
 
 def test_the_command_line_speaks_with_the_arm_that_is_named(stack):

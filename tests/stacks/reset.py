@@ -6,7 +6,6 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from typing import NamedTuple
 
 import psutil
@@ -14,9 +13,9 @@ import pytest
 
 import gemelo
 from schemas import system
-from schemas.device import ShaftPositions
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY, Request
 from services.stack.stack import Stack
+from tests.simulated import where_it_stands
 
 READY = 60.0  # [s] in which a process that a test has killed is there again
 LETS_GO = 6.0  # [s] in which control, motions and processes of a client that has just ended are over
@@ -145,7 +144,7 @@ class Reset:
         if not arm.device.state.armed:
             arm.device.arm()
         if not all(arm.device.state.referenced):
-            arm.reference(self._where_it_stands())
+            arm.reference(where_it_stands(arm))
         if arm.device.state.time_scale != 1.0:
             arm.speed(1.0)
         if arm.scene.present.objects or arm.scene.present.allowed:
@@ -156,19 +155,6 @@ class Reset:
         steps = {name: arm.description.joint(name).steps.per_unit for name in where}
         if any(abs(arm.joints[name] - at) * steps[name] > 1.0 for name, at in where.items()):
             arm.move(joints=where)
-
-    def _where_it_stands(self) -> dict[str, float]:
-        """A person looks at the arm before declaring: a virtual one says where its shafts are."""
-        shafts: SimpleQueue[ShaftPositions] = SimpleQueue()
-        listening = self._arm.node.subscribe(gemelo.topics.DEVICE_SHAFT, shafts.put)
-        try:
-            shaft = shafts.get(timeout=5.0)
-        except Empty as error:
-            raise AssertionError("the virtual device does not say where its shafts are") from error
-        finally:
-            listening.close()
-        joint = self._arm.description.joint
-        return {name: joint(name).clamp(at) for name, at in zip(shaft.name, shaft.position, strict=True)}
 
     def _files(self) -> set[Path]:
         return {path for path in Path(self._stack.deployment["GEMELO_PATHS_PROGRAMS"]).rglob("*") if path.is_file()}

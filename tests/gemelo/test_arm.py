@@ -1,26 +1,19 @@
-"""The API on the whole stack: fresh states, ends of motions, losses, and the threads that may call it."""
+"""The API on a simulated arm: fresh states, ends of motions, losses, and the threads that may call it."""
 
 from __future__ import annotations
 
-import asyncio
 import itertools
-import time
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 import gemelo
+from gemelo.simulation import SimulatedArm
 from schemas.device import HomeCommand
 from schemas.planning import PlanProgress
-from services.stack.stack import Stack
-from tests.gemelo.scripts import ended, said, script
+from tests.simulated import is_moving
 
 
-def is_moving(arm: gemelo.Arm) -> bool:
-    return any(abs(speed) > 1e-3 for speed in arm.velocities.values())
-
-
-def test_what_is_asked_right_after_a_motion_is_where_it_ended(arm: gemelo.Arm) -> None:
+def test_what_is_asked_right_after_a_motion_is_where_it_ended(arm: SimulatedArm) -> None:
     for goal in (0.2, -0.2, 0.3):
         motion = arm.move(joints={"brazo_joint": goal})
         assert arm.joints == pytest.approx(motion.stopped_at, abs=1e-9)
@@ -28,7 +21,7 @@ def test_what_is_asked_right_after_a_motion_is_where_it_ended(arm: gemelo.Arm) -
         assert arm.pose().position == pytest.approx(arm.fk(motion.stopped_at).position, abs=1e-6)
 
 
-def test_a_plan_is_executed_as_it_is_and_only_from_where_it_begins(arm: gemelo.Arm) -> None:
+def test_a_plan_is_executed_as_it_is_and_only_from_where_it_begins(arm: SimulatedArm) -> None:
     arm.move(named="home")
     plan = arm.plan(named="left")
     back = arm.plan(named="home", from_joints=plan.end)
@@ -42,7 +35,7 @@ def test_a_plan_is_executed_as_it_is_and_only_from_where_it_begins(arm: gemelo.A
     assert refused.value.code < 0
 
 
-def test_a_motion_tells_how_far_it_is_while_it_goes(arm: gemelo.Arm) -> None:
+def test_a_motion_tells_how_far_it_is_while_it_goes(arm: SimulatedArm) -> None:
     arm.move(named="home")
     shares: list[float] = []
     motion = arm.move(named="left", on_progress=lambda motion: shares.append(motion.progress))
@@ -52,7 +45,7 @@ def test_a_motion_tells_how_far_it_is_while_it_goes(arm: gemelo.Arm) -> None:
     assert motion.progress == 1.0
 
 
-def test_planning_tells_how_it_stands(arm: gemelo.Arm) -> None:
+def test_planning_tells_how_it_stands(arm: SimulatedArm) -> None:
     arm.move(named="home")
     arm.scene.add_box("post", size=(0.04, 0.04, 0.16), at=(0.29, 0.27, 0.08))
     heard: list[PlanProgress] = []
@@ -61,13 +54,13 @@ def test_planning_tells_how_it_stands(arm: gemelo.Arm) -> None:
     assert all(progress.allowed == 5.0 for progress in heard)
 
 
-def test_the_same_seed_gives_the_same_plan(arm: gemelo.Arm) -> None:
+def test_the_same_seed_gives_the_same_plan(arm: SimulatedArm) -> None:
     arm.move(named="home")
     arm.scene.add_box("post", size=(0.04, 0.04, 0.16), at=(0.29, 0.27, 0.08))
     assert arm.plan(named="left", seed=7).trajectory == arm.plan(named="left", seed=7).trajectory
 
 
-def test_a_wait_that_times_out_leaves_the_motion_going(arm: gemelo.Arm) -> None:
+def test_a_wait_that_times_out_leaves_the_motion_going(arm: SimulatedArm) -> None:
     arm.move(named="home")
     motion = arm.start(named="left", speed=0.3)
     with pytest.raises(TimeoutError, match="it goes on"):
@@ -78,7 +71,7 @@ def test_a_wait_that_times_out_leaves_the_motion_going(arm: gemelo.Arm) -> None:
     assert 0.0 < motion.progress < 1.0
 
 
-def test_a_newer_motion_takes_over_and_the_older_one_says_so(arm: gemelo.Arm) -> None:
+def test_a_newer_motion_takes_over_and_the_older_one_says_so(arm: SimulatedArm) -> None:
     arm.move(named="home")
     first = arm.start(arm.plan(joints={"brazo_joint": 1.0}, speed=0.3))
     with gemelo.connect() as other:
@@ -89,7 +82,7 @@ def test_a_newer_motion_takes_over_and_the_older_one_says_so(arm: gemelo.Arm) ->
     assert aborted.value.stopped_at == pytest.approx(arm.joints, abs=1e-9)
 
 
-def test_a_motion_that_another_script_cancels_is_canceled(arm: gemelo.Arm) -> None:
+def test_a_motion_that_another_script_cancels_is_canceled(arm: SimulatedArm) -> None:
     arm.move(named="home")
     motion = arm.start(named="left", speed=0.3)
     with gemelo.connect() as other:
@@ -98,7 +91,7 @@ def test_a_motion_that_another_script_cancels_is_canceled(arm: gemelo.Arm) -> No
         motion.wait()
 
 
-def test_an_emergency_stop_aborts_with_the_reason_and_the_remedy_works(arm: gemelo.Arm) -> None:
+def test_an_emergency_stop_aborts_with_the_reason_and_the_remedy_works(arm: SimulatedArm) -> None:
     arm.move(named="home")
     motion = arm.start(named="left", speed=0.3)
     arm.device.inject("estop")
@@ -112,7 +105,7 @@ def test_an_emergency_stop_aborts_with_the_reason_and_the_remedy_works(arm: geme
     assert arm.device.fault == ""
 
 
-def test_a_hand_that_holds_the_arm_up_does_not_end_the_motion(arm: gemelo.Arm) -> None:
+def test_a_hand_that_holds_the_arm_up_does_not_end_the_motion(arm: SimulatedArm) -> None:
     arm.move(named="home")
     motion = arm.start(named="left")
     arm.hold()
@@ -122,7 +115,7 @@ def test_a_hand_that_holds_the_arm_up_does_not_end_the_motion(arm: gemelo.Arm) -
     assert motion.wait().status is gemelo.GoalStatusCode.SUCCEEDED
 
 
-def test_a_jog_into_a_limit_says_which(arm: gemelo.Arm) -> None:
+def test_a_jog_into_a_limit_says_which(arm: SimulatedArm) -> None:
     joint = arm.description.joints[0]
     arm.move(joints={joint.name: joint.upper - 0.05})
     limits: set[str] = set()
@@ -135,27 +128,26 @@ def test_a_jog_into_a_limit_says_which(arm: gemelo.Arm) -> None:
     assert joint.upper - 0.05 < arm.joints[joint.name] <= joint.upper
 
 
-def test_streamed_targets_are_followed_and_a_refused_one_is_raised(arm: gemelo.Arm) -> None:
+def test_streamed_targets_are_followed_and_a_refused_one_is_raised(arm: SimulatedArm) -> None:
     arm.move(named="home")
-    end = time.monotonic() + 10.0
+    end = arm.sim.now + 10.0
     while abs(arm.joints["brazo_joint"] - 0.1) > 0.005:
-        assert time.monotonic() < end
+        assert arm.sim.now < end
         arm.stream({"brazo_joint": 0.1})
     with pytest.raises(gemelo.BadArgument, match=r"beyond its limits.*nearest that can"):
         arm.stream({"brazo_joint": 3.5})
-    while is_moving(arm):
-        assert time.monotonic() < end
+    assert arm.wait_for(lambda: not is_moving(arm), 10.0)
     motion = arm.start(named="left", speed=0.3)
     with pytest.raises(gemelo.Refused, match="goal"):
         stream_until_it_is_over(arm, motion)
     motion.wait()
 
 
-def test_a_plan_waits_for_an_arm_that_is_just_coming_to_rest_but_not_for_one_that_goes_on(arm: gemelo.Arm) -> None:
+def test_a_plan_waits_for_an_arm_that_is_just_coming_to_rest_but_not_for_one_that_goes_on(arm: SimulatedArm) -> None:
     arm.move(named="home")
-    end = time.monotonic() + 10.0
+    end = arm.sim.now + 10.0
     while arm.joints["brazo_joint"] < 0.1 or not is_moving(arm):
-        assert time.monotonic() < end
+        assert arm.sim.now < end
         arm.stream({"brazo_joint": 0.6})
     assert arm.move(named="home").status.name == "SUCCEEDED"
     motion = arm.start(named="left", speed=0.1)
@@ -166,13 +158,13 @@ def test_a_plan_waits_for_an_arm_that_is_just_coming_to_rest_but_not_for_one_tha
     arm.stop()
 
 
-def stream_until_it_is_over(arm: gemelo.Arm, motion: gemelo.Motion) -> None:
+def stream_until_it_is_over(arm: SimulatedArm, motion: gemelo.Motion) -> None:
     while not motion.is_over:
         arm.stream({"brazo_joint": 0.2})
-        time.sleep(0.02)
+        arm.sim.sleep(0.02)
 
 
-def test_two_connections_of_one_script_do_not_disturb_one_another(arm: gemelo.Arm) -> None:
+def test_two_connections_of_one_script_do_not_disturb_one_another(arm: SimulatedArm) -> None:
     with gemelo.connect() as second:
         assert second.node.name != arm.node.name
         second.move(named="home")
@@ -182,47 +174,7 @@ def test_two_connections_of_one_script_do_not_disturb_one_another(arm: gemelo.Ar
     assert arm.device.status.online
 
 
-def test_it_works_where_an_event_loop_runs_as_in_a_notebook(arm: gemelo.Arm) -> None:
-    async def cell() -> dict[str, float]:
-        motion = arm.move(joints={"brazo_joint": 0.1})
-        await asyncio.sleep(0)
-        return motion.stopped_at
-
-    with ThreadPoolExecutor(1) as pool:  # in this one a browser's library may have a loop of its own
-        stopped_at = pool.submit(asyncio.run, cell()).result(60.0)
-    assert stopped_at == pytest.approx(arm.joints, abs=1e-9)
-
-
-def test_it_works_line_by_line_and_ends_with_the_prompt(twin: Stack) -> None:
-    lines = "import gemelo\narm = gemelo.connect()\narm.name\narm.move(named='home')\nsorted(arm.joints)[0]\n"
-    with script(twin, "", "-i", "-q") as process:
-        code, output, _ = ended(process, lines)
-    assert code == 0
-    first, moved, joint = output.splitlines()
-    assert (first, joint) == ("'rm1'", "'antebrazo_joint'")
-    assert moved.startswith("<Motion rm1: named='home', succeeded in")
-
-
-def test_a_forked_process_is_told_to_connect_anew_and_both_end(twin: Stack) -> None:
-    text = """
-    import os, gemelo
-    arm = gemelo.connect()
-    arm.joints
-    if os.fork() == 0:
-        try:
-            arm.joints
-        except gemelo.Error as error:
-            print(error, flush=True)
-        os._exit(7)
-    print(os.waitstatus_to_exitcode(os.wait()[1]), len(arm.joints), flush=True)
-    """
-    with script(twin, text) as process:
-        assert said(process).endswith("a forked process calls gemelo.connect() anew")
-        assert said(process) == "7 3"
-        assert ended(process)[0] == 0
-
-
-def test_waiting_in_a_handler_is_refused_instead_of_hanging(arm: gemelo.Arm) -> None:
+def test_waiting_in_a_handler_is_refused_instead_of_hanging(arm: SimulatedArm) -> None:
     said: list[str] = []
 
     def handler(message: object) -> None:
@@ -232,14 +184,12 @@ def test_waiting_in_a_handler_is_refused_instead_of_hanging(arm: gemelo.Arm) -> 
             said.append(str(error))
 
     arm.node.subscribe(gemelo.topics.JOINT_STATES, handler)
-    end = time.monotonic() + 5.0
-    while not said and time.monotonic() < end:
-        time.sleep(0.01)
+    assert arm.wait_for(lambda: bool(said), 5.0)
     assert "cannot be called where messages are handled" in said[0]
 
 
 def test_ctrl_c_while_the_answer_to_a_homing_is_on_its_way_stops_it(
-    arm: gemelo.Arm, monkeypatch: pytest.MonkeyPatch
+    arm: SimulatedArm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     command = type(arm.device).command
 
@@ -256,34 +206,3 @@ def test_ctrl_c_while_the_answer_to_a_homing_is_on_its_way_stops_it(
     assert stopped.value.homing.homed == ()
     assert "stopped" in stopped.value.homing.reason
     assert arm.device.mode is gemelo.DeviceMode.UNREFERENCED
-
-
-def test_another_arm_than_the_twin_s_is_named(twin: Stack) -> None:
-    with pytest.raises(
-        gemelo.Lost, match=r'no stepper_gateway of parol6 .*; there is rm1: gemelo\.connect\("rm1"\)'
-    ) as lost:
-        gemelo.connect("parol6")
-    assert lost.value.robots == gemelo.robots() == ("rm1",)
-    with pytest.raises(gemelo.BadArgument, match='there is no arm "parol"; did you mean "parol6"'):
-        gemelo.connect("parol")
-
-
-def test_a_gateway_that_dies_is_lost_within_seconds_and_the_arm_goes_on_when_it_is_back(
-    twin: Stack, arm: gemelo.Arm
-) -> None:
-    arm.move(named="home")
-    motion = arm.start(named="left", speed=0.3)
-    twin.kill("stepper_gateway")
-    began = time.monotonic()
-    with pytest.raises(gemelo.Lost):
-        motion.wait()
-    assert time.monotonic() - began < 5.0
-    twin.wait_ready(20.0, ["stepper_gateway"])
-    assert arm.device.status.online
-
-
-def test_a_planner_that_is_away_is_lost_with_its_name(twin: Stack, arm: gemelo.Arm) -> None:
-    twin.kill("planner")
-    with pytest.raises(gemelo.Lost, match="planner"):
-        arm.plan(named="left", allowed_time=0.1)
-    twin.wait_ready(20.0, ["planner"])

@@ -1,17 +1,12 @@
-"""Programs on the whole stack of rm1: taught, checked, run without a pause between legs, and under a person's hand."""
+"""Programs on a simulated rm1: taught, checked, run without a pause between legs, and under a person's hand."""
 
 from __future__ import annotations
 
 import doctest
 import inspect
-import json
-import os
 import re
-import signal
-import subprocess
-import sys
+import runpy
 import threading
-import time
 from collections import UserDict
 from collections.abc import Iterator
 from pathlib import Path
@@ -42,11 +37,10 @@ from gemelo.programs import (
     export_script,
 )
 from gemelo.programs.steps import AnyStep
+from gemelo.simulation import SimulatedArm
 from schemas.device import DeviceMode, DeviceState
-from services.stack.stack import Stack
-from tests.gemelo.conftest import make_ready
 from tests.gemelo.test_docstrings import OPTIONS
-from tests.gemelo.test_unwatched import is_moving, rests
+from tests.simulated import is_moving, make_ready, rests
 
 LONGEST = 60.0  # [s] of one program here
 ONE_STEP = 0.013  # [rad] or more than that in [m], of the coarsest joint
@@ -56,7 +50,7 @@ SHUTTLE = (Repeat(count=3, steps=(Go(state="left"), Go(state="ready"))),)
 class Cell:
     """The arm with an empty folder of programs, and everything that a run has said."""
 
-    def __init__(self, arm: gemelo.Arm, folder: Path) -> None:
+    def __init__(self, arm: SimulatedArm, folder: Path) -> None:
         self.arm, self.folder = arm, folder
         self.points, self.programs = Points.load(folder, arm.description), Programs(folder)
         self.states: list[RunState] = []
@@ -69,24 +63,14 @@ class Cell:
         """Until the run is at that step, and the arm on its way."""
         assert self.arm.wait_for(lambda: run.state.step == path, LONGEST)
         if moving:
-            end = time.monotonic() + 5.0
-            while not is_moving(self.arm):
-                assert time.monotonic() < end
+            assert self.arm.wait_for(lambda: is_moving(self.arm), 5.0)
 
 
 @pytest.fixture
-def cell(arm: gemelo.Arm, tmp_path: Path) -> Iterator[Cell]:
+def cell(arm: SimulatedArm, tmp_path: Path) -> Iterator[Cell]:
     arm.move(named="ready")
     yield Cell(arm, tmp_path)
     make_ready(arm)
-
-
-def cli(twin: Stack, folder: Path, *words: str) -> subprocess.Popen[str]:
-    environment = {**twin.environment, "GEMELO_PATHS_PROGRAMS": str(folder)}
-    command = [sys.executable, "-u", "-m", "services.cli.main", "program", *words]
-    return subprocess.Popen(
-        command, cwd=twin.root, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
 
 
 NAMES = [name for name in gemelo.programs.__all__ if ">>>" in (inspect.getdoc(getattr(gemelo.programs, name)) or "")]
@@ -104,7 +88,7 @@ def test_an_example_in_a_docstring_does_what_it_shows(name: str, arm: gemelo.Arm
 
 
 def test_three_points_are_taught_run_changed_and_run_again_and_the_script_ends_there_too(
-    cell: Cell, twin: Stack
+    cell: Cell,
 ) -> None:
     arm, points = cell.arm, cell.points
     for name, angle in (("one", 0.2), ('it\'s "two"', 0.4), ("three", 0.7)):
@@ -126,10 +110,7 @@ def test_three_points_are_taught_run_changed_and_run_again_and_the_script_ends_t
     assert ended["brazo_joint"] == pytest.approx(-0.3, abs=ONE_STEP)
     (cell.folder / "job.py").write_text(export_script(Program("job", steps), points))
     arm.move(named="home")
-    command = [sys.executable, str(cell.folder / "job.py")]
-    subprocess.run(
-        command, cwd=twin.root, env={**twin.environment, "PYTHONPATH": str(twin.root)}, check=True, timeout=90
-    )
+    runpy.run_path(str(cell.folder / "job.py"), run_name="__main__")
     assert arm.joints == ended
 
 
@@ -278,9 +259,7 @@ def test_an_emergency_stop_fails_it_with_step_and_reason_and_a_person_starts_it_
     cell.arm.device.reset()
     assert rests(cell.arm, 0.2)
     assert run.state == state
-    end = time.monotonic() + 5.0
-    while all(cell.arm.device.state.referenced):  # until it says that the e-stop has cost it its reference
-        assert time.monotonic() < end
+    assert cell.arm.wait_for(lambda: not all(cell.arm.device.state.referenced), 5.0), "the e-stop costs its reference"
     make_ready(cell.arm)
     run.start(state.step)
     assert run.wait(LONGEST).status is RunStatus.DONE
@@ -333,97 +312,3 @@ def test_a_sensor_is_waited_for_and_its_time_runs_out(cell: Cell) -> None:
     again = cell.run(WaitFor(sensor="ultra", below=1.0, timeout=0.3))
     again.start()
     assert again.wait(10.0).message.endswith("not below 1, after 0.3 s")
-
-
-def test_a_gateway_that_dies_fails_it_with_its_step(cell: Cell, twin: Stack) -> None:
-    run = cell.run(*SHUTTLE)
-    run.start()
-    cell.await_step(run, (0, 1))
-    twin.kill("stepper_gateway")
-    state = run.wait(10.0)
-    assert state.status is RunStatus.FAILED
-    assert state.message.startswith("step 1.2, round 1 (go state='ready'): ")
-    twin.wait_ready(20.0, ["stepper_gateway"])
-    assert rests(cell.arm, 5.0)
-
-
-def test_a_planner_that_dies_fails_it_with_its_step_or_is_back_in_time(cell: Cell, twin: Stack) -> None:
-    run = cell.run(*SHUTTLE)
-    run.start()
-    cell.await_step(run, (0, 0))
-    twin.kill("planner")
-    state = run.wait(LONGEST)
-    twin.wait_ready(20.0, ["planner"])
-    assert rests(cell.arm, 5.0)
-    if state.status is RunStatus.FAILED:
-        assert "planner" in state.message
-        run.start(state.step)
-        assert run.wait(LONGEST).status is RunStatus.DONE
-    assert cell.arm.joints == pytest.approx(cell.arm.states["ready"], abs=ONE_STEP)
-
-
-def test_a_script_that_is_killed_leaves_an_arm_that_decelerates_and_nothing_begins_again(
-    cell: Cell, twin: Stack
-) -> None:
-    Program("job", SHUTTLE).save(cell.folder)
-    with cli(twin, cell.folder, "run", "job") as process:
-        cell.arm.wait_for(lambda: False, 0.1)
-        assert process.stdout is not None
-        assert process.stdout.readline().startswith("step 1.1, round 1: go state='left'")
-        assert process.stdout.readline().startswith("step 1.2, round 1: go state='ready'")
-        process.kill()
-        process.wait()
-    assert rests(cell.arm, 3.0)
-    with cli(twin, cell.folder, "list", "--json") as process:
-        listed = json.loads(process.communicate(timeout=30)[0])
-    assert listed["programs"] == [{"name": "job", "steps": 3, "robot": "", "mistakes": []}]
-    assert rests(cell.arm, 0.1)
-
-
-def test_ctrl_c_decelerates_and_says_where_it_stopped(cell: Cell, twin: Stack) -> None:
-    Program("job", SHUTTLE).save(cell.folder)
-    with cli(twin, cell.folder, "run", "job", "--from", "1.2") as process:
-        assert process.stdout is not None
-        while not process.stdout.readline().startswith("step 1.1, round 2: go state='left'"):
-            pass
-        while not is_moving(cell.arm):
-            pass
-        process.send_signal(signal.SIGINT)
-        output, errors = process.communicate(timeout=20)
-    assert (process.returncode, errors) == (130, "")
-    assert "job: stopped: stopped in step 1.1, round 2 (go state='left'); the arm is at brazo_joint " in output
-    assert output.endswith("go on with: gemelo program run job --from 1.1\n")
-    assert rests(cell.arm, 0.2)
-
-
-def test_the_commands_check_run_and_export(cell: Cell, twin: Stack) -> None:
-    Program("job", (Go(state="left"), Go(position=(0.7, 0.0, 0.1)))).save(cell.folder)
-    Program("fine", (Go(state="left"), Go(state="ready"))).save(cell.folder)
-    (cell.folder / "bad.toml").write_text("version = 1\nsteps = [{do = 'go', state = 'redy'}]\n")
-    ended = {}
-    for words in (
-        ("check", "job"), ("check", "fine", "--json"), ("run", "fine", "--json"), ("run", "bad"), ("run", "fin"),
-        ("run", "fine", "--from", "9"), ("run", "a/b"), ("export", "fine", str(cell.folder / "fine.py")),
-        ("export", "fine", str(cell.folder / "no" / "fine.py")),
-    ):  # fmt: skip
-        with cli(twin, cell.folder, *words) as process:
-            output, errors = process.communicate(timeout=LONGEST)
-            ended[words[:2] + words[2:3] * (words[0] == "run")] = (process.returncode, output, errors)
-            assert "Traceback" not in errors
-    code, output, _ = ended["check", "job"]
-    assert code == 1
-    assert "2: go position=(0.7, 0, 0.1): refused (reach)" in output
-    code, output, _ = ended["check", "fine"]
-    assert (code, json.loads(output)["ok"]) == (0, True)
-    code, output, _ = ended["run", "fine", "--json"]
-    assert (code, json.loads(output)["status"]) == (0, "done"), ended
-    code, _, errors = ended["run", "bad"]
-    assert code == 1
-    assert f'{cell.folder / "bad.toml"}, line 2: step 1: rm1 has no named state "redy"; did you mean "ready"?' in errors
-    assert (ended["run", "fin"][0], 'did you mean "fine"?' in ended["run", "fin"][2]) == (2, True)
-    assert ended["run", "fine", "--from"][0] == 2
-    assert 'program "fine" has no step 9: it has 2' in ended["run", "fine", "--from"][2]
-    assert ended["run", "a/b"][0] == 2
-    assert (cell.folder / "fine.py").read_text() == export_script(cell.programs["fine"], {})
-    assert ended["export", "fine"][0] == 2
-    assert os.listdir(cell.folder).count("fine.py") == 1

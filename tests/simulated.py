@@ -1,0 +1,70 @@
+"""A simulated twin, as scripts find it that call `gemelo.connect()` in the tests' process."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import gemelo
+from gemelo.simulation import SimulatedArm
+from schemas.topics import DEVICE_SHAFT
+
+NUMBERS = itertools.count(2)
+STANDS = 0.5  # [s] for which an arm that rests does not move
+
+
+@contextmanager
+def found_by_connect(arm: SimulatedArm) -> Iterator[None]:
+    """`gemelo.connect()` gives another connection to this arm, and `gemelo.robots()` its name."""
+
+    def connect(robot: object = "", *, name: str = "", **others: Any) -> gemelo.Arm:
+        if robot and Path(str(robot)).name != arm.name:
+            raise gemelo.Lost(f"no stepper_gateway of {robot} here; there is {arm.name}", (arm.name,))
+        return arm.sim.connect(name or f"script-{next(NUMBERS)}")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gemelo, "connect", connect)
+        patch.setattr(gemelo, "robots", lambda *_: (arm.name,))
+        yield
+
+
+def make_ready(arm: gemelo.Arm) -> None:
+    """Does what a person would do after whatever a test has left."""
+    if arm.device.mode is gemelo.DeviceMode.HOLD:
+        arm.stop()
+    if not arm.device.state.armed:
+        arm.device.arm()
+    if not all(arm.device.state.referenced):
+        arm.reference(where_it_stands(arm))
+    arm.speed(1.0)
+    arm.scene.clear()
+
+
+def where_it_stands(arm: gemelo.Arm) -> dict[str, float]:
+    """A person looks at the arm before declaring: a virtual one says where its shafts are."""
+    latest = arm.node.latest(DEVICE_SHAFT)
+    assert arm.wait_for(lambda: latest.message is not None, 5.0)
+    shaft, joint = latest.message, arm.description.joint
+    assert shaft is not None
+    return {name: joint(name).clamp(at) for name, at in zip(shaft.name, shaft.position, strict=True)}
+
+
+def is_moving(arm: gemelo.Arm) -> bool:
+    return any(abs(speed) > 1e-3 for speed in arm.velocities.values())
+
+
+def rests(arm: SimulatedArm, timeout: float) -> bool:
+    """True if it stands for half a second on end, from `timeout` [s] of its time on at the latest."""
+    end, stood = arm.sim.now + timeout, arm.sim.now
+    while arm.sim.now - stood < STANDS:
+        arm.sim.sleep(0.02)
+        if is_moving(arm):
+            stood = arm.sim.now
+        if stood > end:
+            return False
+    return True
