@@ -40,8 +40,9 @@ def become(command: Sequence[str], section: MqttSection, beat: Callable[[], None
     # Held open by the broker, never written: its end is seen by the companion whatever way it ends.
     os.set_inheritable(held, True)
     _allow_files()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    with contextlib.suppress(OSError):  # a disk that is full takes no words
+        sys.stdout.flush()
+        sys.stderr.flush()
     os.execv(command[0], list(command))
 
 

@@ -27,11 +27,17 @@ from services.chaos.injections import (
     released,
     restarted,
     resumed,
+    run_folder_freed,
+    run_folder_full,
+    run_folder_read_only,
+    run_folder_writable,
     slipped,
     slowed,
     stalled,
     stopped,
     thawed,
+    with_descriptors,
+    without_descriptors,
     worker_killed,
 )
 
@@ -102,6 +108,10 @@ FAULTS: tuple[Fault, ...] = (
           slips=True),
     Fault("slipping joint", "its shaft slips", slipped, slips=True),
     Fault("disk full", "the logger cannot write", disk_full, LONG, disk_freed, mutes=True),
+    Fault("run folder full", "no process can write a file of its own", run_folder_full, LONG, run_folder_freed),
+    Fault("run folder read-only", "its disk has failed", run_folder_read_only, LONG, run_folder_writable),
+    Fault("no descriptors", "a process gets no file, socket or pipe", without_descriptors, LONG, with_descriptors,
+          mutes=True),
     Fault("stop", "a person's stop", stopped),
     Fault("hold", "a person's hold, and go on", held, SHORT, resumed),
 )  # fmt: skip

@@ -13,6 +13,7 @@ from random import Random
 import psutil
 
 import gemelo
+from services.chaos.descriptors import give_descriptors, take_descriptors
 from services.chaos.site import ChaosSite, program
 from services.stack.stack import StackError
 
@@ -159,6 +160,52 @@ def disk_freed(site: ChaosSite) -> None:
     with suppress(StackError, ProcessLookupError):
         unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
         resource.prlimit(site.stack.pid("logger"), resource.RLIMIT_FSIZE, unlimited)
+
+
+def run_folder_full(site: ChaosSite, random: Random) -> str:
+    """No file of any process grows; without root, who has no disk of its own for it, by a limit of each process."""
+    if site.disk is not None:
+        site.disk.fill()
+    else:
+        for pid in site.stack.pids().values():
+            resource.prlimit(pid, resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
+    return "no room on the disk of the run folder"
+
+
+def run_folder_freed(site: ChaosSite) -> None:
+    if site.disk is not None:
+        site.disk.free()
+        return
+    for pid in site.stack.pids().values():
+        with suppress(ProcessLookupError):
+            resource.prlimit(pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+
+
+def run_folder_read_only(site: ChaosSite, random: Random) -> str:
+    """As Linux makes a disk that fails; without root by the folder's mode."""
+    if site.disk is not None:
+        site.disk.make_read_only()
+    else:
+        site.stack.run.chmod(0o555)
+    return "the disk of the run folder is read-only"
+
+
+def run_folder_writable(site: ChaosSite) -> None:
+    if site.disk is not None:
+        site.disk.make_writable()
+    else:
+        site.stack.run.chmod(0o755)
+
+
+def without_descriptors(site: ChaosSite, random: Random) -> str:
+    name, pid = random.choice(sorted(site.stack.pids().items()))
+    take_descriptors(pid)
+    return f"{name} gets no descriptor"
+
+
+def with_descriptors(site: ChaosSite) -> None:
+    for pid in site.stack.pids().values():
+        give_descriptors(pid)
 
 
 def clocks_stepped(of_all: bool) -> Begin:

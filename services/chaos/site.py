@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections import deque
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
@@ -24,6 +25,7 @@ from services.broker.replacement import NotInstalled
 from services.chaos.clocks import ClockError, SteppingClocks
 from services.chaos.slots import SlotFile
 from services.chaos.slow_link import SlowLink
+from services.chaos.small_disk import SmallDisk, may_mount
 from services.mqtt.client import stop_loop
 from services.runtime.actions.keys import feedback_topic, status_topic
 from services.runtime.bus.zenoh_bus import ZenohBus
@@ -85,7 +87,8 @@ class ChaosSite:
                 **(self._judged() if is_judged else {}),
             },
         )
-        SavedParameters(self.stack.run, "logger").keep({"keep_files": 0})  # none is removed: all are judged at the end
+        self.disk: SmallDisk | None = None  # of the run folder alone, while the site stands; only root may mount one
+        self._keep_all_recordings()
         self._seed = seed
         self._closing = ExitStack()
 
@@ -105,6 +108,10 @@ class ChaosSite:
         with ExitStack() as closing:
             self.link = SlowLink(self._port, self._broker_port, self._seed)
             closing.callback(self.link.close)
+            if may_mount():
+                closing.callback(shutil.rmtree, self.stack.folder, ignore_errors=True)  # after the disk has gone
+                self.disk = closing.enter_context(SmallDisk(self.stack.run))
+                self._keep_all_recordings()
             closing.enter_context(self.stack)
             os.environ.update(self.stack.deployment)  # where the arm is found
             self.arm = closing.enter_context(self._connect())
@@ -120,6 +127,10 @@ class ChaosSite:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._closing.close()
+
+    def _keep_all_recordings(self) -> None:
+        """None is removed: all are judged at the end."""
+        SavedParameters(self.stack.run, "logger").keep({"keep_files": 0})
 
     def _connect(self) -> gemelo.Arm:
         """Raises `StackError` with the reason of each process that is not ready."""

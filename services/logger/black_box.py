@@ -105,10 +105,10 @@ class BlackBoxWriter:
         )
         self._thread.start()
 
-    def wait(self) -> None:
-        """Until the file is written."""
+    def wait(self, timeout: float | None = None) -> None:
+        """Until the file is written, `timeout` [s] at most."""
         if self._thread is not None:
-            self._thread.join()
+            self._thread.join(timeout)
 
     def _save(self, incident: Incident, entries: tuple[Entry, ...], folder: Path, keep: int) -> None:
         metadata = {**self._metadata, **layout_metadata(layout_of(entries, self._cameras))}

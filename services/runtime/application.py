@@ -15,19 +15,22 @@ from services.runtime.node import Node
 from services.runtime.process.freed_memory import give_back_freed_memory
 from services.runtime.process.leaving import end_process
 from services.runtime.process.logs import LEVELS, line_logger
-from services.runtime.process.shutdown import ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
+from services.runtime.process.shutdown import GRACE, ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
 
 Run = Callable[[Node, Deployment], None]
 EXPECTED = (ConfigurationError, BusError, RequestRefused)  # a sentence says all; anything else shows where it happened
 
 
-def service(name: str, run: Run, arguments: Sequence[str] | None = None) -> NoReturn:
-    """Opens the node `name`, runs `run(node, deployment)`, and ends the process: 0 when stopped, 1 for an error."""
+def service(name: str, run: Run, arguments: Sequence[str] | None = None, grace: float = GRACE) -> NoReturn:
+    """Opens the node `name`, runs `run(node, deployment)`, and ends the process: 0 when stopped, 1 for an error.
+
+    It has `grace` [s] to stop; those who supervise it wait 5 s.
+    """
     options = _parse(name, arguments)
     stop = ShutdownRequest()
     end_with_any_thread(line_logger(name, options.log_level), lambda: stop.is_set)
     give_back_freed_memory()
-    with stop_on_signals(stop):
+    with stop_on_signals(stop, grace):
         code = _run(name, run, options, stop)
     end_soon(code)  # whatever an exit handler does
     end_process(code)

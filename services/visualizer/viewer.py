@@ -13,8 +13,9 @@ import sys
 import threading
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, TextIO
 from urllib.parse import quote
 
 from schemas.deployment import Deployment, ViewerMode, ViewerSection
@@ -64,20 +65,20 @@ def address(viewer: ViewerSection, mode: ViewerMode) -> str:
 def run(deployment: Deployment, memory: str, stopping: threading.Event) -> int:
     """Keep the viewer and its readiness until asked to stop; returns the exit code."""
     run_folder = project_root() / deployment.paths.run
-    unwritten = UnwrittenFiles(lambda said: print(f"viewer: {said}", flush=True))
+    unwritten = UnwrittenFiles(lambda said: say(f"viewer: {said}"))
     readiness = Readiness(run_folder, "viewer", unwritten)
     mode = resolved(deployment.viewer.mode, os.environ)
     try:
         if mode is ViewerMode.NONE:
             return _idle(readiness, stopping)
         if warning := exposure("viewer", deployment.viewer.host, False, deployment.viewer.insecure):
-            print(f"viewer: {warning}", flush=True)
+            say(f"viewer: {warning}")
         require_free(deployment.viewer.host, deployment.viewer.port, "viewer")
         if mode is ViewerMode.WEB:
             require_free(deployment.viewer.host, deployment.viewer.web_port, "viewer", "web_port")
         code = _keep(deployment.viewer, mode, memory, readiness, stopping)
         if code and mode is not deployment.viewer.mode and mode is ViewerMode.NATIVE and not stopping.is_set():
-            print("viewer: no window could be opened; showing it in the browser instead", flush=True)
+            say("viewer: no window could be opened; showing it in the browser instead")
             return _keep(deployment.viewer, ViewerMode.WEB, memory, readiness, stopping)
         return code
     except (DeploymentError, PortTaken) as error:
@@ -86,8 +87,14 @@ def run(deployment: Deployment, memory: str, stopping: threading.Event) -> int:
         readiness.not_ready()
 
 
+def say(text: str, to: TextIO | None = None) -> None:
+    """Prints a line; that nobody takes it, as a full disk, is no reason to end."""
+    with suppress(OSError):
+        print(text, file=to, flush=True)
+
+
 def _idle(readiness: Readiness, stopping: threading.Event) -> int:
-    print("viewer: none wanted (viewer.mode is `none`)", flush=True)
+    say("viewer: none wanted (viewer.mode is `none`)")
     readiness.ready()
     while not stopping.wait(1.0):
         readiness.beat()
@@ -115,12 +122,12 @@ def _relay(errors: IO[bytes] | None) -> None:
     """Passes the program's errors on; a sender that was cut off is said in words, not in those of its protocol."""
     for line in errors or ():
         text = line.decode(errors="replace").rstrip()
-        print(CUT_OFF if "h2 protocol error" in text else text, file=sys.stderr, flush=True)
+        say(CUT_OFF if "h2 protocol error" in text else text, sys.stderr)
 
 
 def _beat(connection: ViewerConnection, readiness: Readiness, where: str) -> None:
     if connection.is_new(time.monotonic()):
-        print(f"viewer: {where}", flush=True)
+        say(f"viewer: {where}")
         readiness.ready()
     elif connection.is_alive:
         readiness.beat()
@@ -130,13 +137,13 @@ def _beat(connection: ViewerConnection, readiness: Readiness, where: str) -> Non
 
 def _ended(child: subprocess.Popen[bytes], mode: ViewerMode, age: float) -> int:
     if child.returncode == 0 and mode is ViewerMode.NATIVE and age > EARLY:
-        print("viewer: closed", flush=True)
+        say("viewer: closed")
         return 0
     return _say_error(f"viewer: the rerun program ended with code {child.returncode} after {age:.1f} s")
 
 
 def _say_error(sentence: str) -> int:
-    print(sentence, file=sys.stderr, flush=True)
+    say(sentence, sys.stderr)
     return 1
 
 

@@ -135,6 +135,52 @@ def test_a_callback_that_never_returns_does_not_keep_the_process(start: Start) -
     assert "in step" in errors
 
 
+def test_a_service_that_needs_longer_to_end_gets_its_own_time(start: Start) -> None:
+    process = start(
+        """
+        def run(node, deployment):
+            print("spins", flush=True)
+            node.spin()
+            time.sleep(2.5)  # what it has to write takes as long
+
+        service("writer", run, grace=4.0)
+        """
+    )
+    await_line(process, "spins")
+    assert end(process) == (0, "")
+
+
+@pytest.mark.parametrize("full", [True, False], ids=["a full disk", "nobody reads"])
+def test_words_that_nobody_takes_end_no_service(start: Start, tmp_path: Path, full: bool) -> None:
+    """Its log goes to a disk that is full, or into a pipe whose reader has gone."""
+    process = start(
+        f"""
+        import os
+        def run(node, deployment):
+            print("spins", flush=True)
+            out = os.open("/dev/full", os.O_WRONLY) if {full} else os.pipe()[1]
+            for number in (1, 2):
+                os.dup2(out, number)
+            node.set_ready(True)
+            count = 0
+
+            def step(now):
+                nonlocal count
+                count += 1
+                node.log.warning("word %d", count)
+                if count == 50:
+                    open({str(tmp_path / "done")!r}, "w").close()
+
+            node.spin(step)
+
+        service("talker", run)
+        """
+    )
+    await_line(process, "spins")
+    assert until((tmp_path / "done").exists, 20.0)
+    assert end(process)[0] == 0
+
+
 def test_what_a_thread_still_holds_at_the_end_is_not_called_a_leak(start: Start) -> None:
     """A thread of Zenoh or of an open link that has not ended in time has the gateway's generator of ruckig's."""
     process = start(

@@ -83,3 +83,15 @@ def test_what_starts_a_stack_of_its_own_leaves_no_process_when_it_is_terminated(
 
 def all_below(running: subprocess.Popen[str]) -> list[psutil.Process]:
     return psutil.Process(running.pid).children(recursive=True)
+
+
+def test_disks_that_refuse_and_processes_without_a_descriptor_end_no_move(tmp_path, pytestconfig):
+    command = [sys.executable, "-m", "services.chaos", "--only", "run folder", "--seed", str(SEED)]
+    done = subprocess.run(
+        [*command, "--minutes", "0.3", "--out", str(tmp_path / "out")],
+        cwd=pytestconfig.rootpath, capture_output=True, text=True, timeout=150.0,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    report = json.loads((tmp_path / "out/report.json").read_text())
+    assert {each["fault"] for each in report["episodes"]} == {"run folder full", "run folder read-only"}
+    assert [each["reason"] for each in report["episodes"] if each["ended"] != "succeeded"] == []

@@ -98,7 +98,8 @@ def plan_at_hand(planner: Planner, at_hand: AtHand) -> PlanResponse:
     try:
         return planner.plan(job.request, job.present, job.age, time.monotonic, at_hand.cancel, at_hand.watch)
     except Exception as error:
-        traceback.print_exc()
+        with suppress(OSError):  # a disk that is full takes no words
+            traceback.print_exc()
         message = f"a defect of the planner: {type(error).__name__}: {error}"
         remedy = "ask for something else, and report this with what the planner's log says"
         return PlanResponse(refusal=Refusal(check="planner", subject="worker", message=message, remedy=remedy))

@@ -112,7 +112,8 @@ class ZenohQueryable:
                     return
             self._on_query(ZenohQuery(query, self._key, principal if self._is_verified else LOCAL))
         except Exception:
-            traceback.print_exc()
+            with suppress(OSError):  # a disk that is full takes no words
+                traceback.print_exc()
 
 
 class ServerMonitor:

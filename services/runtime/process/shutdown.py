@@ -46,10 +46,10 @@ class ShutdownRequest:
 
 
 @contextmanager
-def stop_on_signals(stop: ShutdownRequest) -> Iterator[None]:
+def stop_on_signals(stop: ShutdownRequest, grace: float = GRACE) -> Iterator[None]:
     """Sets `stop` at the first signal, until the block ends; does nothing outside the main thread.
 
-    A block that has not ended `GRACE` after the signal is ended with the process, exit code 1.
+    A block that has not ended `grace` [s] after the signal is ended with the process, exit code 1.
     A second SIGINT raises KeyboardInterrupt.
     """
     if threading.current_thread() is not threading.main_thread():
@@ -59,9 +59,9 @@ def stop_on_signals(stop: ShutdownRequest) -> Iterator[None]:
     is_over = False
 
     def guard() -> None:
-        time.sleep(GRACE)
+        time.sleep(grace)
         if not is_over:
-            _end()
+            _end(grace)
 
     def on_signal(number: int, frame: FrameType | None) -> None:
         nonlocal signals
@@ -93,8 +93,7 @@ def end_with_any_thread(log: logging.Logger, is_stopping: Callable[[], bool]) ->
         error = (died.exc_type, died.exc_value or died.exc_type(), died.exc_traceback)
         log.error('the thread "%s" has died, and with it this process', name, exc_info=error)
         if not is_stopping():
-            sys.stderr.flush()
-            os._exit(1)
+            _exit(1)
 
     threading.excepthook = on_error
 
@@ -104,14 +103,20 @@ def end_soon(code: int) -> None:
 
     def guard() -> None:
         time.sleep(GRACE)
-        sys.stderr.flush()
-        os._exit(code)
+        _exit(code)
 
     _thread.start_new_thread(guard, ())
 
 
-def _end() -> None:
-    print(f"did not stop within {GRACE:g} s: ended where it stands:", file=sys.stderr)
-    faulthandler.dump_traceback(file=sys.stderr)
-    sys.stderr.flush()
+def _exit(code: int) -> None:
+    with suppress(OSError):
+        sys.stderr.flush()
+    os._exit(code)
+
+
+def _end(grace: float) -> None:
+    with suppress(OSError):  # nobody, or a full disk, takes the words
+        print(f"did not stop within {grace:g} s: ended where it stands:", file=sys.stderr)
+        faulthandler.dump_traceback(file=sys.stderr)
+        sys.stderr.flush()
     os._exit(1)

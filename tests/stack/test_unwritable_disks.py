@@ -1,0 +1,136 @@
+"""A disk that is full or read-only, and processes without a descriptor, in the middle of a move: the arm goes on."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+import pytest
+
+from schemas.actions import GoalStatusCode
+from services.chaos.descriptors import give_descriptors, take_descriptors
+from services.chaos.small_disk import SmallDisk
+from services.cli.errors import ExitCode
+from services.stack.stack import Stack
+from tests.optional import need, need_mounts
+from tests.stack.gemelo import gemelo
+from tests.stack.person import Operator, jumps
+
+SPEED = 0.3  # slow enough that all of a fault falls into the move
+OF_THE_ARM = ("router", "broker", "virtual_esp32", "stepper_gateway")
+PROCESSES = (*OF_THE_ARM, "planner", "state_publisher", "logger", "panel")
+NO_DESCRIPTORS = "no descriptors"
+FAULTS = ("full", "read-only", NO_DESCRIPTORS)
+
+
+class Site:
+    """A stack whose run folder and recordings have a disk of their own each."""
+
+    def __init__(self, stack: Stack, run: SmallDisk, out: SmallDisk) -> None:
+        self.stack, self._run, self._out = stack, run, out
+
+    @contextmanager
+    def fault(self, name: str) -> Iterator[None]:
+        """Lasts until the end of the block."""
+        with ExitStack() as healing:
+            match name:
+                case "full":
+                    for disk in (self._run, self._out):
+                        healing.callback(disk.free)
+                        disk.fill()
+                case "read-only":
+                    healing.callback(self._run.make_writable)
+                    self._run.make_read_only()
+                case _:
+                    for pid in self.stack.pids().values():
+                        healing.callback(give_descriptors, pid)
+                        take_descriptors(pid)
+            yield
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory) -> Iterator[Site]:
+    need("mosquitto")
+    need_mounts()
+    folder = tmp_path_factory.mktemp("disks")
+    stack = Stack(broker="mosquitto", panel=True, out=folder / "out", processes=PROCESSES)
+    with SmallDisk(stack.run) as run, SmallDisk(folder / "out") as out, stack:
+        yield Site(stack, run, out)
+
+
+@pytest.fixture
+def stack(site: Site) -> Stack:
+    return site.stack
+
+
+def begin(operator: Operator):
+    """A move that is under way, and its plan."""
+    plan = operator.plan(SPEED)
+    handle = operator.send(plan)
+    assert operator.wait_for(lambda: handle.feedback is not None and handle.feedback.elapsed > 0.1, 10.0)
+    return handle, plan
+
+
+def require_success(outcome) -> None:
+    assert outcome.status is GoalStatusCode.SUCCEEDED, outcome
+    assert outcome.result.executed_steps == outcome.result.commanded_steps
+
+
+def doctor(stack: Stack) -> str:
+    return gemelo(stack, "doctor", code=ExitCode.FAILED)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_move_goes_on_to_the_step_and_a_stop_works_and_nobody_is_started_anew(site, stack, operator, fault):
+    before = stack.pids()
+    handle, plan = begin(operator)
+    with site.fault(fault):
+        require_success(handle.wait(plan.duration + 10.0))
+        assert operator.wait_for(lambda: all(map(stack.is_ready, PROCESSES)), 10.0), stack.why_not_ready()
+        if fault == NO_DESCRIPTORS:
+            handle, plan = begin(operator)  # a stop by a client that was there before: no new one gets in
+            assert operator.stop().accepted
+        else:
+            said = doctor(stack)
+            assert "folder run" in said
+            handle, plan = begin(operator)
+            gemelo(stack, "stop")
+        assert handle.wait(10.0).status is not GoalStatusCode.SUCCEEDED
+        assert stack.pids() == before
+    stack.wait_ready(20.0)
+    assert stack.pids() == before
+    assert not jumps(operator.arm, operator.seen)
+    outcome, _ = operator.move_again()
+    require_success(outcome)
+    assert all((stack.run / f"{name}.ready").exists() for name in PROCESSES)
+
+
+@pytest.mark.parametrize("fault", ["full", "read-only"])
+@pytest.mark.parametrize("name", OF_THE_ARM)
+def test_what_moves_and_stops_the_arm_also_starts_while_the_disk_refuses(site, stack, operator, fault, name):
+    with site.fault(fault):
+        stack.kill(name, signal.SIGTERM)
+        assert operator.wait_for(lambda: not stack.is_ready(name), 10.0)
+        stack.wait_ready(20.0, OF_THE_ARM)
+        outcome, _ = operator.move_again()
+        require_success(outcome)
+        assert "folder run" in doctor(stack)
+    stack.wait_ready(20.0)
+
+
+def test_a_gateway_without_a_descriptor_outlives_its_broker_and_comes_back_with_the_first_one(stack, operator):
+    gateway = stack.pid("stepper_gateway")
+    take_descriptors(gateway)
+    try:
+        stack.kill("broker")
+        assert operator.wait_for(lambda: not stack.is_ready("stepper_gateway"), 10.0)
+        stack.wait_ready(20.0, ["broker"])
+        operator.wait_for(lambda: False, 3.0)  # some attempts
+        assert stack.pid("stepper_gateway") == gateway
+    finally:
+        give_descriptors(gateway)
+    stack.wait_ready(20.0)
+    assert stack.pid("stepper_gateway") == gateway
+    outcome, _ = operator.move_again()
+    require_success(outcome)
