@@ -28,6 +28,7 @@ from services.planner.workers import workers as module
 from services.planner.workers.jobs import Job
 from services.planner.workers.process import PlannerProcess
 from services.planner.workers.workers import Workers
+from tests.descriptors import few_descriptors
 from tests.planner.native.scenes import star_mesh, stl_of
 from tests.planner.processes import planning_processes
 
@@ -70,6 +71,20 @@ def test_a_plan_comes_out_of_a_process_and_tells_where_its_time_went(stack: Stac
     assert response.times.timing > 0.0
     assert response.scene_version == 1
     assert len(planning_processes()) == 1
+
+
+def test_a_process_that_dies_while_no_other_can_be_started_is_replaced_as_soon_as_one_can(stack: Stack):
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    (process,) = planning_processes()
+    with few_descriptors():
+        os.kill(process.pid, signal.SIGKILL)
+        stack.ask(EASY)
+        refused = stack.answer()
+    assert refused.refusal is not None
+    assert "no other can be started now: Too many open files" in refused.refusal.message
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
 
 
 def test_a_change_of_the_scene_reaches_the_process(stack: Stack):
