@@ -2,22 +2,38 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
+from bed_firmware import Bed, open_bed, wait_for
 
 from firmware.platform.host.memory import PositionStore, StoredPosition
+from services.chaos.descriptors import give_descriptors, take_descriptors
 from services.runtime.process import unwritten as attempts
+from services.runtime.process.readiness import says_ready
 from services.runtime.process.unwritten import UnwrittenFiles
 from tests.disks import WAYS, Disk, refusing_disk
 
 REFERENCE = (0, 0, 0)
+NO_DESCRIPTORS = "no descriptors"
 
 
 @pytest.fixture(params=WAYS)
 def disk(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Disk]:
     with refusing_disk(request.param, tmp_path / "run") as disk:
+        yield disk
+
+
+@contextmanager
+def trouble(way: str, folder: Path) -> Iterator[Disk]:
+    """A disk that refuses in this way; a sound one where the process gets no descriptors."""
+    if way == NO_DESCRIPTORS:
+        yield Disk(folder, lambda: None, lambda: None)
+        return
+    with refusing_disk(way, folder) as disk:
         yield disk
 
 
@@ -73,3 +89,51 @@ def test_a_device_that_wakes_on_a_read_only_disk_does_not_believe_what_may_be_ol
         disk.refuse()
         woken = store(disk).wake(REFERENCE)
         assert (woken.referenced, woken.shaft, woken.reset_cause) == (False, (100, 0, 0), "memory_unwritable")
+
+
+def stored(bed: Bed) -> object:
+    """The steps that the board's file has; None where there is none, or nothing in it."""
+    with suppress(OSError, ValueError):
+        return bed.memory()["steps"]
+    return None
+
+
+@pytest.mark.parametrize("way", [*WAYS, NO_DESCRIPTORS])
+def test_a_device_that_moves_goes_on_while_it_can_write_nothing_and_keeps_its_position_afterwards(
+    tmp_path: Path, way: str
+) -> None:
+    with trouble(way, tmp_path / "run") as disk, open_bed(tmp_path) as bed:
+        bed.start_device()
+        process = bed.process
+        assert process is not None
+        with bed.beating():
+            assert bed.move(400, 1.0)[20] == 0
+            if way == NO_DESCRIPTORS:
+                take_descriptors(process.pid)
+            disk.refuse()
+            assert bed.event("finished")["stream"] == 1
+            assert bed.move(100, 1.0, start=400, stream=2)[20] == 0
+            assert bed.event("finished")["stream"] == 2
+        wait_for(lambda: says_ready(disk.folder, "virtual_esp32"), "readiness")
+        disk.take()
+        give_descriptors(process.pid)
+        wait_for(lambda: stored(bed) == [100, 0, 0], "the position on the disk")
+        assert process.poll() is None
+        assert bed.end_device(signal.SIGTERM) == 0
+        bed.start_device()
+        assert bed.status["referenced"] is True
+
+
+@pytest.mark.parametrize("way", ["full", "read-only"])
+def test_a_device_starts_on_a_disk_that_refuses_and_says_what_it_cannot_write(tmp_path: Path, way: str) -> None:
+    with trouble(way, tmp_path / "run") as disk, open_bed(tmp_path) as bed:
+        disk.refuse()
+        bed.start_device()
+        wait_for(lambda: says_ready(disk.folder, "virtual_esp32"), "readiness")
+        with bed.beating():
+            assert bed.move(200, 0.5)[20] == 0
+            assert bed.event("finished")["stream"] == 1
+        for what in ("the readiness of virtual_esp32 in", "the position of rm1 in"):
+            assert bed.log.count(what) == 1, bed.log
+        disk.take()
+        wait_for(lambda: stored(bed) == [200, 0, 0], "the position on the disk")

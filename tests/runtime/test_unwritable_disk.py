@@ -6,6 +6,7 @@ import os
 import resource
 import socket
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 
@@ -13,9 +14,11 @@ import pytest
 
 from services.runtime.deployment import project_root
 from services.runtime.process.beat_socket import newest_beat
-from services.runtime.process.readiness import Readiness, says_ready
+from services.runtime.process.readiness import Readiness, is_fresh, says_ready
 from services.runtime.process.unwritten import UnwrittenFiles
 from tests.disks import WAYS, Disk, refusing_disk
+from tests.optional import need
+from tests.runtime.support import free_port, until
 
 
 @pytest.fixture(params=WAYS)
@@ -33,7 +36,7 @@ def probe(folder, *words: str) -> subprocess.CompletedProcess[str]:
 
 def grow_old(folder) -> None:
     """The files that the process has written before count no more."""
-    for file in folder.glob("gateway.*") if folder.is_dir() else ():
+    for file in folder.glob("*.*") if folder.is_dir() else ():
         os.utime(file, (time.time() - 9.0,) * 2)
 
 
@@ -122,3 +125,36 @@ def test_systemd_hears_of_a_beat_without_a_free_descriptor(tmp_path, monkeypatch
         finally:
             resource.setrlimit(resource.RLIMIT_NOFILE, limits)
         assert systemd.recv(100).startswith(b"WATCHDOG=1")
+
+
+@pytest.mark.parametrize("process", ["router", "broker amqtt", "broker mosquitto"])
+def test_router_and_broker_start_while_the_disk_refuses_and_live_on_when_it_begins_to(disk, process):
+    name, _, broker = process.partition(" ")
+    if broker == "mosquitto":
+        need("mosquitto")
+    port = free_port()
+    environ = os.environ | {
+        f"GEMELO_{'ROUTER' if name == 'router' else 'MQTT'}_PORT": str(port),
+        "GEMELO_MQTT_BROKER": broker or "amqtt",
+        "GEMELO_PATHS_RUN": str(disk.folder),
+    }
+    module = "services.runtime.router" if name == "router" else "services.broker.main"
+    disk.refuse()
+    running = subprocess.Popen([sys.executable, "-m", module], cwd=project_root(), env=environ)
+    try:
+        assert until(lambda: says_ready(disk.folder, name), 30.0)
+        socket.create_connection(("127.0.0.1", port), 5.0).close()
+        disk.take()
+        assert until(lambda: (disk.folder / f"{name}.ready").exists(), 10.0)
+        disk.refuse()
+        if disk.folder.is_dir() and os.access(disk.folder, os.W_OK):  # a full disk lets a file be touched that is there
+            grow_old(disk.folder)
+            assert until(lambda: is_fresh(disk.folder / f"{name}.ready"), 10.0)
+        else:
+            assert until(lambda: newest_beat(disk.folder, name, 3.0) == "ready", 10.0)
+        assert running.poll() is None
+        running.terminate()
+        assert running.wait(10.0) == 0
+    finally:
+        running.kill()
+        running.wait()
