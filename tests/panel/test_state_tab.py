@@ -1,7 +1,8 @@
-"""The numbers of the tab State that no counter knows: what the shafts of a virtual device have made."""
+"""What the tab State shows that no counter knows: the shafts of a virtual device, and a disk that refuses."""
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 from schemas.device import ShaftPositions
@@ -27,3 +28,17 @@ def test_the_shafts_of_a_virtual_device_stand_beside_its_counters_and_a_real_one
         page.draw(5)
         assert "true shaft" in shown.state.joints.content
         assert ">10<" in shown.state.joints.content
+
+
+def test_a_disk_that_refuses_stands_on_the_page_until_it_takes_files_again(tmp_path: Path):
+    with memory_page("rm1", tmp_path) as page:
+        unwritten = page.panel.operator.arm.node.unwritten
+        [shown] = page.panel.pages()
+        page.draw(5)
+        assert ">Disk<" not in shown.state.tool.content
+        unwritten.failed("the readiness of panel", OSError(errno.ENOSPC, "No space left on device"))
+        page.draw(5)
+        assert "the readiness of panel cannot be written (No space left on device)" in shown.state.tool.content
+        unwritten.written("the readiness of panel")
+        page.draw(5)
+        assert ">Disk<" not in shown.state.tool.content

@@ -250,6 +250,8 @@ ENGLISH: dict[str, str] = {
     "shaft": "true shaft",
     "turned": "Roll, pitch, yaw",
     "browser": "This browser",
+    "disk": "Disk",
+    "disk_refuses": "the arm goes on, but {what}",
     "dark": "Dark colours",
     # why something cannot be done now
     "reason_device_silent": "the device says nothing",

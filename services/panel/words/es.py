@@ -252,6 +252,8 @@ SPANISH: dict[str, str] = {
     "shaft": "eje real",
     "turned": "Alabeo, cabeceo, guiñada",
     "browser": "Este navegador",
+    "disk": "Disco",
+    "disk_refuses": "el brazo sigue, pero {what}",
     "dark": "Colores oscuros",
     # why something cannot be done now
     "reason_device_silent": "el equipo no dice nada",

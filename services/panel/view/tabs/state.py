@@ -75,6 +75,8 @@ class StateTab:
         rows += [(esc(name), f"{value:.4g} {esc(units.get(name, ''))}") for name, value in readings.sensors.items()]
         if browser is not None:
             rows.append((esc(words("browser")), f"{browser.rate:.0f} fps, {1000 * lag:.0f} ms"))
+        if unwritten := self._operator.arm.node.unwritten.sentence:  # of the page's own process
+            rows.append((esc(words("disk")), esc(words("disk_refuses", what=unwritten))))
         return rows
 
 
