@@ -96,9 +96,15 @@ def _write(path: Path, rows: Array) -> None:
     np.save(packed, rows, allow_pickle=False)
     content = packed.getvalue()
     try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".", delete=False) as beside:
-            beside.write(hashlib.sha256(content).digest() + content)
-        os.replace(beside.name, path)
+        handle, beside = tempfile.mkstemp(dir=path.parent, prefix=".")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(hashlib.sha256(content).digest() + content)
+            os.replace(beside, path)
+        except OSError:
+            with suppress(OSError):
+                os.unlink(beside)
+            raise
         _prune(path.parent)
     except OSError as error:
         log.warning("%s cannot be written (%s): it is made again at the next start", path, error.strerror)

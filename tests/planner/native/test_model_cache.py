@@ -25,6 +25,7 @@ from services.planner.native.native_planner import NativePlanner
 from services.planner.native.sphere_cover import SphereCover, kept_cover
 from services.planner.trial import trial
 from tests.arm.plates import add_plate
+from tests.disks import refusing_disk
 from tests.planner.test_world import stl_box
 
 BULGE = 0.02  # [m]
@@ -110,6 +111,18 @@ def test_a_folder_that_cannot_be_written_is_no_reason_not_to_plan(
     assert len(kept_cover(cube(), BULGE).spheres) > 0
     assert "cannot be written" in caplog.text
     assert made == [0]
+
+
+def test_a_full_disk_keeps_no_part_of_a_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
+    with refusing_disk("full", tmp_path / "cache") as disk:
+        monkeypatch.setenv(FOLDER, str(disk.folder))
+        disk.refuse()
+        rows = cached_rows(b"content", lambda: np.ones((5000, 4)))
+        assert rows.shape == (5000, 4)
+        assert "cannot be written (No space left on device)" in caplog.text
+        assert [path.name for path in disk.folder.iterdir()] == ["ballast"]
 
 
 def test_the_folder_is_the_platforms_where_none_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
