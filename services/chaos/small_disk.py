@@ -24,12 +24,13 @@ def may_mount() -> bool:
 class SmallDisk:
     """Mounted at `folder`, which it makes, from entering to leaving; raises `NoDisk`."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, size: int = SIZE) -> None:
+        """`size` in [bytes]."""
+        self._folder, self._size = folder, size
 
     def __enter__(self) -> SmallDisk:
         self._folder.mkdir(parents=True, exist_ok=True)
-        _run("mount", "-t", "tmpfs", "-o", f"size={SIZE}", "tmpfs", str(self._folder))
+        _run("mount", "-t", "tmpfs", "-o", f"size={self._size}", "tmpfs", str(self._folder))
         return self
 
     def __exit__(

@@ -37,6 +37,7 @@ from services.runtime.process.unwritten import remedy_of
 BROKER_PAGE = "docs/my_broker.md has every such sentence with what to do"
 # Tuning constants: chosen.
 LEAST_DISK = 1e9  # [bytes] free: an hour of recordings
+LEAST_DESCRIPTORS = 8  # free ones of a process: a connection to a broker takes three
 FILE = 16_384  # [bytes] of a file that is tried: more than any of a run's has
 LEAST_MEMORY = 5e8  # [bytes] free: what the stack needs itself
 MOST_CPU = 85.0  # [%] of all cores: above it, ticks of a virtual device come late
@@ -220,6 +221,7 @@ def twin(session: CommandSession) -> Iterator[Diagnosis]:
     told = _told(session, nodes)
     yield versions({name: info for name, (info, _) in told.items()})
     yield from unwritten(info for info, _ in told.values())
+    yield from descriptors(info for info, _ in told.values() if info.host == session.node.info().host)
     yield clocks({name: clock for name, (_, clock) in told.items() if clock is not None})
 
 
@@ -250,6 +252,20 @@ def unwritten(infos: Iterable[NodeInfo]) -> Iterator[Diagnosis]:
     for info in infos:
         if info.unwritten:
             yield Diagnosis(Verdict.WARNING, f"files of {info.node} on {info.host}", info.unwritten)
+
+
+def descriptors(infos: Iterable[NodeInfo]) -> Iterator[Diagnosis]:
+    """The processes of this host that soon get no file or connection any more; those of other users are left out."""
+    import psutil  # 20 ms
+
+    for info in infos:
+        with suppress(psutil.Error):
+            process = psutil.Process(info.pid)
+            used, most = process.num_fds(), process.rlimit(psutil.RLIMIT_NOFILE)[0]
+            if most - used < LEAST_DESCRIPTORS:
+                found = f"{used} are in use, its limit is {most}: a connection that breaks does not come back"
+                remedy = "`ulimit -n` raises the limit for its next start; `gemelo top` shows whether it grows"
+                yield Diagnosis(Verdict.WARNING, f"descriptors of {info.node}", found, remedy)
 
 
 def device(status: DeviceStatus | None, state: DeviceState | None, up: str) -> Diagnosis:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import platform
 import re
+import subprocess
+import sys
 from contextlib import closing
 from importlib.metadata import version
 from pathlib import Path
@@ -13,6 +15,7 @@ import pytest
 
 from schemas.device import DeviceState, DeviceStatus
 from schemas.system import NodeInfo
+from services.chaos.descriptors import give_descriptors, take_descriptors
 from services.cli import doctor
 from services.cli.errors import ExitCode
 from services.cli.main import run
@@ -129,6 +132,19 @@ def test_the_doctor_says_why_a_broker_does_not_let_the_gateway_in(tmp_path: Path
         assert "chmod 600" in doctor.broker(section).found
     away = doctor.broker(external(locked(tmp_path / "other")))
     assert "are its address and port right" in away.found
+
+
+def test_the_doctor_says_which_process_gets_no_descriptor_any_more():
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
+        info = NodeInfo(node="planner", pid=process.pid)
+        assert list(doctor.descriptors([info])) == []
+        take_descriptors(process.pid)
+        (found,) = doctor.descriptors([info])
+        assert (found.verdict, found.subject) == ("warning", "descriptors of planner")
+        assert "its limit is 3" in found.found
+        give_descriptors(process.pid)
+        assert list(doctor.descriptors([info])) == []
+        process.communicate(b"\n")
 
 
 @pytest.mark.parametrize("wire", ["mqtt", "serial"])
