@@ -19,7 +19,8 @@ PATIENCE = 1.5  # [s] for the handshake, and again for the answer: with BEAT les
 FILES = 16_384  # descriptors: above any flood that is held off, and no more than the system allows
 # MQTT 3.1.1, 3.1: protocol, level 4, a session that leaves nothing, 5 s of keep-alive, no name, no user.
 CONNECT = b"\x10\x0c\x00\x04MQTT\x04\x02\x00\x05\x00\x00"
-CONNACK, DISCONNECT = b"\x20", b"\xe0\x00"
+CONNACK = b"\x20"
+PINGREQ, PINGRESP = b"\xc0\x00", b"\xd0"
 
 
 class NotInstalled(Exception):
@@ -57,24 +58,49 @@ def _allow_files() -> None:
 def _watch_broker(section: MqttSection, alive: int, beat: Callable[[], None], on_end: Callable[[], None]) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):  # they are the broker's; this one ends with it
         signal.signal(number, signal.SIG_IGN)
-    interval = 0.02
+    interval, own = 0.02, OwnClient(section)
     while not select.select([alive], [], [], interval)[0]:
-        if _answers(section):
+        if own.is_answered():
             interval = BEAT
             beat()
     on_end()
 
 
-def _answers(section: MqttSection) -> bool:
-    """It says yes or no to a client: the kernel accepts connections also for one that stands still."""
-    try:
-        with socket.create_connection(section.listening, timeout=PATIENCE) as plain, _wrapped(section, plain) as link:
-            link.sendall(CONNECT)
-            answer = link.recv(4)
-            link.sendall(DISCONNECT)
-    except OSError:
-        return False
-    return answer.startswith(CONNACK)
+class OwnClient:
+    """A client of our own broker that stays connected: it is answered also where the broker has no descriptor left for
+    another one, and is not answered by a broker that stands still, for which the kernel accepts connections."""
+
+    def __init__(self, section: MqttSection) -> None:
+        self._section = section
+        self._link: socket.socket | None = None
+
+    def is_answered(self) -> bool:
+        """Says hello, or pings where it is known; waits up to PATIENCE [s] for the answer."""
+        try:
+            if self._link is None:
+                self._link = _wrapped(
+                    self._section, socket.create_connection(self._section.listening, timeout=PATIENCE)
+                )
+                return self._exchange(CONNECT, CONNACK, 4)
+            return self._exchange(PINGREQ, PINGRESP, 2)
+        except OSError:
+            self._leave()
+            return False
+
+    def _exchange(self, said: bytes, wanted: bytes, length: int) -> bool:
+        assert self._link is not None
+        self._link.sendall(said)
+        answer = self._link.recv(length)
+        # One that is refused, as a stranger to a locked broker, was answered too; it has no connection then.
+        if answer[:1] != wanted or (wanted == CONNACK and answer[3:4] != b"\x00"):
+            self._leave()
+        return answer[:1] == wanted
+
+    def _leave(self) -> None:
+        if self._link is not None:
+            with contextlib.suppress(OSError):
+                self._link.close()
+            self._link = None
 
 
 def _wrapped(section: MqttSection, link: socket.socket) -> socket.socket:

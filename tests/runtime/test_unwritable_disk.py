@@ -127,7 +127,7 @@ def test_systemd_hears_of_a_beat_without_a_free_descriptor(tmp_path, monkeypatch
         assert systemd.recv(100).startswith(b"WATCHDOG=1")
 
 
-@pytest.mark.parametrize("process", ["router", "broker amqtt", "broker mosquitto"])
+@pytest.mark.parametrize("process", ["router", "broker embedded", "broker mosquitto"])
 def test_router_and_broker_start_while_the_disk_refuses_and_live_on_when_it_begins_to(disk, process):
     name, _, broker = process.partition(" ")
     if broker == "mosquitto":
@@ -135,7 +135,7 @@ def test_router_and_broker_start_while_the_disk_refuses_and_live_on_when_it_begi
     port = free_port()
     environ = os.environ | {
         f"GEMELO_{'ROUTER' if name == 'router' else 'MQTT'}_PORT": str(port),
-        "GEMELO_MQTT_BROKER": broker or "amqtt",
+        "GEMELO_MQTT_BROKER": broker or "embedded",
         "GEMELO_PATHS_RUN": str(disk.folder),
     }
     module = "services.runtime.router" if name == "router" else "services.broker.main"
