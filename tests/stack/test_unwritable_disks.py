@@ -13,7 +13,7 @@ from services.chaos.descriptors import give_descriptors, take_descriptors
 from services.chaos.small_disk import SmallDisk
 from services.cli.errors import ExitCode
 from services.stack.stack import Stack
-from tests.optional import need, need_mounts
+from tests.optional import need_mounts
 from tests.stack.gemelo import gemelo
 from tests.stack.person import Operator, jumps
 
@@ -52,10 +52,9 @@ class Site:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory) -> Iterator[Site]:
-    need("mosquitto")
     need_mounts()
     folder = tmp_path_factory.mktemp("disks")
-    stack = Stack(broker="mosquitto", panel=True, out=folder / "out", processes=PROCESSES)
+    stack = Stack(broker="embedded", panel=True, out=folder / "out", processes=PROCESSES)
     with SmallDisk(stack.run) as run, SmallDisk(folder / "out", OUT_SIZE) as out, stack:
         yield Site(stack, run, out)
 
