@@ -96,7 +96,7 @@ ROLES: tuple[Role, ...] = (
     Role("gateway", "trajectories to step knots", GATEWAY, reads=(JOINT_TARGETS, SCENE)),
     Role(
         "planner", "goals to verified trajectories, and jogging", "planner",
-        writes=(JOINT_TARGETS,), reads=(JOINT_STATES, GRIPPER_STATE, DEVICE_STATUS, JOG, CONTROL), asks=STOPS,
+        writes=(JOINT_TARGETS,), reads=(JOINT_STATES, GRIPPER_STATE, DEVICE_STATUS, JOG, CONTROL, SCENE), asks=STOPS,
     ),
     Role("state_publisher", "joint states to frames", "state_publisher", reads=(JOINT_STATES,), asks=STOPS),
     Role("logger", "everything recorded to files", "logger", reads=RECORDED, asks=STOPS, hears_requests=True),

@@ -28,6 +28,7 @@ from services.runtime.bus import identity
 from services.runtime.bus.branches import principal_of
 from services.runtime.bus.connection import connect
 from services.runtime.bus.interface import Bus, Declaration
+from services.runtime.bus.name_holder import NameHolder, StopWatch
 from services.runtime.certificate_watch import CertificateWatch
 from services.runtime.client_watch import Absences, ClientWatch
 from services.runtime.clock import SYSTEM, Clock
@@ -40,6 +41,7 @@ from services.runtime.endpoints import (
     parameter_request,
     parameters_request,
 )
+from services.runtime.errors import NodeNameTaken
 from services.runtime.loop.loop import Loop
 from services.runtime.loop.task_queue import Worker
 from services.runtime.parameters import ParameterRegistry, ParameterSet
@@ -115,6 +117,9 @@ class Node:
         except BaseException:
             self._bus.close()
             raise
+        self._name = NameHolder(self._identity)
+        self._stop_watch = StopWatch()
+        self._bus.watch_tokens(identity.bearers(self._identity), self._on_bearer)
         self._log_to_bus = BusHandler(lambda record: self.publisher(LOG).put(record), self.clock)
         self.log.addHandler(self._log_to_bus)
         self._statistics = LoopStatistics(self._identity, self.clock)
@@ -393,6 +398,10 @@ class Node:
         """`on_change(is_there)` runs in the thread of logic."""
         return self._bus.watch_alive(key, lambda is_there: self.post(lambda: on_change(is_there)))
 
+    def _on_bearer(self, key: str, is_there: bool) -> None:
+        """A token of this node's name; from the bus's own thread."""
+        self.post(lambda: self._name.on_token(key, is_there, self.monotonic()))
+
     def _serve_about_itself(self) -> None:
         address = self._identity.address
         self.serve(info_request(address), lambda question: self.info())
@@ -412,7 +421,16 @@ class Node:
         self.publisher(PARAMETER_CHANGES).put(change)
         return parameter
 
+    def holds_name(self) -> bool:
+        """False for a while after this process was stopped, until it is certain that no other bears its name by now.
+
+        Call before each turn of a loop that must not act beside another.
+        """
+        return self._stop_watch.is_certain(self.monotonic(), lambda: self.is_connected, self._name.newer)
+
     def _beat(self) -> None:
+        if objection := self._name.objection(self.monotonic()):
+            raise NodeNameTaken(objection)
         if self._readiness is not None:
             self._readiness.beat()
         self._bus.require_reconnection()

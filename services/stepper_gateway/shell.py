@@ -23,6 +23,7 @@ from schemas.device import (
 from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
 from schemas.joints import JointTargets
 from schemas.motion import (
+    FollowErrorCode,
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
@@ -95,6 +96,8 @@ from services.stepper_gateway.parameters import GatewayParameters
 JOGGER = "planner"  # the node that streams targets for others
 AT_ONCE = 16  # payloads handled before the loop looks at its deadline and for stops; chosen: about 1 ms
 
+WAS_STOPPED = "this gateway's process was stopped: it looks whether another has taken its place: wait two seconds"
+
 Server = ActionServer[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
 
 Gripper = ActionServer[GripperCommandGoal, GripperCommandFeedback, GripperCommandResult]
@@ -115,6 +118,7 @@ class Shell:
         self._inputs = InputLog(core, began, self._moment(), node.publisher(GATEWAY_INPUTS).put)
         self._told = began.parameters
         self._link: links.Link | None = None
+        self._silent = False
         self._is_woken = threading.Event()
         self._callers: dict[int, Pending[Any]] = {}  # by ticket: who waits for the device's answer
         self._tickets = itertools.count(1)
@@ -143,7 +147,9 @@ class Shell:
             self._node.post(self._on_link)
 
     def step(self, _now: int) -> None:
-        """One turn of the control loop."""
+        """One turn of the control loop; none while another gateway may have taken this one's place."""
+        if self._is_silent():
+            return self._node.set_ready(False, WAS_STOPPED)
         if self._parameters.value is not self._told:
             self._told = self._parameters.value
             self._give(ParametersInput(self._told))
@@ -164,7 +170,7 @@ class Shell:
     def _on_link(self) -> None:
         self._is_woken.clear()
         link = self._link
-        if link is None:
+        if link is None or self._is_silent():  # what came stays where it is until the loop goes on
             return
         self._give(LinkInput(link.connected, link.reason))
         received = link.take(AT_ONCE)
@@ -173,13 +179,27 @@ class Shell:
         if len(received) == AT_ONCE:
             self.wake()
 
+    def _is_silent(self) -> bool:
+        """True after this process was stopped, until it is certain that no other gateway was started meanwhile.
+
+        Only what stops the arm is sent then: see `_carry_out`.
+        """
+        was_silent, self._silent = self._silent, not self._node.holds_name()
+        if was_silent and not self._silent:
+            self.wake()
+        return self._silent
+
     def _on_goal(self, goal_id: str, goal: FollowJointTrajectoryGoal) -> GoalDecision:
+        if self._is_silent():
+            return refuse(FollowErrorCode.DEVICE_FAILED, WAS_STOPPED)
         return _decision(self._give(GoalInput(goal_id, goal, self._server.session_of(goal_id))))
 
     def _on_cancel(self, goal_id: str) -> str:
         return str(self._give(CancelInput(goal_id)))
 
     def _on_grip(self, goal_id: str, goal: GripperCommandGoal) -> GoalDecision:
+        if self._is_silent():
+            return refuse(FollowErrorCode.DEVICE_FAILED, WAS_STOPPED)
         return _decision(self._give(GripInput(goal_id, goal, self._gripper.session_of(goal_id))))
 
     def _on_grip_cancel(self, goal_id: str) -> str:
@@ -187,6 +207,8 @@ class Shell:
 
     def _on_targets(self, targets: JointTargets, writer: str) -> None:
         """The planner's are those of whom it jogs for; of anybody else it does not count what they say of that."""
+        if self._is_silent():
+            return
         self._give(TargetsInput(targets, targets.client or writer if writer == JOGGER else writer))
 
     def _on_command(self, request: DeviceCommandRequest, pending: Pending[DeviceCommandResponse]) -> None:
@@ -210,6 +232,7 @@ class Shell:
 
     def _give(self, given: Input) -> Reply:
         """Gives the core one input now, carries out what comes of it, and returns what it says at once."""
+        self._is_silent()
         reply, outputs = self._inputs.give(given, self._moment())
         self._carry_out(outputs)
         return reply
@@ -234,7 +257,7 @@ class Shell:
         for output in outputs:
             match output:
                 case SendFrame(kind, payload, urgent):
-                    if self._link is not None:
+                    if self._link is not None and (urgent or not self._silent):
                         self._link.send(kind, payload, urgent)
                 case Publish(topic, message):
                     self._node.publisher(topic).put(message)

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from schemas.joints import JointState
+from schemas.message import encode
 from schemas.scene import (
     AllowedPair,
     BoxShape,
@@ -32,6 +33,7 @@ from services.planner.scene.answer_log import AnswerLog
 from services.planner.scene.scene_keeper import SceneKeeper
 from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
+from tests.runtime.support import until
 
 Said = Callable[[str], ExitCode]
 TRIANGLE = "solid a\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n"
@@ -220,3 +222,12 @@ def test_completion_knows_the_kept_objects_and_the_links(monkeypatch, tmp_path):
     assert words[""] == ["cup"]
     assert "efector_link" in words["cup"]
     assert "cup" in pair_choices(robot)["efector_link"]
+
+
+def test_a_stray_scene_under_the_planners_name_is_answered_with_the_planners_own(scene, network):
+    """Else whoever follows the stray one refuses the plans of the planner for good."""
+    own = scene()
+    stray = MemoryBus(network).publish(SCENE.key, "PlanningScene", SCENE.delivery, "planner")
+    stray.put(encode(PlanningScene(version=7, epoch=own.epoch + 1)))
+    assert scene().epoch != own.epoch
+    assert until(lambda: scene() == own)

@@ -199,3 +199,18 @@ def test_a_watch_hears_of_a_token_that_is_there_and_of_its_end(buses: Buses) -> 
     client.close()
     assert until(lambda: before == [True, False])
     assert other == [True]
+
+
+def test_a_watch_of_a_pattern_names_every_token_that_is_there_comes_and_ends(buses: Buses) -> None:
+    client, server = buses.open(), buses.open()
+    seen: list[tuple[str, bool]] = []
+    client.declare_alive("@id/script/a/1")
+    closed = server.watch_tokens("@id/script/a/*", lambda key, is_there: seen.append((key, is_there)))
+    assert until(lambda: seen == [("@id/script/a/1", True)])
+    client.declare_alive("@id/script/b/1")
+    token = client.declare_alive("@id/script/a/2")
+    assert until(lambda: len(seen) == 2)
+    token.close()
+    assert until(lambda: len(seen) == 3)
+    assert seen[1:] == [("@id/script/a/2", True), ("@id/script/a/2", False)]
+    closed.close()

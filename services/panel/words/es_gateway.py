@@ -22,6 +22,10 @@ _DEVICE: dict[str, str] = {
     "es: espere un segundo, o reinícielo.",
     'the clock of device "{name}" is not known yet: try again in a second': "Aún no se conoce el reloj del equipo "
     "«{name}»: pruebe otra vez en un segundo.",
+    'device "{name}" is asked by another gateway too: nothing moves until there is one. End the other: a forgotten '
+    "`make up`, a second host, or a process that was stopped and goes on": "Otro gateway pregunta también al equipo "
+    "«{name}»: nada se mueve hasta que quede uno. Termine el otro: un `make up` olvidado, otro ordenador, o un proceso "
+    "que estuvo detenido y continúa.",
     'device "{name}" speaks and does not hear: its states arrive, and it answers nothing that is sent to it. Likely '
     "causes: a loose TX wire, a broker's ACL that denies the device its subscription, or two boards or programs with "
     "one client id. Without heartbeats it holds by itself": "El equipo «{name}» habla y no oye: sus estados llegan, y "

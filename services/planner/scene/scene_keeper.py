@@ -29,6 +29,7 @@ from services.runtime.process.unwritten import RETRY
 from services.runtime.topics import Latest
 
 SETTLING = 0.003  # [m] chosen: by less the jaws settle, and plans stay those of the present scene
+PUBLISH_AGAIN = 0.5  # [s] between two answers to the scenes of others; chosen: two planners do not flood each other
 OnWorld = Callable[[World], None]
 
 
@@ -60,6 +61,9 @@ class SceneKeeper:
         self._show()
         node.serve(SCENE_EDIT, self._edit)
         node.every(RETRY, self._save_again)
+        self._other: PlanningScene | None = None  # that another process has published under this name
+        node.subscribe(SCENE, self._on_other_scene)
+        node.every(PUBLISH_AGAIN, self._publish_again)
         if jaw_objects(arm, 0.0):
             node.subscribe(GRIPPER_STATE, self._on_gripper)
 
@@ -77,6 +81,20 @@ class SceneKeeper:
         elif response.code is PlanCode.SUCCESS and self._is_touching:
             self._contacts.put(Contacts(stamp=self._node.now()))
             self._is_touching = False
+
+    def _on_other_scene(self, other: PlanningScene) -> None:
+        """Another process has published a scene under this planner's name: a second planner, or a stray message."""
+        self._other = other
+
+    def _publish_again(self) -> None:
+        """Whoever followed the other scene gets this planner's; of two planners the older ends (bus/name_holder.py)."""
+        other, self._other = self._other, None
+        if other is not None:
+            self._node.log.warning(
+                "another process has published a scene as this planner, version %d of epoch %d: is there a second one? "
+                "The scene of this one is published again", other.version, other.epoch,
+            )  # fmt: skip
+            self._scene.put(self._store.scene)
 
     def _on_gripper(self, state: GripperState) -> None:
         """The jaws have another opening: everything is checked with them there from now on.

@@ -90,8 +90,13 @@ def is_token(key: str) -> bool:
     return TOKEN.fullmatch(key) is not None
 
 
+def bearers(identity: Identity) -> str:
+    """The pattern of the tokens of all nodes with this name."""
+    return f"{IDENTITY}/{identity.principal}/{identity.name}/*"
+
+
 def _bearers(bus: Bus, identity: Identity, warn: Warn) -> set[str]:
-    found = bus.alive(f"{IDENTITY}/{identity.principal}/{identity.name}/*") - {identity.key}
+    found = bus.alive(bearers(identity)) - {identity.key}
     for key in found:
         if not is_token(key):
             warn(_ignored(key))
@@ -112,8 +117,14 @@ def _wait_until_alone(bus: Bus, identity: Identity, gives_way_before: str, warn:
 
 def _taken(name: str, key: str) -> str:
     """The sentence for a name whose bearer has the token `key`."""
-    _, pid, host = key.rsplit("/", 1)[-1].split(".", 2)
+    pid, host = instance_of(key)
     return f'another node named "{name}" is alive (process {pid} on {host}): stop it, or give this one another name'
+
+
+def instance_of(key: str) -> tuple[str, str]:
+    """The process and the host of the node with the token `key`."""
+    _, pid, host = key.rsplit("/", 1)[-1].split(".", 2)
+    return pid, host
 
 
 def _ignored(key: str) -> str:

@@ -176,6 +176,10 @@ class Bus(Protocol):
         """
         ...
 
+    def watch_tokens(self, pattern: str, on_change: Callable[[str, bool], None]) -> Declaration:
+        """As `watch_alive`, for all tokens of `pattern`, where a `*` stands for one chunk: `on_change(key, True)`."""
+        ...
+
     def alive(self, pattern: str) -> set[str]:
         """The keys of the living tokens; a `*` in `pattern` stands for one chunk."""
         ...

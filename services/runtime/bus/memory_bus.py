@@ -15,6 +15,7 @@ from services.runtime.bus.memory_network import (
     MemorySubscription,
     MemoryToken,
     MemoryWatch,
+    matches,
 )
 from services.runtime.clock import Clock
 
@@ -122,24 +123,22 @@ class MemoryBus:
         return token
 
     def watch_alive(self, key: str, on_change: Callable[[bool], None]) -> MemoryWatch:
-        watch = MemoryWatch(self, key, on_change)
+        return self.watch_tokens(key, lambda _, is_there: on_change(is_there))
+
+    def watch_tokens(self, pattern: str, on_change: Callable[[str, bool], None]) -> MemoryWatch:
+        watch = MemoryWatch(self, pattern, on_change)
         with self.network.lock:
             self.network.watches[watch] = None
-            if self.network.tokens[key] > 0:
-                on_change(True)
+            for key in sorted(self.alive(pattern)):
+                on_change(key, True)
         self._declared.append(watch)
         return watch
 
     def alive(self, pattern: str) -> set[str]:
         with self.network.lock:
-            return {key for key, count in self.network.tokens.items() if count > 0 and _matches(pattern, key)}
+            return {key for key, count in self.network.tokens.items() if count > 0 and matches(pattern, key)}
 
     def close(self) -> None:
         for each in self._declared:
             each.close()
         self._declared.clear()
-
-
-def _matches(pattern: str, key: str) -> bool:
-    wanted, chunks = pattern.split("/"), key.split("/")
-    return len(wanted) == len(chunks) and all(want in ("*", chunk) for want, chunk in zip(wanted, chunks, strict=True))

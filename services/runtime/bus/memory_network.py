@@ -106,15 +106,21 @@ class MemoryToken:
 
 @dataclass(eq=False)
 class MemoryWatch:
-    """Who wants to know whether a token is there."""
+    """Who wants to know whether the tokens of a pattern are there."""
 
     bus: Member
-    key: str
-    on_change: Callable[[bool], None]
+    pattern: str
+    on_change: Callable[[str, bool], None]
 
     def close(self) -> None:
         with self.bus.network.lock:
             self.bus.network.watches.pop(self, None)
+
+
+def matches(pattern: str, key: str) -> bool:
+    """True if `key` is one of `pattern`, in which a `*` stands for one chunk."""
+    wanted, chunks = pattern.split("/"), key.split("/")
+    return len(wanted) == len(chunks) and all(want in ("*", chunk) for want, chunk in zip(wanted, chunks, strict=True))
 
 
 class MemoryQuery:
@@ -178,8 +184,8 @@ class MemoryNetwork:
         """One more (1) or one less (-1) of the tokens `key`; tells who watches it. Call with the lock."""
         was, self.tokens[key] = self.tokens[key] > 0, self.tokens[key] + change
         if was != (self.tokens[key] > 0):
-            for watch in [each for each in self.watches if each.key == key]:
-                watch.on_change(not was)
+            for watch in [each for each in self.watches if matches(each.pattern, key)]:
+                watch.on_change(key, not was)
 
     @property
     def is_connected(self) -> bool:

@@ -288,6 +288,12 @@ class ZenohBus:
 
         return ZenohDeclaration(self._session.liveliness().declare_subscriber(key, on_sample, history=True))
 
+    def watch_tokens(self, pattern: str, on_change: Callable[[str, bool], None]) -> ZenohDeclaration:
+        def on_sample(sample: zenoh.Sample) -> None:
+            on_change(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+        return ZenohDeclaration(self._session.liveliness().declare_subscriber(pattern, on_sample, history=True))
+
     def alive(self, pattern: str) -> set[str]:
         replies = self._session.liveliness().get(pattern, timeout=1.0)
         return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}

@@ -32,11 +32,18 @@ SYNC_AT_FIRST = 0.03  # [s] until the clock is known; chosen: the three that are
 SYNC_UNANSWERED = 0.1  # [s] chosen: twelve questions are lost before the device counts as deaf
 LATE_ANSWER = 0.25  # [s] after which an answer is missing; chosen: longer than a slow network's round trip
 DEAF_AFTER = 1.4  # [s] of questions without an answer; chosen: with the pause between two of them, below 2 s
-LEAST_UNANSWERED = 4  # questions, so that a pause of this loop is no deafness of the device
+LEAST_UNANSWERED = 4  # questions; chosen: more than one, as a pause of this loop is no deafness of the device
 STEADY_BEATS = 0.7  # [s] of heartbeats without a pause, after which a device has heard one; chosen: above its 0.5 s
 ASK_STATUS = 1.0  # [s] between two requests for a status that is missing; chosen: a slow network answers by then
 # Chosen: true states are not taken until they are newer than one from so far ahead, which must not look like silence.
 FARTHEST_AHEAD = 0.2  # [s] that a frame's time may be ahead of the device's clock as it is known
+TWIN = (
+    "is asked by another gateway too: nothing moves until there is one. End the other: a forgotten `make up`, a second "
+    "host, or a process that was stopped and goes on"
+)
+TWIN_SEEN = 1.5  # [s] that an answer to a stranger's question counts; chosen: three of its questions
+LEAST_STRANGE = 2  # such answers; chosen: one may be forged, or be to the gateway before this one
+KEPT_QUESTIONS = 512  # of ours, which are no stranger's however late the answer; chosen: 15 s of the most frequent
 QUESTIONS = 32  # that may be under way; chosen: 1 s of them at first, beyond which answers are late
 NOT_HEARD = "is it switched on, does it use the same broker, and does the broker's ACL let it write?"
 NO_CLOCK = "try again in a second"
@@ -70,6 +77,8 @@ class DeviceSession:
         self._checks = StateChecks()
         self._offline_boot = 0  # whose last will has come
         self._questions: deque[int] = deque(maxlen=QUESTIONS)  # [us] SYNCs that may be answered
+        self._asked: deque[int] = deque(maxlen=KEPT_QUESTIONS)  # [us] all of ours
+        self._strange: deque[float] = deque(maxlen=LEAST_STRANGE)  # [s] monotonic, of answers to questions of others
         self._unanswered = 0  # SYNCs since the last answer
         self._unanswered_since = 0.0  # [s] monotonic, of the first of them
         self.answered = -1.0e9  # [s] monotonic, when the device has answered a question last
@@ -162,6 +171,7 @@ class DeviceSession:
     def question(self, moment: Moment) -> Sync:
         """One more question for the clock, now."""
         self._questions.append(moment.micros)
+        self._asked.append(moment.micros)
         if self._unanswered == 0:
             self._unanswered_since = moment.monotonic
         self._unanswered += 1
@@ -170,7 +180,11 @@ class DeviceSession:
     def on_sync_reply(self, reply: SyncReply, arrival_us: int) -> None:
         """Take an answer to a question of ours; raises `BadFrame` for one that is not believed."""
         self.require_known(reply)
-        if reply.boot_id != self.boot_id or reply.t0 not in self._questions:
+        if reply.boot_id != self.boot_id:
+            return
+        if reply.t0 not in self._questions:
+            if reply.t0 not in self._asked:
+                self._strange.append(arrival_us * 1e-6)
             return
         if not self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us):  # the question stays open for the true answer
             raise BadFrame(f"an answer of {reply.t1} us, which is not the device's clock as it is known")
@@ -237,6 +251,11 @@ class DeviceSession:
         is_missing = self._unanswered > 0 and moment.monotonic - self._unanswered_since > LATE_ANSWER
         return SYNC_UNANSWERED if is_missing else SYNC
 
+    def has_twin(self, moment: Moment) -> bool:
+        """True if the device answers another gateway: what each sends would move the arm of the other."""
+        is_enough = len(self._strange) == LEAST_STRANGE
+        return is_enough and moment.monotonic - self._strange[0] <= TWIN_SEEN
+
     def is_deaf(self, moment: Moment) -> bool:
         """True if nothing that is asked has been answered for DEAF_AFTER: what is sent does not arrive."""
         is_long = moment.monotonic - self._unanswered_since > DEAF_AFTER
@@ -265,7 +284,8 @@ class DeviceSession:
         return DeviceMode(self.latest.mode) if self.latest is not None else DeviceMode.BOOT
 
     def unreachable_reason(self, moment: Moment, timeout: float) -> str:
-        """Why the device cannot be reached: no link, no state for `timeout` [s], or no answer; empty if it can."""
+        """Why the device cannot be reached: no link, no state for `timeout` [s], no answer, or another
+        gateway; empty if it can."""
         name = self._device
         if not self.link_up:
             return f'no link to device "{name}": {self.link_reason}'
@@ -277,6 +297,8 @@ class DeviceSession:
             return f'device "{name}" is silent for more than {timeout:g} s: check its power and network'
         if self.is_deaf(moment):
             return f'device "{name}" {DEAF}'
+        if self.has_twin(moment):
+            return f'device "{name}" {TWIN}'
         if self.status is None:
             return f'device "{name}" has not said yet who it is: wait a second, or restart it'
         if not self.clock.is_synchronised:
