@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections import deque
-from collections.abc import Callable
+from collections import defaultdict, deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,8 +15,9 @@ from services.logger.files import MCAP, prune, stem_of
 from services.logger.incident_story import incident_of
 from services.logger.incident_watch import IncidentWatch, Trigger
 from services.recordings.channels import Entry
-from services.recordings.incidents import BLACK_BOX, Incident, IncidentKind, incident_metadata
+from services.recordings.incidents import BLACK_BOX, Incident, IncidentKind, incident_in, incident_metadata
 from services.recordings.mcap_file import McapFile
+from services.recordings.reader import BadRecording, RecordingReader
 from services.recordings.view_layout import layout_metadata, layout_of
 from services.runtime.process.own_files import own_folder
 
@@ -98,7 +99,7 @@ class BlackBoxWriter:
         self._thread: threading.Thread | None = None
 
     def save(self, incident: Incident, entries: tuple[Entry, ...], folder: Path, keep: int) -> None:
-        """Begins to write a file in `folder`, of which the newest `keep` stay; at most one is being written."""
+        """Begins to write a file in `folder`, which keeps the newest `keep` of each kind; one is written at a time."""
         self.wait()
         self._thread = threading.Thread(
             target=self._save, args=(incident, entries, folder, keep), name="black box", daemon=True
@@ -114,11 +115,27 @@ class BlackBoxWriter:
         metadata = {**self._metadata, **layout_metadata(layout_of(entries, self._cameras))}
         try:
             path = write_black_box(folder, self._robot, metadata, incident, entries)
-            prune(folder, self._robot, keep, (path.stem,))
+            prune_each_kind(folder, self._robot, keep, (path.stem,))
         except OSError as error:
             self._tell(f"{BLACK_BOX}{incident.sentence}; it cannot be written to {folder}: {error.strerror or error}")
         else:
             self._tell(f"{BLACK_BOX}{incident.sentence}; `gemelo blackbox open`, or {path}")
+
+
+def prune_each_kind(folder: Path, robot: str, keep: int, ours: Sequence[str]) -> None:
+    """As `prune`, for the incidents of each kind: many of one, whoever causes them, push out none of another.
+
+    What cannot be read is of a kind of its own.
+    """
+    names: dict[str, list[str]] = defaultdict(list)
+    for path in folder.glob(f"*{MCAP}"):
+        try:
+            incident = incident_in(RecordingReader(path))
+        except BadRecording:
+            incident = None
+        names[incident.kind if incident is not None else ""].append(path.name)
+    for of_a_kind in names.values():
+        prune(folder, robot, keep, [stem for stem in ours if f"{stem}{MCAP}" in of_a_kind], of_a_kind)
 
 
 def write_black_box(

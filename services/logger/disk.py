@@ -34,7 +34,9 @@ class LoggerParameters(msgspec.Struct, frozen=True, kw_only=True):
         float, Meta(description="images of each camera that are recorded [Hz]; 0: none", ge=0, le=60)
     ] = 2.0
     keep_files: Annotated[int, Meta(description="how many recordings are kept; 0: all", ge=0)] = 48
-    keep_black_boxes: Annotated[int, Meta(description="how many black boxes are kept; 0: none is saved", ge=0)] = 20
+    keep_black_boxes: Annotated[
+        int, Meta(description="how many black boxes of each kind of incident are kept; 0: none is saved", ge=0)
+    ] = 20
 
 
 RETRY = 2.0  # [s] between two attempts on a disk that refuses

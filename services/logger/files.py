@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -34,10 +34,15 @@ def surplus(names: list[str], robot: str, keep: int, ours: Sequence[str] = ()) -
     return [match[0] for match in matches if match and match[1] in old]
 
 
-def prune(folder: Path, robot: str, keep: int, ours: Sequence[str] = ()) -> list[str]:
-    """Delete the surplus in `folder`, as `surplus` has it; returns what was deleted. What cannot be deleted stays."""
-    deleted = []
-    for name in surplus([path.name for path in folder.iterdir()], robot, keep, ours):
+def prune(
+    folder: Path, robot: str, keep: int, ours: Sequence[str] = (), among: Iterable[str] | None = None
+) -> list[str]:
+    """Delete the surplus in `folder`, as `surplus` has it; returns what was deleted. What cannot be deleted stays.
+
+    `among` are the names that count, else all.
+    """
+    names, deleted = [path.name for path in folder.iterdir()] if among is None else list(among), []
+    for name in surplus(names, robot, keep, ours):
         try:
             (folder / name).unlink()
         except OSError:

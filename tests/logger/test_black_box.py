@@ -435,6 +435,18 @@ def test_a_file_is_read_by_another_reader_and_listed_by_its_story(rig, tmp_path)
         read_incident(tmp_path / "other.mcap")
 
 
+def test_many_incidents_of_one_kind_push_out_none_of_another(rig, tmp_path):
+    """Forged statistics made services seem lost, and pushed out the black box of a real fault."""
+    incident, entries = box_of(rig)
+    writer = BlackBoxWriter("rm1", {}, lambda text: None)
+    writer.save(incident, entries, tmp_path, keep=3)
+    for late in range(1, 6):
+        lost = replace(incident, stamp=incident.stamp + late * SECOND, kind=IncidentKind.LOST)
+        writer.save(lost, entries, tmp_path, keep=3)
+    writer.wait()
+    assert [each.incident.kind for each in black_boxes(tmp_path, "rm1")] == [IncidentKind.LOST] * 3 + [incident.kind]
+
+
 def test_a_full_disk_is_said_and_leaves_no_half_file(rig, tmp_path):
     said: list[str] = []
     told = box_of(rig)

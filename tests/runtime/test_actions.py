@@ -265,3 +265,15 @@ def test_goals_that_are_no_goals_are_refused_and_nothing_dies(buses: Buses) -> N
         assert "no such goal" in node.call(keys.cancel_request(FOLLOW), CancelRequest(goal_id="x")).reason
         assert arm.moved == 0
         assert node.action(FOLLOW).send(goal_of(1)).wait(2.0).status is GoalStatusCode.SUCCEEDED
+
+
+@pytest.mark.parametrize("client", ["", "a//b", "@id/*/*/*", "@id/local/cli-1/*", "@alive/local/cli-1"])
+def test_an_attached_goal_of_a_client_whose_end_nobody_would_see_is_refused(buses: Buses, client: str) -> None:
+    from schemas.actions import GoalRequest
+
+    with moving(buses) as arm:
+        node, goal = buses.node("client"), msgspec.Raw(encode(goal_of(10)))
+        request = GoalRequest(goal_id="x", client=client, attached=True, goal=goal, epoch=arm.server.epoch)
+        with pytest.raises(RequestRefused, match="names the liveliness token of its client"):
+            node.call(keys.goal_request(FOLLOW), request)
+        assert arm.server.active == ()

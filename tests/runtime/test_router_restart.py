@@ -15,7 +15,8 @@ from schemas.frames import RobotDescription
 from schemas.joints import JointState
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
 from schemas.system import LogRecord
-from schemas.topics import DESCRIPTION, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, LOG, PLAN
+from schemas.topics import DESCRIPTION, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, LOG, PLAN, Delivery
+from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.client_watch import RETURN
 from services.runtime.errors import BusError, NoAnswer, ServerLost
 from services.runtime.node import Node
@@ -178,3 +179,19 @@ def test_an_attached_goal_outlives_a_router_that_comes_back_and_not_its_client(o
                 assert handle.status is GoalStatusCode.EXECUTING
             client.close()
             assert until(lambda: not arm.left)
+
+
+@pytest.mark.parametrize("key", ["@request/plan", "log", "device/events"])
+def test_what_is_written_while_the_router_is_away_comes_when_it_is_back(own_router: RouterProcess, key: str) -> None:
+    heard: list[bytes] = []
+    writer, reader = (ZenohBus(own_router.deployment.router, "rm1") for _ in range(2))
+    reader.subscribe(key, Delivery.EVERY, lambda arrival: heard.append(arrival.payload), lambda missed: None)
+    publication = writer.publish(key, "Text", Delivery.EVERY, "planner")
+    assert until(lambda: publication.put(b"before") or heard)
+    own_router.kill()
+    assert until(lambda: not writer.is_connected)
+    publication.put(b"while it was away")
+    own_router.start()
+    assert until(lambda: b"while it was away" in heard, RECOVERY)
+    writer.close()
+    reader.close()

@@ -22,6 +22,7 @@ from schemas.message import BadMessage, Message, decode, encode
 from schemas.topics import Action
 from services.runtime.actions import keys as keys
 from services.runtime.actions.goal_registry import GoalRecord, GoalRegistry
+from services.runtime.bus.identity import is_token
 from services.runtime.client_watch import ClientWatch
 from services.runtime.clock import SYSTEM, Clock
 from services.runtime.errors import RequestRefused
@@ -152,6 +153,9 @@ class ActionServer(Generic[G, F, R]):
     def _decide(self, request: GoalRequest, session: str) -> GoalResponse:
         if not request.goal_id:
             raise RequestRefused(f"{self.action.key}: a goal needs an id", "bad request")
+        if request.attached and not is_token(request.client):  # whose end nobody would ever see
+            wanted_token = "an attached goal names the liveliness token of its client"
+            raise RequestRefused(f'{self.action.key}: {wanted_token}, not "{request.client[:80]}"', "bad request")
         try:
             wanted = decode(self.action.goal, bytes(request.goal))
         except BadMessage as error:

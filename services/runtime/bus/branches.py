@@ -14,7 +14,8 @@ from schemas.roles import BY_EVERY_NODE, ROLE_OF_NODE, ROLES
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")  # of a node
 PRINCIPAL = re.compile(r"[a-z0-9][a-z0-9_-]*(?:\.[a-z0-9][a-z0-9_-]*)?")
 LOCAL = "local"  # the principal of a session without a certificate
-# Zenoh recovers what a reader has missed only of keys without a chunk that begins with `@` (1.10.2).
+# Zenoh recovers what a reader has missed only of keys without a chunk that begins with `@` (1.10.2): no topic has one
+# on the network, where `@request/plan` is `request/plan`.
 BY, FROM = "by", "@from"
 
 _OF_SERVICES = frozenset(role.name for role in ROLES if role.node)
@@ -55,12 +56,12 @@ def is_by_every_node(key: str) -> bool:
 
 def written_under(key: str, principal: str, node: str) -> str:
     """The key under which a node writes what is read under `key`."""
-    return f"{key}/{BY}/{principal}/{node}" if is_by_every_node(key) else key
+    return f"{key}/{BY}/{principal}/{node}" if is_by_every_node(key) else key.removeprefix("@")
 
 
 def read_under(key: str) -> str:
     """The key expression of all that is written under `key`."""
-    return f"{key}/{BY}/*/*" if is_by_every_node(key) else key
+    return f"{key}/{BY}/*/*" if is_by_every_node(key) else key.removeprefix("@")
 
 
 def writer_at(wire_key: str) -> str | None:
