@@ -315,8 +315,8 @@ class Node:
         try:
             with stop_on_signals(self._stop) if self._signals else nullcontext():
                 self._loop.spin(step, rate)
-        except BrokenPipeError:
-            raise  # whoever reads this program's output has enough: no error of the node
+        except (BrokenPipeError, NodeNameTaken):
+            raise  # whoever reads this program's output has enough; of a name that is lost a sentence says all
         except Exception as error:
             self.log.exception("ended by an error")
             error.is_logged = True  # type: ignore[attr-defined]

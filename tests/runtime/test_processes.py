@@ -319,6 +319,21 @@ def test_a_killed_node_can_be_started_again_at_once(start: Start) -> None:
     assert end(second)[0] == 0
 
 
+def test_a_process_that_goes_on_beside_its_successor_ends_with_a_sentence(start: Start) -> None:
+    """Stopped for longer than its lease it counts as dead, and another is started in its place."""
+    first = start(SPINNER)
+    await_line(first, "spins")
+    first.send_signal(signal.SIGSTOP)
+    second = start(SPINNER)
+    await_line(second, "spins")
+    first.send_signal(signal.SIGCONT)
+    _, errors = first.communicate(timeout=10.0)
+    assert first.returncode == 1
+    assert f'another node named "spinner" has started since this one (process {second.pid} on ' in errors
+    assert "Traceback" not in errors
+    assert end(second)[0] == 0
+
+
 def test_the_router_stops_cleanly_and_says_when_its_port_is_taken(tmp_path: Path) -> None:
     own = RouterProcess(tmp_path)
     ready = tmp_path / "run" / "router.ready"
