@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from services.simulation.virtual_clock import VirtualClock
 
 ROOM = "services.simulation"  # imported when a simulation begins: it stands on all services
+PROGRAM = "program"  # the node of a connection, if it is not named
 UNREFERENCED = "unreferenced"  # a start of which the board does not know where the joints stand
 
 # The value of `arm.device.inject` for each word of `gemelo device press`; None: the last word after it.
@@ -135,7 +136,7 @@ class Simulation:
             wire=_wire(wire),
         )
         self._twins.append(twin)
-        node = Node(name or "program", twin.deployment, robot=arm.name, bus=twin.bus(), log_level="warning")
+        node = Node(name or PROGRAM, twin.deployment, robot=arm.name, bus=twin.bus(), log_level="warning")
         connected = SimulatedArm(Session(twin.deployment, arm, node), self, twin)
         self.arms.append(connected)
         self._clock.keep_pace()
@@ -265,6 +266,31 @@ class SimulatedWorld:
             raise BadArgument(f'press("{what}", ...): one name and one value at most, not {words!r}')
         self._arm.device.inject(kind, str(rest[0]) if rest else "", value)
         self.sleep(PRESSED)
+
+    def connect(self, name: str) -> Arm:
+        """Another connection to the same arm, as of another program; `name` is that of its node.
+
+        >>> with gemelo.simulate("rm1") as simulated, simulated.sim.connect("other") as other:
+        ...     other.take_control("ana")
+        ...     simulated.control.holder
+        <gemelo.control.Hold ...>
+        'ana'
+        """
+        twin = self._twin
+        node = Node(name, twin.deployment, robot=twin.arm.name, bus=twin.bus(), log_level="warning")
+        return Arm(Session(twin.deployment, twin.arm, node))
+
+    def node(self, name: str) -> Node:
+        """A node of your own on the arm's bus, to be closed by you.
+
+        >>> with gemelo.simulate("rm1") as simulated, simulated.sim.node("watcher") as watcher:
+        ...     states = watcher.latest(gemelo.topics.JOINT_STATES)
+        ...     watcher.wait(0.1)
+        ...     states.age() < 0.05
+        True
+        """
+        twin = self._twin
+        return Node(name, twin.deployment, robot=twin.arm.name, bus=twin.bus(), log_level="warning")
 
     def cut_wire(self) -> None:
         """Nothing goes between gateway and board any more, and the gateway knows it.

@@ -17,13 +17,24 @@ from services.runtime.process.leaving import end_process
 ABOUT = "The twin's command line: move the arm, and see everything that is said about it."
 EPILOG = (
     "The deployment is deploy/local.toml, or the file that $GEMELO_CONFIG names. `gemelo --robot NAME COMMAND` is for\n"
-    "another arm of urdf/, or for a recording that is played."
+    "another arm of urdf/, or for a recording that is played. `gemelo --simulate COMMAND` is for a twin of its own that\n"
+    "needs nothing to run, in virtual time; `--simulate=START` has it stand in a named state, or unreferenced."
 )
 
 
 def parse(arguments: Sequence[str]) -> Options:
     """The options of one command line; ends the process with a sentence if it cannot be understood."""
     return build(COMMANDS, GROUPS, ABOUT, EPILOG, arguments).parse_args(arguments)
+
+
+def with_simulation(arguments: list[str]) -> list[str]:
+    """Without `--simulate` or `--simulate=START` before the command, which is for a twin of its own then."""
+    if not arguments or arguments[0].partition("=")[0] != "--simulate":
+        return arguments
+    from services.cli.simulated import choose  # slow to load, for --simulate alone
+
+    choose(arguments[0])
+    return arguments[1:]
 
 
 def with_robot(arguments: list[str]) -> list[str]:
@@ -73,7 +84,7 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
 
 def _run(given: list[str]) -> ExitCode:
     try:
-        options = parse(with_robot(given))
+        options = parse(with_simulation(with_robot(with_simulation(given))))
         code: ExitCode = options.command.load("run")(options)
         sys.stdout.flush()
         return code
@@ -86,6 +97,9 @@ def _run(given: list[str]) -> ExitCode:
         # The reader (as `head`) has enough; without this the interpreter complains again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ExitCode.OK
+    finally:
+        if (simulated := sys.modules.get("services.cli.simulated")) is not None:
+            simulated.end()
 
 
 def main() -> NoReturn:

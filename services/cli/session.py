@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
 import gemelo
+from services.cli import simulated
 from services.cli.errors import CommandError, ExitCode, in_commands, usage
 
 if TYPE_CHECKING:
@@ -39,10 +40,16 @@ def connect_arm(robot: Robot | None = None) -> Iterator[Arm]:
 
     Raises `CommandError` if there is no router, if nobody answers, or for what was refused or has failed.
     """
-    robot = robot or load_robot()
+    robot, twin = robot or load_robot(), simulated.chosen()
     require_router(robot.deployment)
-    with reported(robot), gemelo.connect(robot, name=own_name(), needs_gateway=False) as arm:
-        yield arm
+    with reported(robot):
+        opened = (
+            gemelo.connect(robot, name=own_name(), needs_gateway=False)
+            if twin is None
+            else twin.connect(robot, own_name())
+        )
+        with opened as arm:
+            yield arm
 
 
 @contextmanager
@@ -68,14 +75,20 @@ def connect(robot: Robot | None = None) -> Iterator[CommandSession]:
 
     Raises `CommandError` if there is no router, if nobody answers, or if a server refuses.
     """
-    deployment, arm = robot or load_robot()
+    robot, twin = robot or load_robot(), simulated.chosen()
+    deployment, arm = robot
     require_router(deployment)
     from services.runtime.errors import BusError, NoAnswer, RequestRefused, ServerLost  # slow to load: the bus
     from services.runtime.node import Node
 
     try:
-        with Node(own_name(), deployment, robot=arm.name) as node:
-            yield CommandSession(deployment, arm, node)
+        if twin is None:
+            opened = Node(own_name(), deployment, robot=arm.name)
+        else:
+            with reported(robot):
+                opened = twin.node(robot, own_name())
+        with opened as node:
+            yield CommandSession(node.deployment, arm, node)
     except NoAnswer as error:
         raise CommandError(other_robots(deployment, arm) or str(error), ExitCode.NO_STACK) from error
     except BusError as error:
@@ -92,7 +105,9 @@ def share_control(session: CommandSession) -> None:
 
 
 def require_router(deployment: Deployment) -> None:
-    """Raises `CommandError` where no router listens, before anything slow is loaded."""
+    """Raises `CommandError` where no router listens, before anything slow is loaded; a simulated twin needs none."""
+    if simulated.chosen() is not None:
+        return
     from gemelo import robot_files  # slow to load
 
     try:
@@ -103,7 +118,7 @@ def require_router(deployment: Deployment) -> None:
 
 def other_robots(deployment: Deployment, arm: ArmDescription) -> str:
     """A sentence that names the robots on the router if `arm`'s own gateway is not there; else empty."""
-    robots = gemelo.robots(deployment)
+    robots = gemelo.robots(deployment) if simulated.chosen() is None else ()
     if not robots or arm.name in robots:
         return ""
     router = f"{deployment.router.host}:{deployment.router.port}"
