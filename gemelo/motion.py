@@ -206,7 +206,7 @@ class Motion:
                 told[0] = self.feedback
                 on_progress(self)
 
-        return self._session.wait_for(lambda: self.is_over, timeout, tell)
+        return self._session.wait_for(lambda: self.is_over, timeout, tell if on_progress is not None else None)
 
     def _interrupted(self, on_cancel: OnMotion | None) -> Interrupted:
         """Decelerates and waits for the rest; a second Ctrl-C leaves this at once. Raises `Lost`."""

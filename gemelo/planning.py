@@ -318,7 +318,7 @@ def _ask(session: Session, request: PlanRequest, on_progress: OnPlanProgress | N
     shown = session.node.subscribe(PLAN_PROGRESS, hear) if on_progress is not None else None
     try:
         call = session.ask(PLAN, request, timeout)
-        session.wait_for(lambda: call.is_over, timeout, tell)
+        session.wait_for(lambda: call.is_over, timeout, tell if on_progress is not None else None)
         return answer_of(call)
     except Lost:
         _cancel(session, request)  # it may be waiting behind the plans of others

@@ -140,7 +140,10 @@ class Session:
                 left = 1.0 if end is None else end - self.clock.monotonic()
                 if left <= 0.0:
                     return False
-                self.news.wait(min(left, 1.0))
+                if on_news is None:
+                    self.news.wait_for(is_so, min(left, 1.0))
+                else:
+                    self.news.wait(min(left, 1.0))
             self.node  # noqa: B018 raises where the connection has ended
             if on_news is not None:
                 on_news()

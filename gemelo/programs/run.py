@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial
 
 from gemelo.arm import Arm
 from gemelo.errors import Error, Refused
@@ -99,12 +99,12 @@ class ProgramRun:
             require_right(self.program, self._arm.description, self._points, self._programs)
             programs = called_programs(self.program, self._programs)
             legs = legs_of(self.program, programs, first)
-            self._controls = Controls(pauses_after_one=one_step)
+            self._controls, clock = Controls(pauses_after_one=one_step), self._arm.node.clock
             self.execution = Execution(self._arm, legs, dict(self._points), self._controls, self._on_leg)
             if stops != self._stops:
                 self._controls.stop.set()
-            self._put(RunState(self.program.name, RunStatus.RUNNING, started_at=time.time()))
-            self._thread = threading.Thread(target=self._run, args=(self.execution,), name="program", daemon=True)
+            self._put(RunState(self.program.name, RunStatus.RUNNING, started_at=clock.unix() * 1e-9))
+            self._thread = clock.thread(partial(self._run, self.execution), "program")
             self._thread.start()
 
     def pause(self) -> None:
@@ -152,9 +152,10 @@ class ProgramRun:
 
     def wait(self, timeout: float | None = None) -> RunState:
         """Returns when the run is over or has paused, with its state; TimeoutError after `timeout` [s]."""
-        end = None if timeout is None else time.monotonic() + timeout
+        clock = self._arm.node.clock
+        end = None if timeout is None else clock.monotonic() + timeout
         while self._goes_on:
-            left = 1.0 if end is None else end - time.monotonic()
+            left = 1.0 if end is None else end - clock.monotonic()
             if left <= 0.0:
                 raise TimeoutError(f'program "{self.program.name}" still runs after {timeout:g} s')
             self._arm.wait_for(lambda: not self._goes_on, min(left, 1.0))

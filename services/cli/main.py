@@ -17,8 +17,8 @@ from services.runtime.process.leaving import end_process
 ABOUT = "The twin's command line: move the arm, and see everything that is said about it."
 EPILOG = (
     "The deployment is deploy/local.toml, or the file that $GEMELO_CONFIG names. `gemelo --robot NAME COMMAND` is for\n"
-    "another arm of urdf/, or for a recording that is played. `gemelo --simulate COMMAND` is for a twin of its own that\n"
-    "needs nothing to run, in virtual time; `--simulate=START` has it stand in a named state, or unreferenced."
+    "another arm of urdf/, or for a recording that is played. `gemelo --simulate COMMAND` is for a twin of its own in\n"
+    "virtual time, for which nothing needs to run; `--simulate=START` has it stand in a named state, or unreferenced."
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from pathlib import Path
@@ -148,3 +149,10 @@ def test_time_can_be_real() -> None:
 def test_what_cannot_be_is_refused_in_a_sentence(options: dict[str, object], reason: str) -> None:
     with pytest.raises(gemelo.BadArgument, match=reason):
         gemelo.simulate("rm1", **options)  # type: ignore[arg-type]
+
+
+def test_a_part_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("services.planner.main", "pinocchio"):
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(gemelo.Error, match=r'a simulated planner needs: pip install "gemelo\[planner\]"'):
+        gemelo.simulate("rm1")
