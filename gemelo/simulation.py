@@ -267,19 +267,6 @@ class SimulatedWorld:
         self._arm.device.inject(kind, str(rest[0]) if rest else "", value)
         self.sleep(PRESSED)
 
-    def connect(self, name: str) -> Arm:
-        """Another connection to the same arm, as of another program; `name` is that of its node.
-
-        >>> with gemelo.simulate("rm1") as simulated, simulated.sim.connect("other") as other:
-        ...     other.take_control("ana")
-        ...     simulated.control.holder
-        <gemelo.control.Hold ...>
-        'ana'
-        """
-        twin = self._twin
-        node = Node(name, twin.deployment, robot=twin.arm.name, bus=twin.bus(), log_level="warning")
-        return Arm(Session(twin.deployment, twin.arm, node))
-
     def node(self, name: str) -> Node:
         """A node of your own on the arm's bus, to be closed by you.
 
