@@ -42,12 +42,12 @@ test-stacks: # a stack on each of two workers: with three on two slow cores one 
 test-alone:
 	@$(pytest) -m "alone" tests
 
-check: setup ## ruff, mypy, import-linter, clang-format
+check: setup ## ruff, mypy, import-linter, clang-format, gofmt
 	@$(MAKE) --jobs 2 --keep-going --output-sync=target $(checks)
 	@echo "check: all good"
 
 # Side by side, the longest first; each one's messages stay together.
-checks := check-types check-walls check-lint check-format check-cpp
+checks := check-types check-walls check-lint check-format check-cpp check-go
 .PHONY: $(checks)
 check-types:
 	@$(bin)/mypy --no-error-summary gemelo schemas services firmware docs examples
@@ -59,10 +59,13 @@ check-format:
 	@$(bin)/ruff format --check --quiet . || { echo "remedy: make format"; exit 1; }
 check-cpp:
 	@git ls-files '*.h' '*.hpp' '*.cpp' | xargs -r $(bin)/clang-format --dry-run -Werror
+check-go: # where Go is on PATH
+	@! command -v gofmt >/dev/null || [ -z "$$(gofmt -l services)" ] || { echo "remedy: make format"; exit 1; }
 
-format: setup ## let ruff and clang-format write
+format: setup ## let ruff, clang-format and gofmt write
 	@$(bin)/ruff check --quiet --fix . ; $(bin)/ruff format --quiet .
 	@git ls-files '*.h' '*.hpp' '*.cpp' | xargs -r $(bin)/clang-format -i
+	@! command -v gofmt >/dev/null || gofmt -w services
 
 docs: setup ## docs/api.md from the docstrings of gemelo
 	@$(bin)/python docs/make_api.py

@@ -90,6 +90,7 @@ FIGURES = {
     "render_ms": FigureRow("vision.eyes:render_ms", "ms"),
     "cli_start_ms": FigureRow("stack:cli_start_ms", "ms"),
     "handshake_ms": FigureRow("handshake:handshake_ms", "ms"),
+    "broker_echo_ms": FigureRow("brokers:broker_echo_ms", "ms"),
     "arms_on_one_router": FigureRow("many_arms:arms_on_one_router", "arms"),
     "tick_instructions": FigureRow("firmware_cost:tick_instructions", "instr"),
     "slot_instructions": FigureRow("firmware_cost:slot_instructions", "instr"),

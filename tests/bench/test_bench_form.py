@@ -28,7 +28,7 @@ OF_THE_ISSUES = (
     "stack_idle_cpu_percent", "stack_rss_mb", "state_to_frame_ms", "image_path_ms",
     "move_accept_to_first_step_ms", "program_legs", "stop_ms", "chunk_ack_ms", "chunk_ack_tls_ms",
     "panel_cpu_percent", "panel_lag_ms", "stop_key_ms", "goal_drag_hz", "record_cpu_percent",
-    "record_mb_per_hour", "blackbox_ms", "blackbox_cpu_percent", "ready_s",
+    "record_mb_per_hour", "blackbox_ms", "blackbox_cpu_percent", "ready_s", "broker_echo_ms",
 )  # fmt: skip
 
 

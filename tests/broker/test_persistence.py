@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import re
+from base64 import b64decode
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from tests.broker.running import BROKERS, RunningBroker, wait_until
+from tests.disks import WAYS, refusing_disk
 
+COMPLAINT = {"embedded": "cannot be written", "mosquitto": "rror"}
 PERSISTED = {"embedded": "embedded_broker.json", "mosquitto": "mosquitto.db"}
 
 
@@ -71,26 +76,39 @@ def test_without_a_folder_a_restart_forgets_all_and_nothing_is_written(tmp_path,
     assert found - written <= ({"run/mosquitto.conf"} if name == "mosquitto" else set())
 
 
-def test_a_folder_that_cannot_be_written_is_said_once_and_the_broker_goes_on_until_it_can(tmp_path, join, topic):
-    """mosquitto goes on too, and says so in words of its own."""
-    kept = tmp_path / "kept"
-    kept.write_text("a file where the folder belongs")
-    running = RunningBroker("embedded", tmp_path, persistence_folder=kept).wait_ready()
-    writer, reader = join(running), join(running)
-    reader.subscribe(topic)
-    writer.publish(topic, "retained", retain=True)
-    assert reader.next() == (topic, "retained")
-    wait_until(lambda: "cannot be written" in running.output)
-    writer.publish(topic, "again", retain=True)
-    assert reader.next() == (topic, "again")
-    kept.unlink()
-    wait_until(lambda: "is written again" in running.output)
-    assert running.output.count("cannot be written") == 1
-    running.restart()
-    late = join(running)
-    late.subscribe(topic)
-    assert late.next() == (topic, "again")
-    running.stop()
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("name", BROKERS)
+def test_a_disk_that_refuses_ends_nothing_and_once_it_takes_files_all_is_kept_again(tmp_path, join, topic, name, way):
+    with refusing_disk(way, tmp_path / "disk") as disk:
+        file = disk.folder / PERSISTED[name]
+        running = RunningBroker(name, tmp_path / "own", persistence_folder=disk.folder).wait_ready()
+        writer, reader = join(running), join(running)
+        reader.subscribe(topic)
+        disk.refuse()
+        writer.publish(f"{topic}/large", bytes(10_000), retain=True)  # mosquitto sees no error within its buffer
+        for number in range(3):
+            writer.publish(topic, str(number), retain=True)
+            assert reader.next() == (topic, str(number))
+        wait_until(lambda: COMPLAINT[name] in running.output)
+        writer.publish(topic, "meanwhile", retain=True)
+        assert reader.next() == (topic, "meanwhile")
+        disk.take()
+        writer.publish(topic, "again", retain=True)
+        wait_until(lambda: file.exists() and b"again" in content(file))
+        if name == "embedded":
+            assert running.output.count(COMPLAINT[name]) == 1
+            wait_until(lambda: "is written again" in running.output)
+        running.restart(kill=True)
+        late = join(running)
+        late.subscribe(topic)
+        assert late.next() == (topic, "again")
+        running.stop()
+
+
+def content(file: Path) -> bytes:
+    """Payloads are in base64 where the file is text."""
+    text = file.read_bytes()
+    return text + b"".join(b64decode(each) for each in re.findall(rb'"payload":"([^"]*)"', text))
 
 
 def test_a_file_that_cannot_be_read_is_put_aside_and_said(tmp_path, join):
