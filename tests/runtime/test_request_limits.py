@@ -19,9 +19,9 @@ from services.runtime.bus.interface import UNREAD, Bus, BusReply, Query
 from services.runtime.bus.pace import Pace, Rate
 from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.bus.zenoh_declarations import QUERIES
+from services.runtime.clock import SystemClock
 from services.runtime.errors import NoAnswer
 from services.runtime.node import Node
-from services.runtime.requests import limits
 from services.runtime.requests.limits import (
     KNOWN_AFTER,
     MAX_CLIENTS,
@@ -42,8 +42,8 @@ from tests.runtime.support import Buses, RouterProcess, hear, spinning, until
 Answers = list[BusReply | None]
 
 
-class Clock:
-    """[s] monotonic, as a test sets it."""
+class SetClock(SystemClock):
+    """Its [s] monotonic are as a test sets them."""
 
     now = 100.0
 
@@ -52,15 +52,13 @@ class Clock:
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
-    clock = Clock()
-    monkeypatch.setattr(limits, "time", clock)
-    return clock
+def clock() -> SetClock:
+    return SetClock()
 
 
 @pytest.mark.parametrize("urgent", [False, True])
-def test_a_flood_under_ever_new_names_gets_what_one_client_gets(clock: Clock, urgent: bool) -> None:
-    rates, seconds = RequestRates(), 10
+def test_a_flood_under_ever_new_names_gets_what_one_client_gets(clock: SetClock, urgent: bool) -> None:
+    rates, seconds = RequestRates(clock=clock), 10
     for _ in range(2):  # known from the second time on
         assert rates.permit_request("viewer.desk", "known", urgent)
         clock.now += KNOWN_AFTER
@@ -76,8 +74,8 @@ def test_a_flood_under_ever_new_names_gets_what_one_client_gets(clock: Clock, ur
     )
 
 
-def test_clients_that_were_known_before_they_flood_get_three_times_what_one_gets(clock: Clock) -> None:
-    rates, seconds, names = RequestRates(), 10, 2 * MAX_CLIENTS
+def test_clients_that_were_known_before_they_flood_get_three_times_what_one_gets(clock: SetClock) -> None:
+    rates, seconds, names = RequestRates(clock=clock), 10, 2 * MAX_CLIENTS
     for number in range(names):
         clock.now += 1 / OF_NEWCOMERS.per_second
         rates.permit_request("viewer.desk", f"client {number}")
@@ -90,8 +88,8 @@ def test_clients_that_were_known_before_they_flood_get_three_times_what_one_gets
     assert rates.permit_request("operator.desk", "gemelo move")
 
 
-def test_principals_without_end_share_one_place(clock: Clock) -> None:
-    rates = RequestRates()
+def test_principals_without_end_share_one_place(clock: SetClock) -> None:
+    rates = RequestRates(clock=clock)
     permitted = sum(rates.permit_request(f"viewer.host{number}", "a") for number in range(100 * MAX_PRINCIPALS))
     assert permitted <= 2 * MAX_PRINCIPALS + OF_NEWCOMERS.burst
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-import time
 from queue import Empty, SimpleQueue
 from typing import Generic, TypeVar
 
@@ -50,7 +48,7 @@ class PendingCall(Generic[Q, R]):
         self._payload, self._number = to_payload(question), number or bus.take_number()
         if appearance and not bus.wait_served(request.key, min(timeout, appearance)):
             raise NoAnswer(_nobody(bus, request))
-        self._end = time.monotonic() + timeout
+        self._end = bus.clock.monotonic() + timeout
         self._send()
 
     @property
@@ -72,7 +70,7 @@ class PendingCall(Generic[Q, R]):
 
     def _send(self) -> None:
         self._tries += 1
-        schema, left = schema_of(self._request.request), max(PAUSE, self._end - time.monotonic())
+        schema, left = schema_of(self._request.request), max(PAUSE, self._end - self._bus.clock.monotonic())
         urgent = self._request.urgent
         self._bus.ask(self._request.key, schema, self._payload, left, self._on_answer, urgent, self._number)
 
@@ -83,10 +81,9 @@ class PendingCall(Generic[Q, R]):
             self._put(UNREAD)
 
     def _on_answer(self, answer: BusReply | None) -> None:
-        if answer == UNREAD and self._request.urgent and time.monotonic() + PAUSE < self._end:
-            again = threading.Timer(PAUSE, self._send_again)
-            again.daemon = True
-            again.start()
+        clock = self._bus.clock
+        if answer == UNREAD and self._request.urgent and clock.monotonic() + PAUSE < self._end:
+            clock.later(PAUSE, self._send_again)
         else:
             self._put(answer)
 
