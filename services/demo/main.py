@@ -119,8 +119,9 @@ def take_picture(recording: Path, png: Path) -> list[str]:
 
 def missing_driver() -> str:
     """What is missing to draw without a display, with the remedy; empty where all is here."""
-    command = [project_root() / "deploy/optional", "vulkan"]
-    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+    command = [str(project_root() / "deploy/optional"), "vulkan"]
+    asked: subprocess.CompletedProcess[str] = subprocess.run(command, capture_output=True, text=True, check=False)
+    return asked.stdout.strip()
 
 
 if __name__ == "__main__":
