@@ -146,7 +146,7 @@ class RecordingWriter:
 
 
 def require_reserve(folder: Path, reserve_mb: float) -> None:
-    """Raises NoReserve where less than the reserve is free: ledger, positions and logs mostly lie on the same disk."""
+    """Raises NoReserve where fewer [MB] than the reserve are free: ledger, positions and logs mostly share the disk."""
     disk = os.statvfs(folder)
     reserve = min(reserve_mb * 1e6, disk.f_blocks * disk.f_frsize / SHARE)
     if disk.f_bavail * disk.f_frsize < reserve:

@@ -1,4 +1,4 @@
-"""What the tab State shows that no counter knows: the shafts of a virtual device, and a disk that refuses."""
+"""The tab State: the shafts of a virtual device beside its counters, and a disk that refuses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a process could not write to its disk: reported once for each change, and kept for whoever asks."""
+"""The files that a process could not write: reported once for each change, and kept for whoever asks."""
 
 from __future__ import annotations
 
