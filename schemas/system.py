@@ -57,7 +57,7 @@ class NodeInfo(Message, frozen=True, kw_only=True):
     robot: str = ""
     host: str = ""
     pid: int = 0
-    version: str = ""
+    version: str = ""  # empty: it could not be read
     started: int = 0  # [ns] UNIX time
     publishes: tuple[str, ...] = ()
     subscribes: tuple[str, ...] = ()

@@ -240,7 +240,7 @@ def _told(session: CommandSession, nodes: Iterable[str]) -> dict[str, tuple[Node
 def versions(infos: Mapping[str, NodeInfo]) -> Diagnosis:
     """Whether every node runs the version of gemelo that this command is of."""
     own = gemelo_version()
-    others = [f"{name} {info.version} on {info.host}" for name, info in infos.items() if info.version != own]
+    others = [f"{name} {info.version} on {info.host}" for name, info in infos.items() if info.version not in ("", own)]
     if not others:
         return Diagnosis(Verdict.OK, "versions of the nodes", f"{len(infos)} nodes run {own}, as this command")
     remedy = "put one version on every host (`make setup` there), and start its nodes anew"

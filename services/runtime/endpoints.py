@@ -95,8 +95,16 @@ class NodeEndpoints:
             each.report_losses()
 
 
-@cache
 def _own_version() -> str:
+    """Empty where the process has no descriptor left to read it."""
+    try:
+        return _read_version()
+    except (OSError, ImportError):
+        return ""
+
+
+@cache
+def _read_version() -> str:
     from importlib.metadata import version  # 20 ms that most nodes never need
 
     return version("gemelo")
