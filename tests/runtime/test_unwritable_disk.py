@@ -9,13 +9,16 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from importlib.metadata import version
 
 import pytest
 
+from services.runtime import endpoints
 from services.runtime.deployment import project_root
 from services.runtime.process.beat_socket import newest_beat
 from services.runtime.process.readiness import Readiness, is_fresh, says_ready
 from services.runtime.process.unwritten import UnwrittenFiles
+from tests.descriptors import few_descriptors
 from tests.disks import WAYS, Disk, refusing_disk
 from tests.optional import need
 from tests.runtime.support import free_port, until
@@ -108,6 +111,13 @@ def test_without_a_disk_and_a_descriptor_a_beat_still_finds_a_socket(tmp_path):
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, limits)
     assert says_ready(tmp_path / "run", "gateway")
+
+
+def test_a_version_that_cannot_be_read_now_is_read_later():
+    endpoints._read_version.cache_clear()
+    with few_descriptors():
+        assert endpoints._own_version() == ""
+    assert endpoints._own_version() == version("gemelo")
 
 
 def test_systemd_hears_of_a_beat_without_a_free_descriptor(tmp_path, monkeypatch):
