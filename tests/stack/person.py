@@ -92,10 +92,6 @@ class Operator:
         plan = self.plan(speed)
         return self.send(plan).wait(plan.duration + 10.0)
 
-    def stop(self):
-        """What the gateway answers to a STOP."""
-        return self.node.call(DEVICE_STOP, DeviceStopRequest(), timeout=3.0)
-
     def is_moving(self):
         """Whether the last joint state says that some joint moves."""
         return bool(self.seen) and any(abs(velocity) > 1e-3 for velocity in self.seen[-1].velocity)

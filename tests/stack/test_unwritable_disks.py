@@ -1,4 +1,4 @@
-"""A disk that is full or read-only, and processes without a descriptor, in the middle of a move: the arm goes on."""
+"""A disk that is full or read-only in the middle of a move, and a gateway without a descriptor: the arm goes on."""
 
 from __future__ import annotations
 
@@ -20,9 +20,8 @@ from tests.stack.person import Operator, jumps
 SPEED = 0.3  # slow enough that all of a fault falls into the move
 OF_THE_ARM = ("router", "broker", "virtual_esp32", "stepper_gateway")
 PROCESSES = (*OF_THE_ARM, "planner", "state_publisher", "logger", "panel")
-NO_DESCRIPTORS = "no descriptors"
 OUT_SIZE = 128 << 20  # [bytes] for the recordings and black boxes of all tests
-FAULTS = ("full", "read-only", NO_DESCRIPTORS)
+FAULTS = ("full", "read-only")
 
 
 class Site:
@@ -35,18 +34,13 @@ class Site:
     def fault(self, name: str) -> Iterator[None]:
         """Lasts until the end of the block."""
         with ExitStack() as healing:
-            match name:
-                case "full":
-                    for disk in (self._run, self._out):
-                        healing.callback(disk.free)
-                        disk.fill()
-                case "read-only":
-                    healing.callback(self._run.make_writable)
-                    self._run.make_read_only()
-                case _:
-                    for pid in self.stack.pids().values():
-                        healing.callback(give_descriptors, pid)
-                        take_descriptors(pid)
+            if name == "full":
+                for disk in (self._run, self._out):
+                    healing.callback(disk.free)
+                    disk.fill()
+            else:
+                healing.callback(self._run.make_writable)
+                self._run.make_read_only()
             yield
 
 
@@ -84,20 +78,14 @@ def doctor(stack: Stack) -> str:
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_move_goes_on_to_the_step_and_a_stop_works_and_nobody_is_started_anew(site, stack, operator, fault):
     before = stack.pids()
-    # Where its own disk refuses too, or no file can be opened, the logger rightly says that it does not record.
-    ready = [name for name in PROCESSES if name != "logger" or fault == "read-only"]
+    ready = [name for name in PROCESSES if name != "logger" or fault == "read-only"]  # it has nowhere to record else
     handle, plan = begin(operator)
     with site.fault(fault):
         require_success(handle.wait(plan.duration + 10.0))
         assert operator.wait_for(lambda: all(map(stack.is_ready, ready)), 10.0), stack.why_not_ready()
-        if fault == NO_DESCRIPTORS:
-            handle, plan = begin(operator)  # a stop by a client that was there before: no new one gets in
-            assert operator.stop().accepted
-        else:
-            said = doctor(stack)
-            assert "folder run" in said
-            handle, plan = begin(operator)
-            gemelo(stack, "stop")
+        assert "folder run" in doctor(stack)
+        handle, plan = begin(operator)
+        gemelo(stack, "stop")
         assert handle.wait(10.0).status is not GoalStatusCode.SUCCEEDED
         assert stack.pids() == before
     stack.wait_ready(20.0)
@@ -108,7 +96,7 @@ def test_a_move_goes_on_to_the_step_and_a_stop_works_and_nobody_is_started_anew(
     assert all((stack.run / f"{name}.ready").exists() for name in PROCESSES)
 
 
-@pytest.mark.parametrize("fault", ["full", "read-only"])
+@pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("name", OF_THE_ARM)
 def test_what_moves_and_stops_the_arm_also_starts_while_the_disk_refuses(site, stack, operator, fault, name):
     with site.fault(fault):
