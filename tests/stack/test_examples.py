@@ -87,14 +87,14 @@ class OnAnArm:
 
 
 class TestRm1(OnAnArm):
-    @pytest.fixture(scope="class")
+    @pytest.fixture
     def twin(self, rm1_stack: Stack) -> Iterator[Stack]:
         with found_by_scripts(rm1_stack):
             yield rm1_stack
 
 
 class TestParol6(OnAnArm):
-    @pytest.fixture(scope="class")
+    @pytest.fixture
     def twin(self, parol6_stack: Stack) -> Iterator[Stack]:
         with found_by_scripts(parol6_stack):
             yield parol6_stack

@@ -13,7 +13,7 @@ import pytest
 
 import gemelo
 from schemas import system
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY, Request
+from services.runtime.endpoints import parameter_request, parameters_request
 from services.stack.stack import Stack
 from tests.simulated import where_it_stands
 
@@ -38,8 +38,12 @@ class Reset:
         self._stack = stack
         self._arm = self._connected()
         self._parameters: Values = {}
-        self._put_right()
-        self._parameters = self._read_parameters()
+        try:
+            self._put_right()
+            self._parameters = self._read_parameters()
+        except BaseException:
+            self.close()
+            raise
 
     def close(self) -> None:
         """Leaves the bus."""
@@ -57,7 +61,7 @@ class Reset:
     def after(self, before: Before) -> list[str]:
         """What the test should have ended or put back itself, a sentence for each; all of it is put right."""
         left = [*self._processes(), *self._children(before), *self._complaints(before)]
-        left += [*self._control(), *self._motion(), *self._device(), *self._changed_parameters()]
+        left += [*self._motion(), *self._control(), *self._device(), *self._changed_parameters()]
         self._put_right()
         for path in self._files() - before.files:
             path.unlink()
@@ -94,7 +98,6 @@ class Reset:
         arm = self._arm
         if not self._becomes(lambda: _rests(arm), LETS_GO):
             yield f"the arm still moves, device mode {arm.device.mode.name}"
-            arm.node.action(FOLLOW_JOINT_TRAJECTORY).cancel_all()
             arm.stop()
             assert self._becomes(lambda: _rests(arm), LETS_GO), "the arm does not come to rest"
 
@@ -123,15 +126,14 @@ class Reset:
             usual = self._parameters.get((node, name), value)
             if value != usual:
                 yield f"{node}'s parameter {name} is {value}, it was {usual}"
-                setting = Request(f"@node/{node}/parameters/set", system.SetParameter, system.Parameter, node, "")
+                setting = parameter_request(node)
                 self._arm.node.call(setting, system.SetParameter(name=name, value=usual), 5.0)
 
     def _read_parameters(self) -> Values:
         found: Values = {}
         for node in self._stack.processes:
             if node in self._arm.node.alive():
-                listed = Request(f"@node/{node}/parameters/list", system.Empty, system.Parameters, node, "")
-                answer = self._arm.node.call(listed, system.Empty(), 5.0)
+                answer = self._arm.node.call(parameters_request(node), system.Empty(), 5.0)
                 found |= {(node, each.name): each.value for each in answer.parameters}
         return found
 
@@ -145,7 +147,7 @@ class Reset:
             arm.device.arm()
         if not all(arm.device.state.referenced):
             arm.reference(where_it_stands(arm))
-        if arm.device.state.time_scale != 1.0:
+        if arm.device.state.speed != 1.0:
             arm.speed(1.0)
         if arm.scene.present.objects or arm.scene.present.allowed:
             arm.scene.clear()

@@ -24,8 +24,6 @@ from tests.stepper_gateway.locked import wait_for
 from tests.stepper_gateway.processes import BROKER, DEVICE, Processes
 from tests.stepper_gateway.wired import WiredGateway
 
-pytestmark = pytest.mark.full
-
 NEAR = (0.1, -0.2, 0.01)
 
 
