@@ -7,35 +7,35 @@ HYPOTHESIS_PROFILE=full. HYPOTHESIS_PROFILE=explore looks for new examples.
 from __future__ import annotations
 
 import gc
-import os
 import signal
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import settings
-from hypothesis.internal.conjecture import providers
 
 from services.runtime.process.arithmetic import use_one_kernel
+from tests import optional, profiles
 
 if TYPE_CHECKING:
     from services.arm.model.description import ArmDescription
 
 use_one_kernel()  # as the planner's process does: what it computes is compared with recordings of other machines
 
-pytest_plugins = ["tests.cost", "tests.stacks.counts", "tests.stacks.shared", "tests.stacks.browser", "pytester"]
+pytest_plugins = [
+    "tests.cost",
+    "tests.left_out",
+    "tests.stacks.counts",
+    "tests.stacks.shared",
+    "tests.stacks.browser",
+    "pytester",
+]
 
 # A run in the background begins with Ctrl-C ignored, and every process that a test starts would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# No deadline: two cores, shared; time is measured by the bench.
-settings.register_profile("quick", derandomize=True, deadline=None)
-settings.register_profile("full", derandomize=True, deadline=None)
-settings.register_profile("explore", deadline=None)
-profile = os.environ.get("HYPOTHESIS_PROFILE", "quick")
-settings.load_profile(profile)
-if profile != "explore":  # not those with the numbers of whatever modules happen to be loaded
-    providers._get_local_constants = lambda: providers._local_constants
+profiles.load()
+sys.addaudithook(optional.on_audit_event)
 
 WHOLE = {"twin", "chromium"}  # fixtures that start a stack's processes, or a browser
 

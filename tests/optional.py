@@ -1,4 +1,8 @@
-"""Tools without which a test is skipped, named by `make test` in its closing line; in CI it fails."""
+"""Tools without which a test is skipped, named by `make test` in its closing line; in CI it fails.
+
+A test that starts one of their programs in its own process needs it without a word; what a process of the product
+starts, it names with `need`.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import os
 import subprocess
 from functools import cache
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
 
@@ -19,6 +23,22 @@ def lack(name: str) -> str:
     done = subprocess.run([OPTIONAL, name], capture_output=True, text=True, check=False)
     assert done.returncode in (0, 1), done.stderr
     return done.stdout.strip()
+
+
+@cache
+def programs() -> dict[str, str]:
+    """The row of deploy/optional that each program belongs to."""
+    done = subprocess.run([OPTIONAL, "programs"], capture_output=True, text=True, check=True)
+    rows = (line.split("|") for line in done.stdout.splitlines())
+    return {program: name for name, several in rows for program in several.split()}
+
+
+def on_audit_event(event: str, arguments: tuple[Any, ...]) -> None:
+    """Asks for the program that is about to be started by its name, as sys.addaudithook calls it."""
+    if event == "subprocess.Popen" and isinstance(command := arguments[1], list | tuple):
+        first = command[0] if command else ""
+        if isinstance(first, str) and "/" not in first and first in programs():
+            need(programs()[first])
 
 
 def need(name: str) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -100,14 +101,27 @@ def missing_files(folder: Path, recording: Path) -> list[str]:
 
 
 def take_picture(recording: Path, png: Path) -> list[str]:
-    """Takes a picture of the viewer; returns what went wrong, empty if nothing did."""
+    """Takes a picture of the viewer; returns what went wrong, empty if nothing did.
+
+    Where no driver draws it there is none: that is said with its remedy, and fails nothing.
+    """
     from services.visualizer.program.screenshot import save_screenshot  # slow to load: rerun
 
     try:
         save_screenshot(recording, png)
     except (RuntimeError, OSError) as error:
+        if lack := missing_driver():
+            say(f"no picture of the view: {lack}")
+            return []
         return [f"no picture: {error}"]
     return []
+
+
+def missing_driver() -> str:
+    """What is missing to draw without a display, with the remedy; empty where all is here."""
+    command = [str(project_root() / "deploy/optional"), "vulkan"]
+    asked: subprocess.CompletedProcess[str] = subprocess.run(command, capture_output=True, text=True, check=False)
+    return asked.stdout.strip()
 
 
 if __name__ == "__main__":

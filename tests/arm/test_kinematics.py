@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from services.arm.errors import DescriptionError
@@ -17,6 +17,7 @@ from services.arm.frames.transforms import from_message
 from services.arm.kinematics.chain import link_transforms
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import ArmDescription, load_arm
+from tests.profiles import examples
 
 RM1 = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 KINEMATICS = Kinematics(RM1)
@@ -89,7 +90,7 @@ def test_a_margin_sees_what_is_only_near():
     assert KINEMATICS.collisions.distance((0.0, 0.0, 0.0)) > 0.1
 
 
-@settings(max_examples=200)
+@examples(full=200)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_no_distance_changes_faster_than_the_reach_says(a: tuple[float, ...], b: tuple[float, ...]):
     moved = float(np.abs(np.subtract(a, b)) @ KINEMATICS.collisions.reach)

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.kinematics.tool_jacobian import ToolJacobian
 from services.arm.model.description import load_arm
+from tests.profiles import examples
 
 ROOT = Path(__file__).parents[2]
 ARMS = {name: load_arm(ROOT / "urdf" / name) for name in ("rm1", "parol6")}
@@ -19,7 +20,7 @@ BOTH = {name: (Kinematics(arm), ToolJacobian(arm)) for name, arm in ARMS.items()
 
 
 @pytest.mark.parametrize("name", ARMS)
-@settings(max_examples=40, deadline=None)
+@examples(quick=10, full=40)
 @given(data=st.data())
 def test_the_tool_and_its_jacobian_are_those_of_pinocchio(name: str, data: st.DataObject) -> None:
     at = [data.draw(st.floats(joint.lower, joint.upper)) for joint in ARMS[name].joints]

@@ -13,6 +13,7 @@ from services.bench.figures import Figure, FigureGoal, NotMeasured, guarded, of_
 from services.bench.main import FIGURES, function_of
 from services.bench.panel import DRAG_GOAL, judged_cpu
 from services.bench.stack import Stacks
+from tests.table import table
 
 OF_THE_ISSUES = (
     "frame_lookup_us", "state_check_us", "collision_checks_per_s", "ik_ms", "ik_success", "plan_ms",
@@ -32,7 +33,7 @@ OF_THE_ISSUES = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", OF_THE_ISSUES)
+@table("name", OF_THE_ISSUES)
 def test_every_figure_of_the_issues_has_a_function_of_its_name(name):
     function = function_of(FIGURES[name])
     assert callable(function)

@@ -9,6 +9,7 @@ from services.bench.ledger import LEVEL, POPULATIONS, SEED, StateAfterMove, simu
 MOVES = 150
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["log-normal about 0.6", "log-uniform 0.1 to 1.2", "1.2 times beta (2, 3)"])
 def test_of_all_states_that_it_calls_sure_95_percent_have_lost_no_step(name: str) -> None:
     seen = simulate(MOVES, POPULATIONS[name], SEED)

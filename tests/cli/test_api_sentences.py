@@ -13,6 +13,7 @@ import gemelo
 from services.cli.errors import CommandError, ExitCode, in_commands
 from services.cli.home import home
 from services.cli.session import load_robot, reported
+from tests.table import table
 
 GEMELO = Path(__file__).parents[2] / "gemelo"
 METHOD = re.compile(r"\barm\.[a-z_.]+\(")
@@ -37,7 +38,7 @@ def test_there_are_sentences_that_name_methods() -> None:
     assert len(NAMING_METHODS) > 5
 
 
-@pytest.mark.parametrize("text", NAMING_METHODS)
+@table("text", NAMING_METHODS)
 def test_every_method_that_a_sentence_names_has_its_command(text: str) -> None:
     said = in_commands(text)
     assert not METHOD.search(said)

@@ -13,6 +13,7 @@ from services.cli.errors import CommandError, ExitCode
 from services.cli.main import run
 from services.cli.messages import message_of
 from services.cli.topic import topic_of
+from tests.table import table
 
 
 @pytest.fixture
@@ -50,7 +51,7 @@ def test_every_topic_is_listed_with_its_unit_of_rate(capsys):
         assert topic.key in text
 
 
-@pytest.mark.parametrize("topic", [topic.key for topic in TOPICS])
+@table("topic", [topic.key for topic in TOPICS])
 def test_topic_info_is_yaml_with_every_field(topic, no_stack, capsys):
     assert run(["topic", "info", topic]) is ExitCode.OK
     shown = yaml.safe_load(capsys.readouterr().out)

@@ -12,6 +12,7 @@ from services.arm.model import description
 from services.cli.commands import COMMANDS, GROUPS
 from services.cli.errors import ExitCode
 from services.cli.main import parse, run
+from tests.table import table
 
 SPEAKING = (
     "move --named ready", "state", "hold", "reference --joints brazo_joint=0", "home brazo_joint", "output avanzar on",
@@ -32,7 +33,7 @@ TABLES = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: " ".join(command.words))
+@table("command", COMMANDS, ids=lambda command: " ".join(command.words))
 def test_every_function_of_the_table_takes_one_argument(command):
     for name in ("run", "add_options", "choices"):
         if getattr(command, name):
@@ -43,13 +44,13 @@ def test_every_group_of_the_table_has_its_line_of_help():
     assert {command.words[0] for command in COMMANDS if len(command.words) > 1} == set(GROUPS)
 
 
-@pytest.mark.parametrize("command", [each for each in COMMANDS if each.example], ids=lambda each: each.example)
+@table("command", [each for each in COMMANDS if each.example], ids=lambda each: each.example)
 def test_every_example_of_the_table_can_be_typed(command):
     options = parse(command.example.split()[1:])
     assert options.command is command
 
 
-@pytest.mark.parametrize("line", WATCHING)
+@table("line", WATCHING)
 def test_whatever_watches_the_bus_can_end_after_one_or_some_and_speak_to_programs(line):
     once = parse([*line.split(), "--once", "--json"])
     assert (once.count, once.json) == (1, True)
@@ -57,7 +58,7 @@ def test_whatever_watches_the_bus_can_end_after_one_or_some_and_speak_to_program
     assert (some.count, some.csv) == (3, True)
 
 
-@pytest.mark.parametrize("line", TABLES)
+@table("line", TABLES)
 def test_whatever_is_listed_is_listed_for_programs_too(line):
     assert parse([*line.split(), "--json"]).json
 

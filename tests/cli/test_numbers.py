@@ -32,6 +32,7 @@ from services.cli.units import (
     Quantity,
     parse_joints,
 )
+from tests.table import table
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 SPELLINGS = {
@@ -193,18 +194,18 @@ def test_a_unit_of_another_quantity_is_refused(option, capsys):
 
 
 @each_option
-@pytest.mark.parametrize("text", ["nan", "inf", "1e999", "0x10", "1..2", "3furlongs", "far"])
+@table("text", ["nan", "inf", "1e999", "0x10", "1..2", "3furlongs", "far"])
 def test_what_is_no_number_is_refused(option, text, capsys):
     assert text.split("furlongs")[0] in refusal_of(option, text, capsys)
 
 
-@pytest.mark.parametrize("option", [each for each in OPTIONS if "--rpy" in each.line], ids=lambda option: option.line)
+@table("option", [each for each in OPTIONS if "--rpy" in each.line], ids=lambda option: option.line)
 def test_more_than_a_turn_in_radians_means_degrees(option, capsys):
     assert "write 90deg for degrees" in refusal_of(option, "90rad", capsys)
 
 
-@pytest.mark.parametrize("words", ["--axis 1mm 0 0", "--axis 0 0 1 --along 0 90deg 0", "--quaternion 1m 0 0 0"])
-@pytest.mark.parametrize("command", ["move", "ik"])
+@table("words", ["--axis 1mm 0 0", "--axis 0 0 1 --along 0 90deg 0", "--quaternion 1m 0 0 0"])
+@table("command", ["move", "ik"])
 def test_a_direction_has_no_unit(command, words, capsys):
     with pytest.raises(SystemExit):
         parse([command, "--to", "0", "0", "0", *words.split()])

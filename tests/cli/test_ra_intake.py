@@ -7,11 +7,12 @@ import json
 from fractions import Fraction
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from services.cli.ra_intake import RaIntake, RefusedMessage
 from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from tests.profiles import examples
 
 STANDS = (0, 0, 0)
 
@@ -93,7 +94,7 @@ def test_after_a_stop_the_next_message_counts_from_where_the_arm_is() -> None:
     assert intake.target_steps == (Fraction(1000) + Fraction(1.8) * Fraction(1296, 25), 0, 0)
 
 
-@settings(max_examples=150)
+@examples(full=150)
 @given(st.binary(max_size=300) | st.text(max_size=60).map(lambda text: json.dumps({"q1": text}).encode()))
 def test_any_bytes_are_followed_or_refused(payload: bytes) -> None:
     with contextlib.suppress(RefusedMessage):

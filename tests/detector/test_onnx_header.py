@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 
 from services.detector.onnx_header import Header, NotOnnx, read_header
 from tests.detector.onnx_file import red_finder
+from tests.table import table
 
 SIZE = 32
 WHATEVER = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 
 
-@pytest.mark.parametrize("said", [(1, 3, SIZE, SIZE), (0, 3, 0, 0), (1, 3, 480, 640), (7,)])
-@pytest.mark.parametrize(
+@table("said", [(1, 3, SIZE, SIZE), (0, 3, 0, 0), (1, 3, 480, 640), (7,)])
+@table(
     ("names", "read"),
     [
         ("{0: 'cup', 1: \"a mug's\"}", {0: "cup", 1: "a mug's"}),

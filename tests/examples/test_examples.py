@@ -19,6 +19,7 @@ from services.arm.model.description import load_arm
 from services.runtime.actions import ActionServer, GoalDecision, accept
 from services.runtime.node import Node
 from tests.runtime.support import ROOT, RouterProcess, programs, spinning, until
+from tests.table import table
 
 EXAMPLES = sorted(path.name for path in (ROOT / "examples").glob("*.py"))
 LONGEST = {"09_pick_and_place.py": 40, "14_straight_planner.py": 29}  # lines that do something
@@ -195,14 +196,14 @@ def test_straight_planner_takes_the_place_of_ours(start: Start, router: RouterPr
     assert "joint values alone" in refused.refusal.message
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@table("name", EXAMPLES)
 def test_an_example_is_short(name: str) -> None:
     text = (ROOT / "examples" / name).read_text(encoding="utf-8").splitlines()
     doing = [each for each in text if each.strip() and not each.startswith(("from ", "import ", '"""'))]
     assert len(doing) <= LONGEST.get(name, LONGEST_OTHER)
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@table("name", EXAMPLES)
 def test_an_example_says_what_it_shows_and_names_no_arm(name: str) -> None:
     text = (ROOT / "examples" / name).read_text(encoding="utf-8")
     assert text.startswith(('"""', "'"))

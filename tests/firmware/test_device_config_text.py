@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from device_configs import I32, good_configs
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, assume, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -16,10 +16,11 @@ from firmware.bindings.parsers import ConfigTextRefused, read_config
 from schemas.device_config import DeviceConfig, JointConfig, config_text
 from services.arm.device.device_config import device_config
 from services.arm.model.description import load_arm
+from tests.profiles import examples
 
 LARGEST = 8220  # [bytes] kMaxConfigText of core/config_text.h
 ANY_NUMBER = st.integers(-(2**65), 2**65) | st.integers(-300, 300) | I32
-OFTEN = settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+OFTEN = examples(quick=25, suppress_health_check=[HealthCheck.too_slow])
 
 
 def numbers_of(config: DeviceConfig) -> list[tuple[str | int, ...]]:

@@ -9,12 +9,14 @@ from typing import Any
 import msgspec
 import pytest
 from bench_firmware import FIRST, LAST, Bench, Row, command, rm1_config, smooth, traj
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware.bindings.device import ConfigError, CoreDevice
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, JointConfig
+from tests.profiles import examples
+from tests.table import table
 
 VECTORS = Path(__file__).resolve().parents[2] / "firmware/tests/vectors"
 HOLD, RESUME, STOP = 1, 2, 3
@@ -31,7 +33,7 @@ def vector_device() -> CoreDevice:
     return CoreDevice(msgspec.convert(described["config"], DeviceConfig), boot_id=described["boot_id"])
 
 
-@pytest.mark.parametrize("case", vectors())
+@table("case", vectors())
 def test_every_shared_vector_is_answered_as_expected(case: dict[str, Any]):
     device = vector_device()
     device.take()
@@ -98,7 +100,7 @@ def test_a_stop_ends_the_stream_on_the_path_and_the_next_one_starts_there():
     assert ack.code == 0
 
 
-@settings(max_examples=200)
+@examples(full=200)
 @given(st.binary(max_size=300), st.booleans())
 def test_no_bytes_at_all_move_a_device(data: bytes, retained: bool):
     device = vector_device()

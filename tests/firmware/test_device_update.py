@@ -63,6 +63,7 @@ def reason(bed: UpdateBed, capsys: pytest.CaptureFixture[str], image: bytes) -> 
     return capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_a_board_runs_the_new_firmware_from_the_other_slot_and_keeps_it(
     bed: UpdateBed, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -78,6 +79,7 @@ def test_a_board_runs_the_new_firmware_from_the_other_slot_and_keeps_it(
     assert f"from ota_0; before it was {NEWER} in ota_1" in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_a_firmware_that_says_nothing_gives_way_to_the_one_before(
     bed: UpdateBed, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -89,11 +91,13 @@ def test_a_firmware_that_says_nothing_gives_way_to_the_one_before(
     assert bed.record == {"slot": 0, "state": "valid"}
 
 
+@pytest.mark.full
 def test_a_firmware_that_does_not_start_gives_way_at_once(bed: UpdateBed, capsys: pytest.CaptureFixture[str]) -> None:
     assert bed.update(an_image(b"\x7fELF" + 5000 * b"no library at all")) is ExitCode.FAILED
     assert "has gone back to firmware" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_a_board_that_is_cut_off_in_the_trial_starts_the_firmware_before(bed: UpdateBed) -> None:
     transfer(bed)
     bed.stop()  # before anybody has heard its status
@@ -119,6 +123,7 @@ def test_what_is_lost_doubled_or_damaged_on_its_way_is_sent_again_and_written_on
     assert (bed.folder / "virtual_esp32_ota_1.bin").read_bytes() == an_image()
 
 
+@pytest.mark.full
 def test_a_transfer_that_was_cut_off_goes_on_where_it_ended(bed: UpdateBed, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(update_transfer, "TRIES", 2)
     with pytest.raises(CommandError, match=rf"cut off at {9 * PIECE} of \d+ bytes; what the device runs is as before"):
@@ -128,6 +133,7 @@ def test_a_transfer_that_was_cut_off_goes_on_where_it_ended(bed: UpdateBed, monk
     assert sent == -(-len(an_image()) // PIECE) - 9 + 2
 
 
+@pytest.mark.full
 def test_a_session_that_another_one_has_taken_over_is_over(bed: UpdateBed) -> None:
     image = an_image()
 
@@ -143,6 +149,7 @@ def test_a_session_that_another_one_has_taken_over_is_over(bed: UpdateBed) -> No
         transfer(bed, passes)
 
 
+@pytest.mark.full
 def test_an_armed_device_is_not_updated_and_one_that_is_armed_meanwhile_waits(
     bed: UpdateBed, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -159,6 +166,7 @@ def test_an_armed_device_is_not_updated_and_one_that_is_armed_meanwhile_waits(
     assert had >= 3 * PIECE
 
 
+@pytest.mark.full
 def test_a_wrong_signature_and_a_board_without_a_key_are_refused(
     bed: UpdateBed, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -173,6 +181,7 @@ def test_a_wrong_signature_and_a_board_without_a_key_are_refused(
     assert not list(bed.folder.glob("*.part"))
 
 
+@pytest.mark.full
 def test_an_image_for_another_chip_one_that_is_too_large_and_one_that_is_damaged_are_refused(
     bed: UpdateBed, capsys: pytest.CaptureFixture[str]
 ) -> None:

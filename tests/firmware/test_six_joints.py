@@ -69,6 +69,7 @@ def _width(config: DeviceConfig, j: int, here: int, rate: float) -> float:
     return min(fastest, 0.45 * up) if up >= down else -min(fastest, 0.45 * down)
 
 
+@pytest.mark.full
 def test_ten_minutes_of_six_joints_make_every_step_at_the_shafts_too(parol6: ArmDescription):
     config, middle = device_config(parol6), reference_steps(parol6)
     bench = Bench(config, motors=motors(parol6), steps=middle)
@@ -125,6 +126,7 @@ def six(tmp_path: Path) -> Iterator[Bed]:
         yield bed
 
 
+@pytest.mark.full
 def test_six_joints_in_real_time_through_mosquitto_make_every_step(six: Bed, parol6: ArmDescription):
     config, middle = device_config(parol6), reference_steps(parol6)
     six.start_device()

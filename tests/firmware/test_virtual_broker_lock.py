@@ -20,6 +20,8 @@ from services.mqtt.access import BrokerAccess, device_access, gateway_access
 from services.mqtt.client import MqttClient
 from tests.stepper_gateway.locked import Mosquitto, locked, renew
 
+pytestmark = pytest.mark.full
+
 WATCHED = 2.5  # [s] attempts at 0, 1 and 3 s
 
 

@@ -6,11 +6,12 @@ import math
 from collections.abc import Callable
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware.bindings.motor import MotorError, VirtualMotor
 from schemas.robot import Motor, PullOut
+from tests.profiles import examples
 
 NEMA23 = PullOut(
     speed=(0.0, 1000.0, 2000.0, 4000.0, 6000.0, 8000.0, 10000.0),
@@ -87,7 +88,7 @@ def test_no_speed_within_the_curve_shakes_it_out_of_step(speed: int):
     assert bench.shaft == 200
 
 
-@settings(max_examples=30)
+@examples(quick=10, full=30)
 @given(st.lists(st.integers(-300, 300).filter(bool), min_size=1, max_size=8), st.integers(1, 20))
 def test_whatever_it_loses_is_whole_cycles(moves: list[int], hardness: int):
     bench, now = VirtualMotor(motor()), 0.0

@@ -16,6 +16,8 @@ from services.cli.main import run
 from services.runtime.process.unwritten import UnwrittenFiles
 from services.runtime.signatures import make_key
 
+pytestmark = pytest.mark.full
+
 
 def test_a_board_is_updated_over_mqtt_disarmed_only_and_is_armed_again_after_it(
     bed: Bed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

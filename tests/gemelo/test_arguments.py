@@ -29,6 +29,7 @@ from schemas.planning import (
     WaypointGoal,
 )
 from services.arm.model.description import ArmDescription
+from tests.table import table
 
 HERE = gemelo.Pose((0.2, 0.1, 0.15), (1.0, 0.0, 0.0, 0.0))
 
@@ -81,7 +82,7 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("target", "said"), BAD, ids=[said for _, said in BAD])
+@table(("target", "said"), BAD, ids=[said for _, said in BAD])
 def test_an_argument_that_cannot_be_meant_is_refused_with_the_remedy(
     rm1: ArmDescription, target: dict[str, Any], said: str
 ) -> None:
@@ -150,7 +151,7 @@ JOGS: list[tuple[Callable[[ArmDescription], object], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("ask", "said"), JOGS, ids=[said for _, said in JOGS])
+@table(("ask", "said"), JOGS, ids=[said for _, said in JOGS])
 def test_a_jog_that_cannot_be_meant_is_refused(
     rm1: ArmDescription, ask: Callable[[ArmDescription], object], said: str
 ) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo import BadArgument
@@ -20,7 +20,6 @@ names = st.text(st.characters(exclude_categories=["C"]), min_size=1, max_size=64
 values = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ROBOT.joints])
 
 
-@settings(max_examples=50)
 @given(st.dictionaries(names, values, max_size=4))
 def test_points_are_kept_to_the_last_bit(given: dict[str, tuple[float, ...]]) -> None:
     with TemporaryDirectory() as folder:

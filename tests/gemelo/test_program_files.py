@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo import BadArgument, Error
@@ -43,6 +43,7 @@ from gemelo.programs.reading import parse_program
 from gemelo.programs.steps import KINDS
 from gemelo.programs.toml_lines import toml_lines
 from services.arm.model.description import load_arm
+from tests.table import table
 
 ROBOT = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 POINTS = {"above the box": Point({"brazo_joint": 0.1, "antebrazo_joint": 0.2, "efector_joint": 0.05})}
@@ -84,7 +85,6 @@ programs = st.builds(
 )
 
 
-@settings(max_examples=40)
 @given(programs)
 def test_what_is_written_reads_back_as_the_same(program: Program) -> None:
     again, mistakes = parse_program(program.name, program.to_toml())
@@ -97,7 +97,6 @@ def places(value: Any, here: tuple[str | int, ...] = ()) -> set[tuple[str | int,
     return {here, *(place for key, each in inner for place in places(each, (*here, key)))}
 
 
-@settings(max_examples=40)
 @given(programs, st.lists(texts, max_size=3))
 def test_every_place_of_a_file_has_its_line(program: Program, comments: list[str]) -> None:
     text = "".join(f"# {each}\n" for each in comments) + program.to_toml()
@@ -200,7 +199,7 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("text", "line", "said"), MISTAKES, ids=[said[:50] for _, _, said in MISTAKES])
+@table(("text", "line", "said"), MISTAKES, ids=[said[:50] for _, _, said in MISTAKES])
 def test_a_mistake_is_told_with_file_line_and_remedy(text: str, line: int, said: str, tmp_path: Path) -> None:
     file = tmp_path / "me.toml"
     file.write_text(text)
@@ -252,7 +251,7 @@ def test_numbers_may_have_units_in_a_file() -> None:
     assert program.steps[1] == Go(joints={"a": pytest.approx(1.5707963), "b": 0.04}, blend=0.02)
 
 
-@pytest.mark.parametrize("name", ["", " ", "a/b", "a\\b", "..", ".x", "x\0", "x\n", "x" * 65, "rm1.points", 'a"b'])
+@table("name", ["", " ", "a/b", "a\\b", "..", ".x", "x\0", "x\n", "x" * 65, "rm1.points", 'a"b'])
 def test_what_can_be_no_name_of_a_file_is_refused(name: str, tmp_path: Path) -> None:
     with pytest.raises(BadArgument):
         Program(name, ())
@@ -324,7 +323,7 @@ def test_a_steps_number_reads_back(path: tuple[int, ...]) -> None:
     assert parse_path(path_text(path)) == path
 
 
-@pytest.mark.parametrize("text", ["", "0", "1.0", "a", "1.", "-1", "1..2", "1e3", "9" * 9])
+@table("text", ["", "0", "1.0", "a", "1.", "-1", "1..2", "1e3", "9" * 9])
 def test_what_is_no_step_is_refused(text: str) -> None:
     with pytest.raises(BadArgument, match="is no step"):
         parse_path(text)

@@ -6,7 +6,7 @@ import ast
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from gemelo import BadArgument
 from gemelo.programs import (
@@ -124,7 +124,6 @@ def test_a_script_is_type_complete_and_names_stay_texts(tmp_path: Path, root: Pa
     assert script.index("def run_inner(") < script.index("def run_all(")
 
 
-@settings(max_examples=40)
 @given(programs)
 def test_every_program_becomes_a_script_that_compiles(program: Program) -> None:
     names = {step.point for _, step in program.all_steps() if isinstance(step, Go | Line) and step.point}

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 import zenoh
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import HealthCheck, example, given
 from hypothesis import strategies as st
 
 from schemas.site import Site
@@ -24,6 +24,7 @@ from services.hosts.site_file import SiteError
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.process.readiness import GOES_ON
 from tests.hosts.sites import EXAMPLE, changed, escaped, site
+from tests.profiles import examples
 
 NASTY = (
     'a"b', "a'b", "a b", "ñandú/机器人", "a;reboot", "a && b", "`id`", "a#b", "{x}", "a: b", "- a", "a\\", "$(id)",
@@ -128,7 +129,7 @@ def require_readable(lab: Site, folder: Path) -> None:
             assert read.serial.device == lab.robots[robot].serial
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(quick=20, full=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.fixed_dictionaries({}, optional=dict.fromkeys(("project", "config", "state", "user", "serial"), texts)))
 @example({"project": "/opt/a \"b\" 'c' ; ñ", "state": "/var/my 'state", "serial": "/dev/tty ACM#0"})
 @example({"config": "/etc/x\nExecStart=/bin/evil"})
@@ -158,7 +159,7 @@ addresses = st.one_of(
 )
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(quick=20, full=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.sampled_from(("cell", "brain")), st.sampled_from(("address", "listen")), addresses)
 @example("cell", "listen", "fe80::1%a b")
 @example("brain", "address", "fe80::1%eth0")
@@ -209,7 +210,7 @@ def test_a_robots_folder_may_have_any_printable_name(tmp_path, name):
     assert load_deployment(file, {}).robot == str(project_root() / name)
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(quick=15, full=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(texts.filter(lambda text: not re.fullmatch("[a-z0-9][a-z0-9_-]{0,30}", text)))
 def test_a_name_of_a_host_or_robot_that_is_not_plain_is_refused(tmp_path, name):
     for old, new in (("[hosts.desk]", "[hosts.{}]"), ("[robots.rm1]", "[robots.{}]")):
@@ -217,7 +218,7 @@ def test_a_name_of_a_host_or_robot_that_is_not_plain_is_refused(tmp_path, name):
             site(tmp_path, old, new.format(escaped(name)))
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(quick=20, full=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(texts.filter(lambda text: "/" not in text and "\0" not in text and 0 < len(text.encode(errors="replace")) < 250))
 @example("lab-2")
 @example("lab\n")

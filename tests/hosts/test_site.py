@@ -9,6 +9,7 @@ from services.hosts.layout import processes, roles
 from services.hosts.site_file import SiteError
 from services.runtime.deployment import project_root
 from tests.hosts.sites import EXAMPLE, changed, site
+from tests.table import table
 
 SERVICES = 'rm1 = ["stepper_gateway", "virtual_esp32", "state_publisher"]'
 PLANS = 'rm1 = ["planner", "logger"]'
@@ -24,7 +25,7 @@ def problem(folder, old: str, new: str) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize(
+@table(
     ("old", "new", "said"),
     [
         ('"planner", "logger"', '"planer", "logger"', '"planer" is not a service of a robot: did you mean "planner"?'),
@@ -181,13 +182,13 @@ def test_all_mistakes_are_said_at_once_in_the_order_of_the_lines(tmp_path):
     assert lines == sorted(lines)
 
 
-@pytest.mark.parametrize("key", ["project", "config", "state"])
-@pytest.mark.parametrize("path", ["relative", "/", "/a/../b", "/a$HOME", "/a%h", "/a\\\\", "/a\\n/b", "/a "])
+@table("key", ["project", "config", "state"])
+@table("path", ["relative", "/", "/a/../b", "/a$HOME", "/a%h", "/a\\\\", "/a\\n/b", "/a "])
 def test_a_path_that_means_more_than_a_path_is_refused(tmp_path, key, path):
     assert "line 1: " in problem(tmp_path, "# A lab", f'{key} = "{path}"\n# A lab')
 
 
-@pytest.mark.parametrize("user", ["root", "", "a b", "x;reboot", "Ünal"])
+@table("user", ["root", "", "a b", "x;reboot", "Ünal"])
 def test_a_user_that_cannot_be_or_should_not_be_is_refused(tmp_path, user):
     assert "line 1: " in problem(tmp_path, "# A lab", f'user = "{user}"\n# A lab')
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 from itertools import product
@@ -27,12 +28,12 @@ def is_chosen(expression: str, marks: dict[str, bool]) -> bool:
 
 def test_every_test_is_run_once_and_every_property_once_more_with_all_its_examples():
     [quick], [properties, *slow] = runs("test"), runs("test-rest")
-    for full, alone, hypothesis in product((False, True), repeat=3):
+    for full, alone, hypothesis, scaled in product((False, True), repeat=4):
         if alone and not full:
             continue  # tests/conftest.py marks what is alone as full
-        marks = {"full": full, "alone": alone, "hypothesis": hypothesis}
+        marks = {"full": full, "alone": alone, "hypothesis": hypothesis, "scaled": scaled}
         assert sum(is_chosen(each, marks) for each in (quick, *slow)) == 1, marks
-        assert is_chosen(properties, marks) is (hypothesis and not full), marks
+        assert is_chosen(properties, marks) is ((hypothesis or scaled) and not full), marks
 
 
 def test_all_is_what_is_quick_and_then_the_rest():
@@ -45,6 +46,24 @@ def test_one_room_is_run_by_its_name():
     [call] = [line for line in recipe.splitlines() if "bin/pytest " in line]
     assert call.endswith('-m "not full" tests/planner')
     assert "deploy/test_firmware" not in recipe
+
+
+def test_what_counts_its_cases_by_the_profile_is_marked_so_that_all_of_them_are_run():
+    """As pytest knows of a property only where the test itself is one."""
+    unmarked = [
+        f"{path.name}::{test.name}"
+        for path in sorted((ROOT / "tests").rglob("test_*.py"))
+        for test in ast.parse(path.read_text()).body
+        if isinstance(test, ast.FunctionDef) and test.name.startswith("test_")
+        and re.search(r"\b(count\(quick=|given\()", "\n".join(map(ast.unparse, test.body)))
+        and not {"pytest.mark.scaled", "pytest.mark.full"} & set(map(ast.unparse, test.decorator_list))
+    ]  # fmt: skip
+    assert unmarked == []
+
+
+def test_no_property_sets_the_number_of_its_examples_by_itself():
+    files = [path for path in (ROOT / "tests").rglob("test_*.py") if "max_examples=" in path.read_text()]
+    assert [path.name for path in files] == [Path(__file__).name]
 
 
 def test_pytest_finds_every_file_with_tests():

@@ -7,7 +7,7 @@ import typing
 
 import msgspec
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from schemas.message import Message, decode, encode
@@ -17,6 +17,7 @@ from services.logger.recording import Recording
 from services.recordings.channels import Entry
 from services.visualizer.core import Visualizer
 from services.visualizer.model.urdf import parse_urdf
+from tests.profiles import examples
 
 START = 1_795_000_000_000_000_000
 SECOND = 1_000_000_000
@@ -51,12 +52,13 @@ def messages(kind):
     )
 
 
+@pytest.mark.scaled
 @pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.key)
 def test_the_logger_records_any_message_of_a_topic(topic, tmp_path_factory):
     folder = tmp_path_factory.mktemp("log")
     logger, recording = Logger(), Recording(folder, "any", {})
 
-    @settings(max_examples=25, suppress_health_check=list(HealthCheck))
+    @examples(quick=6, full=25, suppress_health_check=list(HealthCheck))
     @given(messages(topic.message))
     def record(message):
         received = decode(topic.message, encode(message))
@@ -83,9 +85,10 @@ HANDLERS = {
 }  # fmt: skip
 
 
+@pytest.mark.scaled
 @pytest.mark.parametrize("topic", [topic for topic in TOPICS if topic.key in HANDLERS], ids=lambda topic: topic.key)
 def test_the_visualizer_shows_any_message_of_a_topic(topic):
-    @settings(max_examples=40, suppress_health_check=list(HealthCheck))
+    @examples(quick=8, full=40, suppress_health_check=list(HealthCheck))
     @given(st.lists(messages(topic.message), max_size=3))
     def show(received):
         core = Visualizer(parse_urdf(URDF), "r", "b")

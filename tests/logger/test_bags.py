@@ -35,6 +35,7 @@ from services.runtime.errors import NodeNameTaken
 from services.runtime.node import Node
 from services.visualizer.program.rerun_program import rerun_binary
 from tests.schemas.samples import sample
+from tests.table import table
 
 START = 1_795_000_000_000_000_000
 PERIOD = 20_000_000  # [ns]
@@ -195,10 +196,10 @@ def test_a_pattern_that_matches_nothing_is_named_with_what_there_is(bag):
     assert chosen(["a/b", "c"], ["a/*"]) == {"a/b"}
 
 
-@pytest.mark.parametrize("topic", recorded_topics(), ids=lambda topic: topic.key)
+@table("topic", recorded_topics(), ids=lambda topic: topic.key)
 def test_what_is_played_is_what_was_said_to_the_byte(topic, tmp_path):
     message = sample(topic.message)
-    file = McapFile(tmp_path / "one.mcap", {})
+    file = McapFile(tmp_path / f"{topic.key.replace('/', '.')}.mcap", {})
     file.write([Entry(topic, message, START)])
     file.close()
     (row,) = [row for row in RecordingReader(file.path).rows() if not row.is_derived]

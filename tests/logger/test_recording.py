@@ -23,6 +23,7 @@ from services.logger.recording import Recording
 from services.recordings import foxglove
 from services.recordings.channels import Entry, schema_of
 from services.recordings.table import recorded_topics
+from tests.table import table
 
 START = 1_795_000_000_000_000_000
 
@@ -38,7 +39,7 @@ def recording(tmp_path):
     recording.abandon()
 
 
-@pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.key)
+@table("topic", TOPICS, ids=lambda topic: topic.key)
 def test_every_schema_stands_alone(topic):
     text = schema_of(topic.message).decode()
     schema = json.loads(text)

@@ -9,11 +9,12 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from services.mqtt.access import BrokerAccess
 from services.mqtt.client import MqttClient
+from tests.profiles import examples
 from tests.runtime.support import until
 
 CONNACK, SUBACK = b"\x20\x02\x00\x00", b"\x90\x03\x00\x01\x00"
@@ -84,7 +85,7 @@ def test_a_packet_that_is_none_ends_the_connection_and_the_next_one_is_read(bad:
         assert broker.connections == 2
 
 
-@settings(max_examples=40, deadline=None)
+@examples(quick=15, full=40)
 @given(bad=st.binary(max_size=60))
 def test_whatever_bytes_come_the_client_comes_back(bad: bytes) -> None:
     with closing(Broker(bad, hangs_up=True)) as broker, listening_to(broker) as heard:

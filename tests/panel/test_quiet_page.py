@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo.device import Device
@@ -24,6 +24,7 @@ from services.panel.view.page import LATE, LATE_AGAIN
 from services.panel.view.world import ASPECT, FARTHEST
 from services.panel.words.en import ENGLISH
 from tests.panel.memory_page import ROOT, MemoryPage, memory_page
+from tests.profiles import examples
 from tests.runtime.support import until
 
 BUSY = 40  # presses, of which each keeps a thread: more than viser has
@@ -140,7 +141,7 @@ def test_stop_goes_out_though_every_thread_is_busy_with_other_buttons(tmp_path: 
 
 
 @pytest.mark.parametrize("robot", ["rm1", "parol6"])
-@settings(max_examples=20, deadline=None)
+@examples(quick=5, full=20)
 @given(data=st.data())
 def test_the_drawn_arm_stands_as_the_urdf_says(robot: str, drawn_arms: dict[str, DrawnArm], data: st.DataObject):
     arm, drawn = load_arm(ROOT / "urdf" / robot), drawn_arms[robot]

@@ -8,8 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
-import pytest
-
 import gemelo
 from gemelo.programs import (
     AnyStep,
@@ -36,6 +34,7 @@ from services.panel.words.step_text import step_text
 from services.panel.words.words import SENTENCES, Words
 from services.stepper_gateway.device.command_handler import NOT_NOW, REMEDIES, complaint
 from services.stepper_gateway.links.frames import Code
+from tests.table import table
 
 ROOT = Path(__file__).parents[2]
 SPANISH, ENGLISH = Words("es"), Words("en")
@@ -152,7 +151,7 @@ NOT_ON_THE_PAGE = {  # of files, logs and clients that a page does not have, and
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("part", PARTS)
+@table("part", PARTS)
 def test_every_sentence_in_the_code_is_said_in_spanish_with_its_values(part: str):
     root, found = ROOT / part, 0
     for path in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
@@ -180,8 +179,8 @@ def told_in_spanish(english: str) -> str:
     return said
 
 
-@pytest.mark.parametrize("kind", DeviceCommandKind)
-@pytest.mark.parametrize("mode", DeviceMode)
+@table("kind", DeviceCommandKind)
+@table("mode", DeviceMode)
 def test_every_command_that_the_device_refuses_in_any_mode_with_any_code(kind: DeviceCommandKind, mode: DeviceMode):
     for code in Code:
         told = complaint(kind, SimpleNamespace(code=code, mode=mode))
@@ -190,8 +189,8 @@ def test_every_command_that_the_device_refuses_in_any_mode_with_any_code(kind: D
             assert not re.search(rf"\b{english}\b", said), said
 
 
-@pytest.mark.parametrize("fault", [*(fault for fault in DeviceFault if fault), 99])
-@pytest.mark.parametrize("joint", ["", "brazo_joint"])
+@table("fault", [*(fault for fault in DeviceFault if fault), 99])
+@table("joint", ["", "brazo_joint"])
 def test_every_fault_has_its_meaning_and_remedy_in_spanish(fault: int, joint: str):
     said = told_in_spanish(fault_text(fault, joint))
     assert joint in said
@@ -199,7 +198,7 @@ def test_every_fault_has_its_meaning_and_remedy_in_spanish(fault: int, joint: st
     assert told_in_spanish(f'device "x" has a fault: {fault_text(1, joint)}')
 
 
-@pytest.mark.parametrize("code", [code for code in FollowErrorCode if code])
+@table("code", [code for code in FollowErrorCode if code])
 def test_every_code_of_a_goal_is_said_in_spanish_where_its_sentence_is_not_known(code: FollowErrorCode):
     for error in (gemelo.Refused("odd", check="execution", code=code), gemelo.Aborted("odd", code=code)):
         heading, text = SPANISH.problem(problem_of(error))
@@ -209,7 +208,7 @@ def test_every_code_of_a_goal_is_said_in_spanish_where_its_sentence_is_not_known
         assert ENGLISH.problem(problem_of(error))[1] == "odd"
 
 
-@pytest.mark.parametrize("kind", StopKind)
+@table("kind", StopKind)
 def test_a_stop_that_is_refused_says_why(kind: StopKind):
     reason = f"a goal is being carried out: cancel it or run `gemelo stop` before {kind.name}"
     refused = gemelo.Refused(f"{kind} refused: {reason} (device mode RUN)", check="device", reason=reason)
@@ -219,7 +218,7 @@ def test_a_stop_that_is_refused_says_why(kind: StopKind):
 BEYOND = 'joint "a": 3.2000 rad is beyond the upper limit 2.9497 rad; stay within -2.9497 to 2.9497 rad'
 
 
-@pytest.mark.parametrize(
+@table(
     ("english", "spanish"),
     [
         (f"{BEYOND} at point 3 (1.000 s)", "a: 3.2000 rad está más allá del límite superior de 2.9497 rad; quédese "

@@ -25,6 +25,7 @@ from schemas.planning import (
 )
 from schemas.scene import PlanningScene
 from tests.planner.judging import asked, planner_of, require_refused, require_sound, show
+from tests.table import table
 
 ARMS = pytest.mark.parametrize("name", ["rm1", "parol6"])
 LONG = "x" * 100_000
@@ -58,8 +59,8 @@ def whole(name: str, goal: Goal = READY, **options: object) -> PlanRequest:
 
 
 @ARMS
-@pytest.mark.parametrize("field", ["velocity_scaling", "acceleration_scaling"])
-@pytest.mark.parametrize("value", [HUGE, -HUGE, -TINY, 0.0, 1.0 + 1e-12])
+@table("field", ["velocity_scaling", "acceleration_scaling"])
+@table("value", [HUGE, -HUGE, -TINY, 0.0, 1.0 + 1e-12])
 def test_no_scaling_but_a_share_will_do(name: str, field: str, value: float):
     words = planned(name, whole(name, **{field: value}))
     assert words.startswith(field)
@@ -67,21 +68,21 @@ def test_no_scaling_but_a_share_will_do(name: str, field: str, value: float):
 
 
 @ARMS
-@pytest.mark.parametrize("field", ["velocity_scaling", "acceleration_scaling"])
-@pytest.mark.parametrize(("value", "words"), [(TINY, "no path ends"), (1e-300, "86400 s"), (1e-12, "86400 s")])
+@table("field", ["velocity_scaling", "acceleration_scaling"])
+@table(("value", "words"), [(TINY, "no path ends"), (1e-300, "86400 s"), (1e-12, "86400 s")])
 def test_a_scaling_with_which_nothing_ends_is_refused(name: str, field: str, value: float, words: str):
     assert words in planned(name, whole(name, **{field: value}))
 
 
 @ARMS
-@pytest.mark.parametrize("motion", [FreeMotion(), PointToPoint(), LinearMotion()])
-@pytest.mark.parametrize("time", [HUGE, 120.1, 0.0, -TINY, -HUGE])
+@table("motion", [FreeMotion(), PointToPoint(), LinearMotion()])
+@table("time", [HUGE, 120.1, 0.0, -TINY, -HUGE])
 def test_too_much_time_and_none_are_refused(name: str, motion: Motion, time: float):
     assert planned(name, whole(name, motion=motion, allowed_time=time)).startswith("allowed_time")
 
 
 @ARMS
-@pytest.mark.parametrize("motion", [FreeMotion(), PointToPoint(), LinearMotion()])
+@table("motion", [FreeMotion(), PointToPoint(), LinearMotion()])
 def test_hardly_any_time_ends_in_time(name: str, motion: Motion):
     goal = JointGoal(name=planner_of(name).arm.joint_names[:1], position=(0.1,))
     words = planned(name, whole(name, goal, motion=motion, allowed_time=TINY))
@@ -89,7 +90,7 @@ def test_hardly_any_time_ends_in_time(name: str, motion: Motion):
 
 
 @ARMS
-@pytest.mark.parametrize(
+@table(
     ("goal", "thing"),
     [
         (NamedGoal(name=""), '""'),
@@ -115,13 +116,13 @@ def test_hardly_any_time_ends_in_time(name: str, motion: Motion):
         (WaypointGoal(), "waypoint"),
     ],
 )
-@pytest.mark.parametrize("motion", [FreeMotion(), LinearMotion()])
+@table("motion", [FreeMotion(), LinearMotion()])
 def test_a_goal_that_cannot_be_is_named(name: str, goal: Goal, thing: str, motion: Motion):
     assert thing in planned(name, whole(name, goal, motion=motion))
 
 
 @ARMS
-@pytest.mark.parametrize("value", [HUGE, -HUGE, 1e9])
+@table("value", [HUGE, -HUGE, 1e9])
 def test_a_joint_that_is_to_go_to_the_moon_is_named_with_its_limit(name: str, value: float):
     joint = planner_of(name).arm.joints[1]
     words = planned(name, whole(name, JointGoal(name=(joint.name,), position=(value,))))
@@ -131,7 +132,7 @@ def test_a_joint_that_is_to_go_to_the_moon_is_named_with_its_limit(name: str, va
 
 
 @ARMS
-@pytest.mark.parametrize(
+@table(
     ("motion", "thing"),
     [
         (LinearMotion(speed=-HUGE), "speed"),
@@ -161,9 +162,7 @@ def test_a_motion_that_cannot_be_is_named(name: str, motion: Motion, thing: str)
 
 
 @ARMS
-@pytest.mark.parametrize(
-    "motion", [LinearMotion(speed=HUGE), LinearMotion(acceleration=HUGE), LinearMotion(max_step=HUGE)]
-)
+@table("motion", [LinearMotion(speed=HUGE), LinearMotion(acceleration=HUGE), LinearMotion(max_step=HUGE)])
 def test_as_fast_as_nothing_can_be_is_as_fast_as_the_joints_can(name: str, motion: Motion):
     planner = planner_of(name)
     begin = planner.kinematics.tool(planner.arm.named_states["ready"]).position.tolist()
@@ -172,8 +171,8 @@ def test_as_fast_as_nothing_can_be_is_as_fast_as_the_joints_can(name: str, motio
 
 
 @ARMS
-@pytest.mark.parametrize("motion", [FreeMotion(), PointToPoint(), LinearMotion()])
-@pytest.mark.parametrize("blend", [0.0, 0.01])
+@table("motion", [FreeMotion(), PointToPoint(), LinearMotion()])
+@table("blend", [0.0, 0.01])
 def test_thousands_of_waypoints_are_gone_by_or_refused_in_time(name: str, motion: Motion, blend: float):
     planner = planner_of(name)
     x, y, z = planner.kinematics.tool(planner.arm.named_states["ready"]).position.tolist()
@@ -183,7 +182,7 @@ def test_thousands_of_waypoints_are_gone_by_or_refused_in_time(name: str, motion
 
 
 @ARMS
-@pytest.mark.parametrize(
+@table(
     ("start", "thing"),
     [
         (JointState(name=(LONG,), position=(0.0,)), "xxx"),
@@ -197,15 +196,15 @@ def test_a_start_that_cannot_be_is_named(name: str, start: JointState, thing: st
 
 
 @ARMS
-@pytest.mark.parametrize("value", [HUGE, -HUGE, 1e9])
+@table("value", [HUGE, -HUGE, 1e9])
 def test_a_start_on_the_moon_is_named(name: str, value: float):
     arm = planner_of(name).arm
     start = JointState(name=arm.joint_names, position=(0.0, value, *[0.0] * (len(arm.joints) - 2)))
     assert planned(name, PlanRequest(goal=READY, start=start)).startswith(arm.joint_names[1])
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize(
+@table("value", [math.nan, math.inf, -math.inf])
+@table(
     "path",
     [
         ("velocity_scaling",),

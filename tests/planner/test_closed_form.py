@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from services.arm.kinematics.kinematics import Kinematics
@@ -19,6 +19,7 @@ from services.planner.kinematics.closed_form import closed_form, turns_about
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import NEVER
+from tests.profiles import examples
 
 ROOT = Path(__file__).parents[2] / "urdf"
 PAROL6 = load_arm(ROOT / "parol6")
@@ -42,7 +43,7 @@ def test_parol6_has_one_and_rm1_does_not():
     assert closed_form(rm1, Kinematics(rm1)) is None
 
 
-@settings(max_examples=300)
+@examples(full=300)
 @given(CONFIGURATIONS)
 def test_the_configuration_that_a_pose_was_made_of_is_among_the_solutions(goal: tuple[float, ...]):
     pose = KINEMATICS.tool(goal)
@@ -52,7 +53,7 @@ def test_the_configuration_that_a_pose_was_made_of_is_among_the_solutions(goal: 
         assert min(np.abs(solution - goal).max() for solution in solutions) < 1e-5
 
 
-@settings(max_examples=100)
+@examples(quick=25)
 @given(CONFIGURATIONS)
 def test_an_arm_with_a_straight_wrist_that_is_there_already_stays_there(configuration: tuple[float, ...]):
     """joint_4 and joint_6 then turn about one axis, and only their sum is given."""
@@ -91,7 +92,7 @@ def test_the_order_of_the_joints_in_robot_toml_does_not_matter():
     )
 
 
-@settings(max_examples=20)
+@examples(quick=8, full=20)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_searching_finds_no_nearer_configuration_than_the_closed_form(goal: tuple[float, ...], near: tuple[float, ...]):
     pose = KINEMATICS.tool(goal)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
@@ -22,6 +22,7 @@ from services.planner.timing.profile import joint_limits, trajectory_of
 from services.planner.timing.time_optimal import time_optimal_path
 from services.planner.timing.timing import timed_path, timed_path_in_python
 from services.planner.verification.verify import limit_shares, require_ends, sample
+from tests.profiles import examples
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")
 LOWER = np.array([joint.lower for joint in ARM.joints])
@@ -46,7 +47,7 @@ def corners_of(seed: int, count: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(0.8 * LOWER, 0.8 * UPPER, (count, len(LOWER)))
 
 
-@settings(max_examples=25)
+@examples(quick=8, full=25)
 @given(st.integers(0, 10_000), st.integers(2, 5), st.floats(0.05, 1.0), st.floats(0.05, 1.0))
 def test_a_timed_curve_keeps_every_limit_and_its_ends(seed: int, count: int, speed: float, acceleration: float):
     corners, limits = corners_of(seed, count), joint_limits(ARM, speed, acceleration)

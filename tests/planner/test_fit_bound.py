@@ -12,7 +12,7 @@ import coal
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from services.collision_fitting.clipping import clipped, common_corners
@@ -26,6 +26,7 @@ from services.planner.collision_geometry.coal_shapes import is_inside, tree_of
 from services.planner.collision_geometry.link_shapes import hull_mesh
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from services.planner.collision_geometry.solids import polytope_around
+from tests.profiles import examples
 
 WITHIN = 0.005  # [m]
 SEEDS = st.integers(0, 2**32 - 1)
@@ -197,7 +198,7 @@ def test_an_open_tube_is_cut_along_its_bore_until_its_wall_is_left():
 
 
 @given(SEEDS, st.integers(4, 200))
-@settings(max_examples=40, deadline=None)
+@examples(quick=10, full=40)
 def test_a_hull_of_few_sides_holds_all_points_and_stands_out_little(seed: int, count: int):
     random = np.random.default_rng(seed)
     points = random.uniform(-0.1, 0.1, (count, 3)) * random.uniform(0.05, 1.0, 3)
@@ -216,7 +217,7 @@ def test_points_on_a_plane_have_no_hull():
 
 
 @given(SEEDS)
-@settings(max_examples=30, deadline=None)
+@examples(quick=10, full=30)
 def test_projection_onto_a_polytope_brings_no_point_farther_from_any_of_its_points(seed: int):
     random = np.random.default_rng(seed)
     solid = polytope_around(hull_mesh(random.normal(size=(30, 3))))
@@ -230,7 +231,7 @@ def test_projection_onto_a_polytope_brings_no_point_farther_from_any_of_its_poin
 
 
 @given(SEEDS)
-@settings(max_examples=30, deadline=None)
+@examples(quick=10, full=30)
 def test_both_sides_of_a_cut_have_all_of_the_triangles_and_no_more(seed: int):
     random = np.random.default_rng(seed)
     corners = random.uniform(-1.0, 1.0, (20, 3, 3))

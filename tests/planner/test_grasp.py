@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.frames import Transform
@@ -45,6 +45,7 @@ from services.planner.scene.scene_store import SceneStore
 from services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner
 from tests.planner.test_scene_node import edit
+from tests.profiles import examples
 
 ROOT = Path(__file__).parents[2]
 ARMS = {name: load_arm(ROOT / "urdf" / name) for name in ("rm1", "parol6")}
@@ -137,7 +138,7 @@ def test_without_a_gripper_or_a_place_it_says_so() -> None:
     assert "it is not known where the arm is" in answer.reason
 
 
-@settings(max_examples=60, deadline=None)
+@examples(quick=20, full=60)
 @given(st.sampled_from(("box", "cylinder")), TURN, TURN, TURN)
 def test_a_width_is_that_of_the_solid_s_corners(kind: str, roll: float, pitch: float, yaw: float) -> None:
     shape: Shape = BoxShape(size=(0.03, 0.02, 0.01)) if kind == "box" else CylinderShape(radius=0.01, length=0.04)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from services.arm.kinematics.kinematics import Kinematics
@@ -15,6 +15,7 @@ from services.arm.model.description import load_arm
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import NEVER, Deadline
+from tests.profiles import examples
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 KINEMATICS = Kinematics(ARM)
@@ -22,7 +23,7 @@ IK = InverseKinematics(ARM, KINEMATICS)
 CONFIGURATIONS = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])
 
 
-@settings(max_examples=300)
+@examples(full=300)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_fk_of_ik_is_the_goal(goal: tuple[float, ...], near: tuple[float, ...]):
     target = ToolTarget(KINEMATICS.tool(goal).position)
@@ -40,7 +41,7 @@ def test_both_elbows_are_found_and_the_nearer_one_comes_first():
         assert np.sign(second[1]) == -side
 
 
-@settings(max_examples=100)
+@examples(quick=25)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_the_nearest_comes_first_of_all_that_are_found(goal: tuple[float, ...], near: tuple[float, ...]):
     start, target = np.array(near), ToolTarget(KINEMATICS.tool(goal).position)
@@ -72,7 +73,7 @@ def test_a_search_that_is_late_ends():
     assert list(IK.solutions(ToolTarget(np.array([0.6, 0.0, 0.1])), np.zeros(3), Deadline(allowed=0.0))) == []
 
 
-@settings(max_examples=50)
+@examples(quick=15, full=50)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_orientations_are_met_where_the_arm_can(goal: tuple[float, ...], near: tuple[float, ...]):
     pose = KINEMATICS.tool(goal)

@@ -30,6 +30,7 @@ from services.planner.collision.world import World
 from services.planner.core import Planner
 from tests.planner.independent import Judge, resampled
 from tests.planner.native.scenes import star_mesh
+from tests.table import table
 
 ARMS = {name: load_arm(Path(__file__).parents[2] / "urdf" / name) for name in ("rm1", "parol6")}
 HOME = np.zeros(3)  # of rm1: its effector is a box of 24 x 42 x 191 mm in front, its tip 0.0177 m above the floor
@@ -68,8 +69,8 @@ def in_front(gap: float) -> dict[str, SceneObject]:
     }
 
 
-@pytest.mark.parametrize("shape", in_front(0.0))
-@pytest.mark.parametrize("gap", [0.03, 0.0005, -0.0005, -0.005])
+@table("shape", in_front(0.0))
+@table("gap", [0.03, 0.0005, -0.0005, -0.005])
 def test_a_distance_that_geometry_knows_is_told_and_a_contact_is_found(shape: str, gap: float):
     """The floor plane is under the base too, which stands on it by design and never moves."""
     judge = Judge(ARMS["rm1"], PlanningScene(objects=(in_front(gap)[shape],)))

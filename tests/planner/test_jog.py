@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.joints import JointState
@@ -12,6 +12,7 @@ from schemas.planning import JogCommand
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.jog.jog import DEAD_MAN, PERIOD, SILENCE, Jog
 from tests.planner.jogging import Jogged, arm_of, kinematics_of, world_of
+from tests.profiles import examples
 
 TURN = JogCommand(name=("brazo_joint",), velocity=(0.5,))
 
@@ -40,7 +41,7 @@ def test_the_arm_never_goes_back_where_it_stops():
 
 @pytest.mark.parametrize("frame", ["base", "tool"])
 @pytest.mark.parametrize("name", ["rm1", "parol6"])
-@settings(max_examples=10)
+@examples(quick=5, full=10)
 @given(direction=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda d: np.linalg.norm(d) > 0.1))
 def test_the_tool_goes_in_the_commanded_direction_however_much_it_is_slowed(
     name: str, frame: str, direction: tuple[float, float, float]

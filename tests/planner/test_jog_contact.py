@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.frames import Transform
@@ -17,6 +17,7 @@ from services.planner.collision.world import World
 from services.planner.jog.jog import PERIOD
 from services.planner.jog.jog_obstacles import CONTACT_SPEED
 from tests.planner.jogging import Array, Jogged, arm_of, kinematics_of
+from tests.profiles import examples
 
 ASTRAY = 0.0002  # [m] by which the gateway's tracker, which starts every joint on its own, leaves the jog's line
 BLOCK = BoxShape(size=(0.05, 0.05, 0.05))
@@ -117,7 +118,7 @@ def test_an_object_that_appears_on_a_moving_arm_stops_it_and_lets_it_go_back() -
 
 
 @pytest.mark.parametrize("name", ["rm1", "parol6"])
-@settings(max_examples=10)
+@examples(quick=5, full=10)
 @given(
     aside=st.tuples(*[st.floats(-0.04, 0.04)] * 3),
     shape=st.sampled_from((BLOCK, SphereShape(radius=0.03))),

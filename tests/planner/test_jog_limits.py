@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.planning import JogCommand
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.jog.jog import PERIOD
 from tests.planner.jogging import Jogged, arm_of
+from tests.profiles import examples
 
 TIGHT = 1e-9
 
@@ -66,13 +67,13 @@ def run(name: str, program: list[tuple[JogCommand | None, int]]) -> None:
     assert jogged.tracker.knot.is_at_rest
 
 
-@settings(max_examples=20)
+@examples(quick=6, full=20)
 @given(programs("rm1"))
 def test_rm1_keeps_limits_and_distance_and_can_always_stop(program: list[tuple[JogCommand | None, int]]) -> None:
     run("rm1", program)
 
 
-@settings(max_examples=12)
+@examples(quick=4, full=12)
 @given(programs("parol6"))
 def test_parol6_keeps_limits_and_distance_and_can_always_stop(program: list[tuple[JogCommand | None, int]]) -> None:
     run("parol6", program)

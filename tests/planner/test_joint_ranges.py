@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 
 from services.planner.kinematics import joint_ranges
 from services.planner.kinematics.joint_ranges import MOST_TURNS
+from tests.table import table
 
 
-@pytest.mark.parametrize("seed", range(20))
+@table("seed", range(20))
 def test_compiled_and_in_python_the_turns_are_the_same_to_the_bit(seed: int) -> None:
     random = np.random.default_rng(seed)
     branches = random.uniform(-math.pi, math.pi, (8, 6))

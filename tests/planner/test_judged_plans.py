@@ -8,7 +8,7 @@ from collections import Counter
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.planning import (
@@ -46,6 +46,7 @@ from tests.planner.judging import (
     require_sound,
     show,
 )
+from tests.profiles import count, examples
 
 ARMS = pytest.mark.parametrize("name", ["rm1", "parol6"])
 UNSURE = 1e-5  # [m] within which coal and MuJoCo may disagree on a touch
@@ -72,11 +73,12 @@ def judged(planner: Planner, request: PlanRequest, scene: PlanningScene) -> tupl
     return response, motion
 
 
+@pytest.mark.scaled
 @ARMS
 def test_no_plan_of_the_joints_touches_anything_or_breaks_a_limit(name: str):
     planner, outcomes = planner_of(name), Counter[str]()
 
-    @settings(max_examples=60)
+    @examples(quick=15, full=60)
     @given(case=cases(planner))
     def check(case: tuple[PlanningScene, PlanRequest]) -> None:
         scene, request = case
@@ -84,15 +86,16 @@ def test_no_plan_of_the_joints_touches_anything_or_breaks_a_limit(name: str):
         outcomes[response.planner_id or response.code.name] += 1
 
     check()
-    assert outcomes["straight"] >= 10, outcomes
-    assert sum(outcomes[searched] for searched in KNOWN) >= 3, outcomes
+    assert outcomes["straight"] >= count(quick=3, full=10), outcomes
+    assert sum(outcomes[searched] for searched in KNOWN) >= count(quick=1, full=3), outcomes
 
 
+@pytest.mark.scaled
 @ARMS
 def test_no_line_leaves_its_line(name: str):
     planner, outcomes = planner_of(name), Counter[PlanCode]()
 
-    @settings(max_examples=40)
+    @examples(quick=10, full=40)
     @given(case=tool_cases(planner, is_arc=False))
     def check(case: tuple[PlanningScene, PlanRequest]) -> None:
         scene, request = case
@@ -109,14 +112,15 @@ def test_no_line_leaves_its_line(name: str):
             require_tool_limits(request, motion, rows)
 
     check()
-    assert outcomes[PlanCode.SUCCESS] >= 8, outcomes
+    assert outcomes[PlanCode.SUCCESS] >= count(quick=2, full=8), outcomes
 
 
+@pytest.mark.scaled
 @ARMS
 def test_no_arc_leaves_its_arc(name: str):
     planner, outcomes = planner_of(name), Counter[PlanCode]()
 
-    @settings(max_examples=40)
+    @examples(quick=10, full=40)
     @given(case=tool_cases(planner, is_arc=True))
     def check(case: tuple[PlanningScene, PlanRequest]) -> None:
         scene, request = case
@@ -132,7 +136,7 @@ def test_no_arc_leaves_its_arc(name: str):
             require_tool_limits(request, motion, rows)
 
     check()
-    assert outcomes[PlanCode.SUCCESS] >= 4, outcomes
+    assert outcomes[PlanCode.SUCCESS] >= count(quick=1, full=4), outcomes
 
 
 def off_arc(rows: Array, begin: Array, interim: Array, end: Array) -> float:
@@ -153,6 +157,7 @@ def require_tool_limits(request: PlanRequest, motion: Motion, rows: Array) -> No
         assert speed.max() <= request.motion.speed * 1.001
 
 
+@pytest.mark.scaled
 @ARMS
 def test_every_configuration_that_ik_gives_has_the_pose_that_was_asked_for(name: str):
     planner = planner_of(name)
@@ -160,7 +165,7 @@ def test_every_configuration_that_ik_gives_has_the_pose_that_was_asked_for(name:
     ready = planner.arm.named_states["ready"]
     standing = asked(planner, ready, joints(planner, ready))
 
-    @settings(max_examples=60)
+    @examples(quick=15, full=60)
     @given(goal=pose_goals(planner, ready))
     def check(goal: PoseGoal) -> None:
         response = served.ik(IkRequest(goal=goal, near=standing.start, solutions=8, avoid_collisions=False), None)
@@ -176,7 +181,7 @@ def test_every_configuration_that_ik_gives_has_the_pose_that_was_asked_for(name:
 
 
 @ARMS
-@settings(max_examples=15)
+@examples(quick=5, full=15)
 @given(start=INNER, goal=INNER, share=st.floats(0.1, 1.0))
 def test_half_the_scaling_is_half_the_speed(name: str, start: tuple[float, ...], goal: tuple[float, ...], share: float):
     """Half the velocity's scaling, a quarter of the acceleration's: a jerk limit of its own keeps it from being exact
@@ -206,13 +211,14 @@ def peak(planner: Planner, motion: Motion) -> float:
     return float((np.abs(motion.velocities).max(axis=0) / [joint.velocity for joint in planner.arm.joints]).max())
 
 
+@pytest.mark.scaled
 @ARMS
 def test_the_same_seed_gives_the_same_plan_in_another_planner_too(name: str):
     one, other = planner_of(name), Planner(arm_of(name))
     other.prepare()
     compared = 0
 
-    @settings(max_examples=15)
+    @examples(quick=5, full=15)
     @given(case=cases(one))
     def check(case: tuple[PlanningScene, PlanRequest]) -> None:
         nonlocal compared
@@ -231,7 +237,7 @@ def test_the_same_seed_gives_the_same_plan_in_another_planner_too(name: str):
         compared += first.code is PlanCode.SUCCESS
 
     check()
-    assert compared >= 3
+    assert compared >= count(quick=1, full=3)
 
 
 @ARMS

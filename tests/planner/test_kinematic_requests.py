@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.frames import Transform
@@ -30,6 +30,7 @@ from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.kinematic_requests import KinematicRequests
 from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import NEVER
+from tests.profiles import examples
 
 ROOT = Path(__file__).parents[2] / "urdf"
 RM1, PAROL6 = load_arm(ROOT / "rm1"), load_arm(ROOT / "parol6")
@@ -44,7 +45,7 @@ def ik(name: str, request: IkRequest, age: float = 0.0) -> IkResponse:
 
 
 @pytest.mark.parametrize("name", ARMS)
-@settings(max_examples=25)
+@examples(quick=10, full=25)
 @given(where=st.lists(st.floats(0.0, 1.0), min_size=6, max_size=6))
 def test_ik_of_fk_leads_back_to_the_pose(name: str, where: list[float]):
     arm, served = ARMS[name], SERVED[name]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from services.arm.errors import DescriptionError
@@ -34,6 +34,7 @@ from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision_geometry.coal_shapes import is_inside
 from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import ShapeKind, TriangleMesh
+from tests.profiles import examples
 
 URDF = Path(__file__).parents[2] / "urdf"
 SEEDS = st.integers(0, 2**32 - 1)
@@ -62,7 +63,7 @@ def as_mesh(made: trimesh.Trimesh, points: np.ndarray | None = None) -> Triangle
 
 
 @given(SEEDS, st.integers(1, 3), st.integers(1, 60))
-@settings(max_examples=60, deadline=None)
+@examples(quick=10, full=60)
 def test_the_smallest_ball_holds_all_and_no_other_place_needs_less(seed: int, dimension: int, count: int):
     random = np.random.default_rng(seed)
     points = np.round(random.normal(size=(count, dimension)), random.integers(0, 8))  # with some on one place or line
@@ -74,7 +75,7 @@ def test_the_smallest_ball_holds_all_and_no_other_place_needs_less(seed: int, di
 
 
 @given(SEEDS, st.sampled_from([kind for kind in FittedKind if kind is not FittedKind.HULL]))
-@settings(max_examples=40, deadline=None)
+@examples(quick=10, full=40)
 def test_what_has_one_of_the_shapes_is_found_to_have_it(seed: int, kind: FittedKind):
     random = np.random.default_rng(seed)
     size, long = random.uniform(0.02, 0.1, 3), random.uniform(0.15, 0.3)
@@ -102,7 +103,7 @@ def test_what_has_one_of_the_shapes_is_found_to_have_it(seed: int, kind: FittedK
 
 
 @given(SEEDS, st.integers(4, 300), st.floats(0.0, 1.0))
-@settings(max_examples=60, deadline=None)
+@examples(quick=10, full=60)
 def test_whatever_the_points_are_the_shape_holds_them_all(seed: int, count: int, flat: float):
     random = np.random.default_rng(seed)
     points = turned(random.normal(size=(count, 3)) * (0.05, 0.05 * flat, 0.05 * flat**3), random)
@@ -117,7 +118,7 @@ def test_points_without_a_volume_get_a_thin_shape(points: np.ndarray):
 
 
 @given(SEEDS)
-@settings(max_examples=6, deadline=None)
+@examples(quick=2, full=6)
 def test_what_is_inside_a_mesh_is_inside_its_shapes_wherever_it_was_cut(seed: int):
     """Of bodies joined at random; the inside is told by the winding number, not by the shapes."""
     random = np.random.default_rng(seed)

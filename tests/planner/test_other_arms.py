@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.frames import Transform
@@ -33,6 +33,7 @@ from tests.planner.judging import (
     require_sound,
     show,
 )
+from tests.profiles import examples
 
 ARMS = pytest.mark.parametrize("name", ["reach4", "slide5", "seven"])
 THINGS = PlanningScene(
@@ -160,7 +161,7 @@ def test_it_draws_a_line(name: str, way: tuple[float, float, float]):
 
 
 @ARMS
-@settings(max_examples=20)
+@examples(quick=6, full=20)
 @given(data=st.data())
 def test_poses_of_every_form_it_can_do_are_reached(name: str, data: st.DataObject):
     planner = planner_of(name)
@@ -177,7 +178,7 @@ def test_poses_of_every_form_it_can_do_are_reached(name: str, data: st.DataObjec
 
 
 @ARMS
-@settings(max_examples=10)
+@examples(quick=4, full=10)
 @given(data=st.data())
 def test_no_plan_touches_anything_or_breaks_a_limit(name: str, data: st.DataObject):
     planner = planner_of(name)

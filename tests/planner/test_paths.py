@@ -34,6 +34,7 @@ from services.planner.timing.toppra_speeds import load_toppra
 from services.planner.verification.verify import limit_shares, require_ends, sample
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.scenes import star_mesh, stl_of
+from tests.profiles import count
 
 ARMS = ("rm1", "parol6")
 DENSER = 100  # samples between two points: ten times as many as the planner looks at
@@ -146,11 +147,12 @@ def random_requests(planner: Planner, count: int, seed: int, **options: object) 
     return [asked(planner, next(free), next(free), **{"allowed_time": 2.0, **options}) for _ in range(count)]
 
 
+@pytest.mark.scaled
 @pytest.mark.parametrize("name", list(SCENES))
 def test_whatever_is_returned_is_within_all_limits_and_touches_nothing(planner: Planner, name: str):
     show(planner, SCENES[name])
-    found = 0
-    for request in random_requests(planner, 8, seed=11):
+    found, requests = 0, random_requests(planner, count(quick=2, full=8), seed=11)
+    for request in requests:
         response = planner.plan(request, None, clock=time.monotonic)
         if response.code is PlanCode.SUCCESS:
             require_sound(planner, request, response)
@@ -158,7 +160,7 @@ def test_whatever_is_returned_is_within_all_limits_and_touches_nothing(planner: 
         else:
             assert response.trajectory.points == ()
             assert response.code is PlanCode.TIMED_OUT
-    assert found >= 4
+    assert found >= len(requests) // 2
 
 
 def narrow_configurations(planner: Planner) -> Iterator[np.ndarray]:
@@ -172,13 +174,14 @@ def narrow_configurations(planner: Planner) -> Iterator[np.ndarray]:
         yield from (row for row in rows[~core.free(rows)] if world.distance(row) > CLEARANCE + 0.0003)
 
 
+@pytest.mark.scaled
 @pytest.mark.parametrize("planner_id", ["", "native", "RRTConnect"])
 def test_a_way_from_where_only_coal_lets_the_arm_be_to_such_a_place_is_found_twice_the_same(
     planner: Planner, planner_id: str
 ):
     show(planner, SCENES["cage"])
     configurations = narrow_configurations(planner)
-    for _ in range(3):
+    for _ in range(count(quick=1, full=3)):
         request = asked(
             planner, next(configurations), next(configurations), motion=FreeMotion(planner_id=planner_id, seed=4)
         )
@@ -188,6 +191,7 @@ def test_a_way_from_where_only_coal_lets_the_arm_be_to_such_a_place_is_found_twi
         assert first.trajectory == second.trajectory
 
 
+@pytest.mark.scaled
 def test_an_arm_that_stands_at_the_very_margin_is_led_away_at_once(planner: Planner):
     """So near, by the spheres, that none of the native planner's lines may begin there."""
     show(planner, SCENES["cage"])
@@ -199,7 +203,7 @@ def test_an_arm_that_stands_at_the_very_margin_is_led_away_at_once(planner: Plan
     free, touching = ([], [])
     for row in random.uniform(lower, upper, (60, len(lower))):
         (free if core.distance(row) > 2.0 * CLEARANCE else touching).append(row)
-    for one, other in zip(free[:4], touching[:4], strict=True):
+    for one, other in list(zip(free[:4], touching[:4], strict=True))[: count(quick=1, full=4)]:
         low, high = 0.0, 1.0
         for _ in range(40):
             middle = 0.5 * (low + high)
@@ -211,6 +215,7 @@ def test_an_arm_that_stands_at_the_very_margin_is_led_away_at_once(planner: Plan
         assert response.planner_id in {"native", "straight"}
 
 
+@pytest.mark.full
 def test_more_attempts_make_no_way_longer_and_some_shorter(planner: Planner):
     show(planner, SCENES["shelf"])
     planner.checker.begin()
@@ -263,6 +268,7 @@ def test_a_gap_too_narrow_for_the_spheres_is_found_by_another_search():
     assert planner.checker.world.touching(spline_rows(way.control, 50), CLEARANCE) is None
 
 
+@pytest.mark.full
 def test_two_hundred_obstacles_are_gone_between(planner: Planner):
     """Strewn anywhere but on one way that is known to be free."""
     request, random = between(planner), np.random.default_rng(7)
@@ -278,6 +284,7 @@ def test_two_hundred_obstacles_are_gone_between(planner: Planner):
     require_sound(planner, request, planner.plan(request, None))
 
 
+@pytest.mark.full
 def test_a_mesh_of_a_hundred_thousand_triangles_is_gone_around(planner: Planner):
     request = between(planner)
     (post,) = planner.checker.newest.scene.objects

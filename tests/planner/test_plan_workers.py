@@ -97,6 +97,7 @@ def test_a_change_of_the_scene_reaches_the_process(stack: Stack):
     assert response.scene_version == 2
 
 
+@pytest.mark.full
 def test_a_large_mesh_costs_no_plan_its_time(stack: Stack):
     """Loading it takes longer than is allowed: it is done when the scene changes, or before the plan's time begins."""
     stack.ask(EASY)
@@ -275,6 +276,7 @@ def test_nothing_is_left_of_a_planner_that_is_killed_while_it_plans():
         assert psutil.wait_procs([orphan], timeout=10.0)[1] == []
 
 
+@pytest.mark.full
 def test_the_first_time_optimal_plan_is_not_stopped_while_its_library_loads(stack: Stack):
     stack.ask(PlanRequest(goal=NamedGoal(name="ready"), start=HOME, timing=Timing.TIME_OPTIMAL))
     assert stack.answer().code is PlanCode.SUCCESS

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.joints import JointState
@@ -18,6 +18,7 @@ from services.planner.request.refusals import PlanRefused
 from services.planner.request.start_state import resolve_start
 from services.planner.timing.profile import joint_limits
 from services.planner.verification.verify import require_within_limits, sample
+from tests.profiles import examples
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 PLANNER = Planner(ARM)
@@ -120,7 +121,7 @@ def test_from_limit_to_limit_of_every_joint_and_back(planner: Planner, rm1: ArmD
             require_within_limits(rm1, sample(response.trajectory), joint_limits(rm1))
 
 
-@settings(max_examples=150)
+@examples(quick=30, full=150)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_whatever_comes_out_is_within_limits_and_free(start: tuple[float, ...], goal: tuple[float, ...]):
     point = tuple(PLANNER.kinematics.tool(goal).position.tolist())

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.joints import JointState
@@ -28,6 +28,8 @@ from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.model.description import ArmDescription, load_arm
 from services.planner.collision.world import World
 from services.planner.core import Planner
+from tests.profiles import examples
+from tests.table import table
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 PLANNER = Planner(ARM)
@@ -44,8 +46,8 @@ def refused(response: PlanResponse, code: PlanCode) -> Refusal:
     return response.refusal
 
 
-@pytest.mark.parametrize("scaling", [0.0, -1.0, 1.0001])
-@pytest.mark.parametrize("which", ["velocity_scaling", "acceleration_scaling"])
+@table("scaling", [0.0, -1.0, 1.0001])
+@table("which", ["velocity_scaling", "acceleration_scaling"])
 def test_a_scaling_of_zero_is_not_one(planner: Planner, home: JointState, which: str, scaling: float):
     request = PlanRequest(goal=NamedGoal(name="ready"), **{which: scaling})
     refusal = refused(planner.plan(request, home), PlanCode.INVALID_GOAL_CONSTRAINTS)
@@ -131,7 +133,7 @@ def test_a_joint_that_holds_the_tool_back_is_named(planner: Planner, home: Joint
     assert "efector_joint at its upper limit of 0.2 m" in refused(response, PlanCode.NO_IK_SOLUTION).message
 
 
-@settings(max_examples=60)
+@examples(quick=15, full=60)
 @given(st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(-0.3, 0.5)))
 def test_the_nearest_goal_of_a_refusal_is_planned_when_asked_for(goal: tuple[float, ...]):
     response = PLANNER.plan(PlanRequest(goal=PoseGoal(position=goal)), STANDING)
@@ -214,8 +216,8 @@ def test_a_scaling_that_would_take_days_is_refused(planner: Planner, home: Joint
     assert "86400 s is the most" in refused(planner.plan(request, home), PlanCode.PLANNING_FAILED).message
 
 
-@pytest.mark.parametrize("allowed", [0.0, -1.0, -1e300, 120.5, 1e300])
-@pytest.mark.parametrize("motion", [FreeMotion(), PointToPoint(), LinearMotion()])
+@table("allowed", [0.0, -1.0, -1e300, 120.5, 1e300])
+@table("motion", [FreeMotion(), PointToPoint(), LinearMotion()])
 def test_no_time_and_too_much_are_refused(planner: Planner, home: JointState, motion: Motion, allowed: float):
     request = PlanRequest(goal=NamedGoal(name="ready"), motion=motion, allowed_time=allowed)
     refusal = refused(planner.plan(request, home), PlanCode.INVALID_GOAL_CONSTRAINTS)
@@ -228,7 +230,7 @@ def test_a_search_without_time_is_timed_out(planner: Planner, home: JointState):
     assert refusal.subject == "allowed_time"
 
 
-@settings(max_examples=100)
+@examples(quick=30)
 @given(st.builds(
     PlanRequest,
     goal=st.one_of(

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from schemas.planning import PlanCode, PoseGoal, Refusal
@@ -19,6 +19,7 @@ from services.arm.model.description import ArmDescription, load_arm
 from services.planner.kinematics.goals import Goals, Start
 from services.planner.request.deadline import NEVER
 from services.planner.request.refusals import PlanRefused
+from tests.profiles import examples
 
 ROOT = Path(__file__).parents[2] / "urdf"
 FORMS = ("position", "pose", "free axis", "pointing")
@@ -89,7 +90,7 @@ def missing(form: str, wanted: FramePose, got: FramePose, axis: np.ndarray) -> t
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", BENCHES)
-@settings(max_examples=25)
+@examples(quick=8, full=25)
 @given(shares(), shares(), st.tuples(*[st.floats(-1.0, 1.0)] * 3))
 def test_fk_of_ik_is_the_goal_in_every_form(
     name: str, form: str, where: list[float], near: list[float], axis: tuple[float, float, float]
@@ -230,7 +231,7 @@ def slightly_out_of_reach(position_tolerance: float, orientation_tolerance: floa
 
 
 @pytest.mark.parametrize("name", BENCHES)
-@settings(max_examples=15)
+@examples(quick=5, full=15)
 @given(shares(), st.tuples(*[st.floats(-1.0, 1.0)] * 4), st.booleans())
 def test_the_nearest_pose_of_a_refusal_can_be_asked_for(
     name: str, where: list[float], turn: tuple[float, ...], is_pointing: bool
@@ -320,7 +321,7 @@ def test_what_is_not_a_number_cannot_get_in(field: str):
         PoseGoal(**{field: (math.nan, 0.0, 0.0)})
 
 
-@settings(max_examples=60)
+@examples(quick=15, full=60)
 @given(st.builds(
     PoseGoal,
     position=st.lists(st.floats(-1e12, 1e12), max_size=4).map(tuple) | st.just((0.2, 0.1, 0.2)),

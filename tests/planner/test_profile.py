@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
@@ -18,6 +18,7 @@ from services.arm.model.description import load_arm
 from services.planner.timing import profile
 from services.planner.timing.profile import joint_limits, straight_line
 from services.planner.verification.verify import require_ends, require_within_limits, sample
+from tests.profiles import examples
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 CONFIGURATIONS = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])
@@ -33,7 +34,7 @@ def dense(trajectory: JointTrajectory, parts: int = 10) -> tuple[np.ndarray, np.
     return (grid, *(np.array([row[i] for row in rows]) for i in range(3)))
 
 
-@settings(max_examples=200)
+@examples(full=200)
 @given(CONFIGURATIONS, CONFIGURATIONS, SCALINGS, SCALINGS)
 def test_a_trajectory_never_exceeds_joint_limits(
     start: tuple[float, ...], goal: tuple[float, ...], speed: float, acceleration: float
@@ -49,7 +50,7 @@ def test_a_trajectory_never_exceeds_joint_limits(
     require_within_limits(ARM, sample(trajectory), limits)
 
 
-@settings(max_examples=100)
+@examples(quick=30)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_start_and_end_are_exact_and_at_rest(start: tuple[float, ...], goal: tuple[float, ...]):
     trajectory = straight_line(ARM.joint_names, start, goal, joint_limits(ARM))
@@ -59,7 +60,7 @@ def test_start_and_end_are_exact_and_at_rest(start: tuple[float, ...], goal: tup
     assert all(b - a > 0.5e-4 for a, b in itertools.pairwise(times))
 
 
-@settings(max_examples=100)
+@examples(quick=30)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_the_joints_move_on_a_straight_line_and_never_back(start: tuple[float, ...], goal: tuple[float, ...]):
     _, p, _, _ = dense(straight_line(ARM.joint_names, start, goal, joint_limits(ARM)))
@@ -69,7 +70,7 @@ def test_the_joints_move_on_a_straight_line_and_never_back(start: tuple[float, .
     assert (np.diff(share) >= -1e-9).all()
 
 
-@settings(max_examples=50)
+@examples(quick=20, full=50)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_jerk_is_limited_and_the_acceleration_has_no_jump(start: tuple[float, ...], goal: tuple[float, ...]):
     limits = joint_limits(ARM)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.frames import Transform
@@ -41,6 +41,7 @@ from services.arm.model.description import load_arm
 from services.planner.scene.scene_check import require_scene
 from services.planner.scene.scene_file import DamagedScene, load_scene, put_aside, save_scene
 from services.planner.scene.scene_store import SceneStore
+from tests.profiles import examples
 
 Poses = Mapping[str, Transform]
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
@@ -279,7 +280,7 @@ edits_of_a_scene = st.one_of(
 requests = st.builds(SceneRequest, edit=edits_of_a_scene)
 
 
-@settings(max_examples=150, deadline=None)
+@examples(quick=30, full=150)
 @given(st.lists(st.tuples(requests, st.sampled_from([HERE, THERE, None])), max_size=12))
 def test_no_sequence_of_edits_leaves_a_scene_that_cannot_be(edits: list[tuple[SceneRequest, Poses | None]]) -> None:
     store = SceneStore(ARM)
@@ -292,7 +293,7 @@ def test_no_sequence_of_edits_leaves_a_scene_that_cannot_be(edits: list[tuple[Sc
         assert all(item.frame == "" or item.attached for item in store.scene.objects)
 
 
-@settings(max_examples=50, deadline=None)
+@examples(quick=15, full=50)
 @given(scene=scenes)
 def test_a_saved_scene_is_the_same_when_it_is_loaded(
     scene: PlanningScene, tmp_path_factory: pytest.TempPathFactory

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -35,6 +35,7 @@ from services.planner.collision.world import World
 from services.planner.core import Planner
 from services.planner.timing.profile import joint_limits
 from services.planner.verification.verify import require_jerk, require_within_limits, sample
+from tests.profiles import examples
 
 URDF = Path(__file__).parents[2] / "urdf"
 PLANNERS = {name: Planner(load_arm(URDF / name)) for name in ("rm1", "parol6")}
@@ -80,7 +81,7 @@ def require_sound(planner: Planner, response: PlanResponse, start: tuple[float, 
 
 
 @ARMS
-@settings(max_examples=25)
+@examples(quick=8, full=25)
 @given(shares=SHARES, direction=DIRECTIONS, length=st.floats(0.005, 0.2), speed=st.sampled_from((0.0, 0.04)))
 def test_a_line_is_a_line_or_says_why_it_ends(
     name: str, shares: list[float], direction: np.ndarray, length: float, speed: float
@@ -114,7 +115,7 @@ def test_a_line_is_a_line_or_says_why_it_ends(
 
 
 @ARMS
-@settings(max_examples=15)
+@examples(quick=5, full=15)
 @given(shares=SHARES, one=DIRECTIONS, other=DIRECTIONS)
 def test_an_arc_is_an_arc_through_its_point(name: str, shares: list[float], one: np.ndarray, other: np.ndarray):
     planner = PLANNERS[name]

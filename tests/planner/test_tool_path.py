@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from services.arm.kinematics.kinematics import FramePose
@@ -14,6 +14,7 @@ from services.planner.cartesian.arcs import arc_about, arc_through
 from services.planner.cartesian.tool_path import ToolPath, polyline
 from services.planner.path.path_curve import NO_LENGTH, CubicSpline, rounded_runs
 from services.planner.request.refusals import PlanRefused
+from tests.profiles import examples
 
 NUMBERS = st.floats(-1.0, 1.0).map(lambda value: round(value, 4))
 POINTS = st.tuples(NUMBERS, NUMBERS, NUMBERS).map(np.array)
@@ -43,7 +44,7 @@ def test_a_line_ends_where_it_should_and_turns_evenly(start: FramePose, end: Fra
         assert turn_between(start, third) == pytest.approx(turn_between(start, end) / 3.0, abs=1e-9)
 
 
-@settings(max_examples=60)
+@examples(quick=20, full=60)
 @given(st.lists(POSES, min_size=3, max_size=5), st.floats(1e-3, 0.3))
 def test_a_blended_corner_is_cut_within_its_radius_and_has_no_kink(poses: list[FramePose], blend: float):
     paths = polyline(poses, blend)
@@ -83,7 +84,7 @@ def test_without_a_blend_every_corner_is_a_stop():
     assert polyline([place(0, 0, 0)] * 3, 0.1) == []
 
 
-@settings(max_examples=40)
+@examples(quick=15, full=40)
 @given(POSES, POINTS, POSES)
 def test_an_arc_keeps_its_radius_and_passes_its_point(start: FramePose, interim: np.ndarray, end: FramePose):
     try:
@@ -153,7 +154,7 @@ def test_a_spline_is_exact_for_cubics_and_smooth_for_all_else():
         assert left == pytest.approx(right, abs=tolerance)
 
 
-@settings(max_examples=40)
+@examples(quick=15, full=40)
 @given(st.lists(POINTS, min_size=2, max_size=5), st.floats(0.001, 0.2))
 @example([np.zeros(3), np.array((0.0, 1.0, 0.0)), np.array((1.0, 0.0, 0.0))], 2.0**-9)  # cut within 1 % of a leg
 def test_joint_corners_are_cut_within_what_the_arm_may_move(corners: list[np.ndarray], blend: float):

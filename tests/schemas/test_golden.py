@@ -10,7 +10,6 @@ import base64
 from typing import Any
 
 import msgspec
-import pytest
 
 from schemas.joints import JointState
 from schemas.message import Message, decode, encode
@@ -24,11 +23,12 @@ from tests.schemas.samples import (
     one_a_line,
     sample,
 )
+from tests.table import table
 
 RECORDED = golden()
 
 
-@pytest.mark.parametrize("kind", messages(), ids=lambda kind: kind.__name__)
+@table("kind", messages(), ids=lambda kind: kind.__name__)
 def test_the_golden_bytes_keep_their_meaning(kind: type[Message]) -> None:
     assert kind.__name__ in RECORDED, "a new message: run `python -m tests.schemas.samples`"
     recorded = RECORDED[kind.__name__]
@@ -36,7 +36,7 @@ def test_the_golden_bytes_keep_their_meaning(kind: type[Message]) -> None:
     assert _contains(msgspec.msgpack.decode(encode(message)), recorded["fields"])
 
 
-@pytest.mark.parametrize("kind", messages(), ids=lambda kind: kind.__name__)
+@table("kind", messages(), ids=lambda kind: kind.__name__)
 def test_what_is_said_now_has_every_recorded_field_under_its_name_and_type(kind: type[Message]) -> None:
     """An old reader must find what it knows: a field that was renamed, removed or retyped fails here."""
     assert _contains(msgspec.msgpack.decode(encode(sample(kind))), RECORDED[kind.__name__]["fields"])
@@ -51,7 +51,7 @@ def test_the_files_have_one_record_on_each_line() -> None:
     assert GOLDEN_CODES.read_text(encoding="utf-8") == one_a_line(golden_codes())
 
 
-@pytest.mark.parametrize("name", sorted(codes().keys() | golden_codes().keys()))
+@table("name", sorted(codes().keys() | golden_codes().keys()))
 def test_every_code_keeps_its_number(name: str) -> None:
     """New codes may come; one that is renumbered, renamed or gone would be misread by who knows the old one."""
     assert name in golden_codes(), "a new enumeration: run `python -m tests.schemas.samples`"

@@ -19,6 +19,7 @@ from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, Trajector
 from schemas.planning import JointGoal, NamedGoal, PlannedPath, PlanRequest, PoseGoal
 from schemas.system import Parameters, SetParameter
 from tests.schemas.samples import messages, sample
+from tests.table import table
 
 KINDS = st.sampled_from(messages())
 NOT_FINITE = st.sampled_from([math.nan, math.inf, -math.inf])
@@ -26,18 +27,18 @@ SCALARS = st.none() | st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floa
 VALUES = st.recursive(SCALARS, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=8)
 
 
-@pytest.mark.parametrize("kind", messages(), ids=lambda kind: kind.__name__)
+@table("kind", messages(), ids=lambda kind: kind.__name__)
 def test_it_comes_back_as_it_went(kind: type[Message]) -> None:
     message = sample(kind)
     assert encode(decode(kind, encode(message))) == encode(message)
 
 
-@pytest.mark.parametrize("kind", messages(), ids=lambda kind: kind.__name__)
+@table("kind", messages(), ids=lambda kind: kind.__name__)
 def test_missing_fields_take_their_defaults(kind: type[Message]) -> None:
     assert encode(decode(kind, msgspec.msgpack.encode(_tagged(kind, {})))) == encode(kind())
 
 
-@pytest.mark.parametrize("kind", messages(), ids=lambda kind: kind.__name__)
+@table("kind", messages(), ids=lambda kind: kind.__name__)
 def test_it_is_frozen_documented_and_has_defaults(kind: type[Message]) -> None:
     assert kind.__struct_config__.frozen
     assert kind.__doc__
@@ -50,7 +51,7 @@ def test_unknown_fields_are_ignored(kind: type[Message], unknown: dict[str, obje
     assert encode(decode(kind, msgspec.msgpack.encode(known | unknown))) == encode(sample(kind))
 
 
-@pytest.mark.parametrize("kind", messages(), ids=lambda kind: kind.__name__)
+@table("kind", messages(), ids=lambda kind: kind.__name__)
 def test_unknown_fields_are_ignored_at_any_depth(kind: type[Message]) -> None:
     grown = _with_an_unknown_field(msgspec.msgpack.decode(encode(sample(kind))))
     assert encode(decode(kind, msgspec.msgpack.encode(grown))) == encode(sample(kind))
@@ -66,7 +67,7 @@ def test_missing_fields_take_their_defaults_at_any_depth() -> None:
     )
 
 
-@pytest.mark.parametrize(
+@table(
     ("kind", "fields"),
     [
         (PlanRequest, {"goal": {"type": "pose", "position": [0.1, math.nan, 0.1]}}),

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 
-import pytest
-
 from schemas.message import Message
 from schemas.topics import ACTIONS, CAMERA_TOPICS, REQUESTS, TOPICS, Action, Delivery, Request, Topic
 from tests.schemas.samples import messages
+from tests.table import table
 
 WRITERS = {"stepper_gateway", "state_publisher", "planner", "logger", "visualizer", "camera", "detector", "any"}
 Row = Topic[Message] | Request[Message, Message] | Action[Message, Message, Message]
@@ -21,14 +20,14 @@ def test_no_key_stands_twice() -> None:
     assert len(keys) == len(set(keys))
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.key)
+@table("row", ROWS, ids=lambda row: row.key)
 def test_every_row_has_a_plain_key_a_known_writer_and_a_sentence(row: Row) -> None:
     assert re.fullmatch(r"[a-z][a-z_]*(/[a-z][a-z_]*)*", row.key)
     assert (row.writer if isinstance(row, Topic) else row.server) in WRITERS
     assert row.about
 
 
-@pytest.mark.parametrize("topic", [*TOPICS, *OF_A_CAMERA], ids=lambda topic: topic.key)
+@table("topic", [*TOPICS, *OF_A_CAMERA], ids=lambda topic: topic.key)
 def test_only_what_may_be_dropped_has_a_rate(topic: Topic[Message]) -> None:
     assert topic.rate is None or topic.rate > 0.0
     assert topic.rate is None or topic.delivery is Delivery.LATEST

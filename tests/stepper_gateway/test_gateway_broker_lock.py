@@ -34,6 +34,7 @@ def serving(section: MqttSection, *lines: str) -> Iterator[Mosquitto]:
         broker.stop()
 
 
+@pytest.mark.full
 def test_a_gateway_joins_a_locked_broker_by_its_folder_or_by_each_setting(tmp_path: Path) -> None:
     section = locked(tmp_path / "lock")
     with serving(section):
@@ -66,6 +67,7 @@ def test_each_mistake_of_password_and_certificate_is_one_sentence_with_its_remed
         assert "has expired: renew it" in reason_of(mine)
 
 
+@pytest.mark.full
 def test_a_port_without_tls_is_said_to_be_one(tmp_path: Path) -> None:
     section = replace(locked(tmp_path / "lock"), secure_folder="")
     broker = Mosquitto(tmp_path, section)
@@ -77,6 +79,7 @@ def test_a_port_without_tls_is_said_to_be_one(tmp_path: Path) -> None:
     assert "mostly 8883" in said
 
 
+@pytest.mark.full
 def test_a_broker_that_wants_a_certificate_of_ours_gets_it_or_says_so(tmp_path: Path) -> None:
     section = locked(tmp_path / "lock")
     folder = Path(section.secure_folder)
@@ -88,6 +91,7 @@ def test_a_broker_that_wants_a_certificate_of_ours_gets_it_or_says_so(tmp_path: 
         assert "mqtt.certificate" in reason_of(mine)
 
 
+@pytest.mark.full
 def test_an_acl_that_denies_is_said_with_its_topic_though_mosquitto_drops_silently(tmp_path: Path) -> None:
     section = locked(tmp_path / "lock")
     acl = Path(section.secure_folder, "acl")
@@ -103,6 +107,7 @@ def test_an_acl_that_denies_is_said_with_its_topic_though_mosquitto_drops_silent
         acl.write_text(kept)
 
 
+@pytest.mark.full
 def test_a_device_writes_its_own_topics_only_and_nobody_but_the_gateway_commands(tmp_path: Path) -> None:
     section = locked(tmp_path / "lock", "rm1", "other")
     gateway, device = gateway_access(section), device_access(section, "rm1")
@@ -116,6 +121,7 @@ def test_a_device_writes_its_own_topics_only_and_nobody_but_the_gateway_commands
             assert published(gateway, f"gemelo/v1/rm1/{kind}") == NOT_AUTHORISED
 
 
+@pytest.mark.full
 def test_a_refused_gateway_asks_ever_more_seldom_and_a_vanished_broker_is_met_again_at_once(tmp_path: Path) -> None:
     section = locked(tmp_path / "lock")
     refused = replace(external(section), password_file=secret(tmp_path, "wrong\n"))

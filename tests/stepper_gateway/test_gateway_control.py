@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.actions import GoalStatusCode
@@ -28,6 +28,7 @@ from schemas.topics import CONTROL
 from services.stepper_gateway.control.control import MOST_MEMBERS
 from services.virtual_arm.gateway_driver import MotionCaller
 from services.virtual_arm.virtual_arm import GatewayParameters, VirtualArm
+from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 ZERO = (0.0, 0.0, 0.0)
@@ -491,7 +492,7 @@ STEPS = st.lists(
 )
 
 
-@settings(max_examples=40, deadline=None)
+@examples(quick=10, full=40)
 @given(STEPS)
 def test_whatever_is_asked_in_whatever_order_only_the_holder_moves_and_the_arm_is_never_blocked(steps) -> None:
     rig = VirtualArm().ready()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.actions import GoalStatusCode
@@ -17,6 +17,7 @@ from services.stepper_gateway.links.frames import Code, CommandReply, decode
 from services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind
 from services.virtual_arm.gateway_driver import asked
 from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
+from tests.profiles import examples
 from tests.stepper_gateway.harness import move
 
 HOME, READY = (0.0, 0.0, 0.0), (0.6, -1.2, 0.08)
@@ -86,7 +87,7 @@ def assert_at(rig: VirtualArm, target: tuple[float, ...]) -> None:
 
 
 @given(CUTS)
-@settings(max_examples=15)
+@examples(quick=7, full=15)
 def test_every_goal_ends_in_time_and_a_success_is_true(cut: Cut) -> None:
     lost = Lost(cut)
     trajectory = move(HOME, READY)
@@ -102,7 +103,7 @@ def test_every_goal_ends_in_time_and_a_success_is_true(cut: Cut) -> None:
 
 
 @given(CUTS, st.floats(0.0, 3.0))
-@settings(max_examples=10)
+@examples(quick=5, full=10)
 def test_every_cancelled_goal_ends_in_time_and_the_arm_does_not_go_on_by_itself(cut: Cut, when: float) -> None:
     lost = Lost(cut)
     rig = lost.rig
@@ -118,7 +119,7 @@ def test_every_cancelled_goal_ends_in_time_and_the_arm_does_not_go_on_by_itself(
 
 
 @given(CUTS, st.sampled_from((JAWS, 0.0, 0.02)))
-@settings(max_examples=10)
+@examples(quick=5, full=10)
 def test_every_goal_of_the_gripper_ends_in_time(cut: Cut, position: float) -> None:
     lost = Lost(cut)
     if lost.rig.grip(position).accepted:
@@ -132,7 +133,7 @@ COMMANDS = tuple(
 
 
 @given(CUTS, st.floats(0.0, 3.2), st.lists(st.sampled_from(COMMANDS), min_size=1, max_size=3))
-@settings(max_examples=15)
+@examples(quick=7, full=15)
 def test_every_command_is_answered_in_time_and_what_was_accepted_was_done(
     cut: Cut, when: float, wanted: list[DeviceCommandKind]
 ) -> None:
@@ -150,7 +151,7 @@ def test_every_command_is_answered_in_time_and_what_was_accepted_was_done(
 
 
 @given(CUTS, st.floats(0.0, 3.2))
-@settings(max_examples=8)
+@examples(quick=4, full=8)
 def test_a_configuration_and_an_injection_are_answered_in_time(cut: Cut, when: float) -> None:
     lost = Lost(cut)
     rig = lost.rig

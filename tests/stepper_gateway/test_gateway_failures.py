@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.actions import GoalStatusCode
@@ -13,6 +13,7 @@ from schemas.topics import DEVICE_STATUS, JOINT_STATES
 from services.stepper_gateway.links.frames import Ack, CommandReply, StateFrame, SyncReply, encode
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
+from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)
@@ -271,7 +272,7 @@ junk = st.one_of(
 )
 
 
-@settings(max_examples=60)
+@examples(quick=15, full=60)
 @given(st.lists(st.tuples(st.sampled_from([k for k in Kind if k != Kind.STATUS]), junk, st.booleans()), max_size=20))
 def test_junk_from_the_wire_is_counted_and_nothing_moves(items: list[tuple[Kind, bytes, bool]]) -> None:
     rig = VirtualArm().ready()
@@ -289,7 +290,7 @@ def test_junk_from_the_wire_is_counted_and_nothing_moves(items: list[tuple[Kind,
     assert rig.core.bad_frames == wrong
 
 
-@settings(max_examples=40)
+@examples(quick=10, full=40)
 @given(st.lists(st.tuples(st.sampled_from(list(Kind)), st.binary(max_size=80)), max_size=20))
 def test_random_bytes_while_moving_change_nothing(items: list[tuple[Kind, bytes]]) -> None:
     rig = VirtualArm().ready()

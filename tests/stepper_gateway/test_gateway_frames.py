@@ -33,6 +33,7 @@ from services.stepper_gateway.links.reports import (
     decode_report,
     decode_sensors,
 )
+from tests.table import table
 
 VECTORS = Path(__file__).resolve().parents[2] / "firmware" / "tests" / "vectors"
 KINDS = {
@@ -136,7 +137,7 @@ def test_random_bytes_are_no_report(payload: bytes) -> None:
         decode_sensors(payload)
 
 
-@pytest.mark.parametrize("text", ["{}", '{"t_us": 1e400}', '{"t_us": -1, "ultra": "far"}', "[1]", '{"ultra": null}'])
+@table("text", ["{}", '{"t_us": 1e400}', '{"t_us": -1, "ultra": "far"}', "[1]", '{"ultra": null}'])
 def test_odd_sensor_readings_are_read_or_refused_never_a_crash(text: str) -> None:
     with contextlib.suppress(BadFrame):
         assert all(isinstance(value, float) for value in decode_sensors(text.encode()).values.values())
@@ -147,7 +148,7 @@ def test_sensor_readings_are_those_beside_the_time_and_the_boot() -> None:
     assert (report.t_us, report.values) == (123, {"ultra": 12.5, "bateria": 7.0})
 
 
-@pytest.mark.parametrize("vector", vectors())
+@table("vector", vectors())
 def test_the_shared_vectors_are_read_and_written_alike(vector: dict[str, Any]) -> None:
     payload = bytes.fromhex(vector["frame"])
     if vector["fields"] is None:  # nothing that fields could say

@@ -145,6 +145,7 @@ def test_a_target_that_is_not_there_is_refused_with_the_nearest(press: InjectKin
         target_of(InjectRequest(kind=press, target=target), rm1())
 
 
+@pytest.mark.full
 def test_the_virtual_devices_own_process_is_pressed_released_and_blocked(processes: Processes) -> None:
     with closing(WiredGateway(processes.port)) as gateway:
         gateway.ready()

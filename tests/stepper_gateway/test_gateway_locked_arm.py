@@ -24,6 +24,8 @@ from tests.stepper_gateway.locked import wait_for
 from tests.stepper_gateway.processes import BROKER, DEVICE, Processes
 from tests.stepper_gateway.wired import WiredGateway
 
+pytestmark = pytest.mark.full
+
 NEAR = (0.1, -0.2, 0.01)
 
 

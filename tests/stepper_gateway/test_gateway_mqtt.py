@@ -8,6 +8,7 @@ import signal
 import time
 from contextlib import closing
 
+import pytest
 from msgspec.structs import replace
 from paho.mqtt import publish
 from paho.mqtt.client import Client
@@ -73,6 +74,7 @@ def test_a_killed_broker_aborts_the_goal_and_nothing_stale_is_sent_after_it_retu
         assert gateway.published["device/state"][-1].refused == refused
 
 
+@pytest.mark.full
 def test_a_stop_to_a_frozen_broker_is_answered_in_time_and_is_carried_out_when_it_thaws(processes: Processes) -> None:
     with closing(WiredGateway(processes.port)) as gateway, closing(Wire(processes.port)) as wire:
         gateway.ready()
@@ -120,6 +122,7 @@ class Wire:
         self._client.loop_stop()
 
 
+@pytest.mark.full
 def test_a_restarted_device_is_met_again(processes: Processes) -> None:
     with closing(WiredGateway(processes.port)) as gateway:
         gateway.ready()
@@ -151,6 +154,7 @@ def said(gateway: WiredGateway) -> DeviceStatus:
     return status
 
 
+@pytest.mark.full
 def test_a_dead_device_is_said_dead_to_every_gateway_that_comes_after(processes: Processes) -> None:
     with closing(WiredGateway(processes.port)) as gateway:
         gateway.ready()
@@ -166,6 +170,7 @@ def test_a_dead_device_is_said_dead_to_every_gateway_that_comes_after(processes:
         assert late.core.not_ready(late.moment)
 
 
+@pytest.mark.full
 def test_a_retained_status_of_long_ago_is_no_sign_of_life(processes: Processes) -> None:
     processes.kill(DEVICE)
     time.sleep(0.5)
@@ -191,6 +196,7 @@ def test_a_retained_status_of_long_ago_is_no_sign_of_life(processes: Processes) 
         assert said(gateway).boot_id not in (0, 5)
 
 
+@pytest.mark.full
 def test_a_retained_configuration_of_another_robot_is_replaced_and_nothing_moves_by_it(processes: Processes) -> None:
     wanted = device_config(rm1())
     stale = replace(wanted, joints=(replace(wanted.joints[0], max_velocity_q8=400_000), *wanted.joints[1:]))
@@ -220,6 +226,7 @@ def test_a_retained_configuration_of_another_robot_is_replaced_and_nothing_moves
         assert gateway.published["device/configuration"][-1].accepted
 
 
+@pytest.mark.full
 def test_a_gateway_gives_the_configuration_when_it_is_asked_for(processes: Processes) -> None:
     with closing(WiredGateway(processes.port)) as gateway:
         gateway.ready()

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.message import Vector
@@ -19,6 +19,7 @@ from services.stepper_gateway.motion.knot_sources import PathKnots
 from services.stepper_gateway.motion.knots import Knot, Limits, StepEncoder, StepKnot, whole_steps
 from services.stepper_gateway.motion.paths import JoinedPath, RoundedPath, SampledPath, TimedPath, join_path, profile
 from services.virtual_arm.virtual_arm import rm1
+from tests.profiles import examples
 from tests.stepper_gateway.harness import ROOT, move
 
 JOINTS = rm1().joints
@@ -60,7 +61,7 @@ def test_a_rounded_path_starts_from_the_arm_where_the_first_point_comes_later() 
 places = st.tuples(st.floats(-2.9, 2.9), st.floats(-2.9, 2.9), st.floats(0.0, 0.2))
 
 
-@settings(max_examples=60)
+@examples(quick=15, full=60)
 @given(places, places, places, st.floats(0.0, 1.0))
 def test_a_bridge_is_continuous_and_keeps_the_limits(
     first: Vector, second: Vector, third: Vector, share: float
@@ -86,7 +87,7 @@ def test_a_bridge_is_continuous_and_keeps_the_limits(
             assert abs(knot.acceleration[joint]) <= LIMITS.acceleration[joint] * 1.05
 
 
-@settings(max_examples=40)
+@examples(quick=10, full=40)
 @given(st.floats(0.0005, 30.0))
 def test_a_planned_motion_has_equal_steps_of_at_most_20_ms_and_ends_exactly(duration: float) -> None:
     points = tuple(

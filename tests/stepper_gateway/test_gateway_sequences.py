@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.actions import GoalStatusCode
@@ -16,6 +16,7 @@ from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, Trajector
 from schemas.topics import JOINT_STATES
 from services.virtual_arm.gateway_driver import asked
 from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
+from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 JOINTS = rm1().joints
@@ -295,7 +296,7 @@ def assert_next_goal_succeeds(play: Play) -> None:
     play.finish_track()
 
 
-@settings(max_examples=30)
+@examples(quick=8, full=30)
 @given(wires, st.integers(0, 99), st.lists(st.tuples(EXPLORED, waits), min_size=3, max_size=10))
 def test_whatever_the_sequence_the_arm_stays_safe_and_every_goal_ends(
     wire: VirtualWire, seed: int, sequence: list[tuple[Action, float]]

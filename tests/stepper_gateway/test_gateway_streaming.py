@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.actions import GoalStatusCode
@@ -17,6 +17,7 @@ from schemas.topics import DEVICE_EVENTS, JOINT_STATES
 from services.stepper_gateway.motion.knots import Knot, Limits
 from services.stepper_gateway.motion.target_tracker import TargetTracker
 from services.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
+from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 
@@ -167,7 +168,7 @@ UPPER = (2.95, 2.95, 0.2)
 shares = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
 
 
-@settings(max_examples=40)
+@examples(quick=10, full=40)
 @given(st.lists(st.tuples(shares, st.integers(1, 60), st.booleans()), min_size=1, max_size=6))
 def test_whatever_the_targets_the_tracker_keeps_every_limit(
     program: list[tuple[tuple[float, ...], int, bool]],

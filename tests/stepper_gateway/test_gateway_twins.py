@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, given
 from hypothesis import strategies as st
 
 from schemas.actions import GoalStatusCode
@@ -13,6 +13,7 @@ from services.stepper_gateway.links.frames import Ack, Code, decode
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.gateway_driver import GatewayDriver, Moment
 from services.virtual_arm.virtual_arm import VirtualArm
+from tests.profiles import examples
 from tests.stepper_gateway.harness import move
 
 HOME, READY = (0.0, 0.0, 0.0), (0.6, -1.2, 0.08)
@@ -95,7 +96,7 @@ def accepted(driver: GatewayDriver, goal_id: str, arm: VirtualArm) -> bool:
 
 
 @given(st.floats(0.0, 2.5), st.lists(st.tuples(st.booleans(), st.floats(0.0, 1.0)), max_size=6), st.booleans())
-@settings(max_examples=8, phases=(Phase.explicit, Phase.generate))
+@examples(quick=4, full=8, phases=(Phase.explicit, Phase.generate))
 def test_of_two_gateways_never_are_chunks_of_both_played_and_a_stop_of_either_works(
     joins: float, goals: list[tuple[bool, float]], first_stops: bool
 ) -> None:
@@ -131,7 +132,7 @@ def test_each_says_so_and_the_one_that_stays_goes_on() -> None:
 
 
 @given(st.floats(1.0, 6.0), st.floats(0.0, 2.0))
-@settings(max_examples=5, phases=(Phase.explicit, Phase.generate))
+@examples(quick=4, full=5, phases=(Phase.explicit, Phase.generate))
 def test_a_gateway_that_thaws_beside_another_moves_nothing(frozen: float, later: float) -> None:
     arm = Twins()
     arm.ready()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -16,7 +16,9 @@ from services.stepper_gateway.goals.rejections import GoalRejected
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.parameters import GatewayParameters
 from services.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
+from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
+from tests.table import table
 
 HOME = (0.0, 0.0, 0.0)
 READY = (0.6, -1.2, 0.08)
@@ -123,7 +125,7 @@ REFUSED: list[tuple[str, JointTrajectory, FollowErrorCode, tuple[str, ...]]] = [
 ]
 
 
-@pytest.mark.parametrize(("goal", "code", "said"), [pytest.param(*r[1:], id=r[0]) for r in REFUSED])
+@table(("goal", "code", "said"), [pytest.param(*r[1:], id=r[0]) for r in REFUSED])
 def test_a_bad_goal_is_refused_with_what_is_wrong(
     goal: JointTrajectory, code: FollowErrorCode, said: tuple[str, ...]
 ) -> None:
@@ -216,7 +218,7 @@ goals = st.builds(
 )
 
 
-@settings(max_examples=150)
+@examples(quick=30, full=150)
 @given(goals)
 def test_any_goal_is_refused_or_its_path_keeps_the_limits(goal: FollowJointTrajectoryGoal) -> None:
     validator, parameters = GoalValidator(rm1().joints, 50_000), GatewayParameters()
@@ -235,7 +237,7 @@ def test_any_goal_is_refused_or_its_path_keeps_the_limits(goal: FollowJointTraje
 places = st.tuples(st.floats(-2.9, 2.9), st.floats(-2.9, 2.9), st.floats(0.0, 0.2))
 
 
-@settings(max_examples=15)
+@examples(quick=5, full=15)
 @given(st.lists(st.tuples(places, st.floats(0.02, 2.0)), min_size=1, max_size=4))
 def test_an_accepted_goal_never_leaves_the_limits_whenever_it_comes(program: list[tuple[Vector, float]]) -> None:
     rig = VirtualArm().ready()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware.bindings.injection import InjectRefused, inject
@@ -20,6 +20,7 @@ from schemas.topics import GRIPPER_STATE
 from services.arm.model.description import ArmDescription, load_arm
 from services.arm.model.gripper import opening_of, pulse_of
 from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from tests.profiles import examples
 
 ROOT = Path(__file__).resolve().parents[2]
 OPEN, VALVE_OPEN = 0.05, 0.04  # [m] of urdf/rm1 and urdf/parol6
@@ -301,7 +302,7 @@ def test_the_servo_command_has_its_number_of_the_wire():
     assert DeviceCommandKind.SERVO == 12
 
 
-@settings(max_examples=50, deadline=None)
+@examples(quick=15, full=50)
 @given(st.floats(0.0, OPEN))
 def test_an_opening_is_a_pulse_and_back(opening: float):
     assert opening_of(servo(), pulse_of(servo(), opening)) == pytest.approx(opening, abs=1e-12)

@@ -9,7 +9,7 @@ import random
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware.platform.host.sketch import AustinStepper, HostSketch
@@ -110,7 +110,6 @@ def test_what_is_no_reading_is_refused_with_a_sentence(payload: bytes) -> None:
         read_states(payload)
 
 
-@settings(max_examples=50)
 @given(st.binary(max_size=300) | st.text(max_size=100).map(lambda text: json.dumps({"ultra": text}).encode()))
 def test_any_bytes_are_read_or_refused(payload: bytes) -> None:
     for read in (read_sensors, read_states):

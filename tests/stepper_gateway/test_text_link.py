@@ -11,7 +11,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.actions import GoalStatusCode
@@ -24,6 +24,7 @@ from services.stepper_gateway.links.foreign.text_link import TextLink
 from services.stepper_gateway.links.foreign.text_messages import AnswerReader, LineAnswer, line_of, read_answer
 from services.stepper_gateway.main import baud_of, open_device
 from services.virtual_arm.virtual_arm import rm1
+from tests.profiles import examples
 from tests.stepper_gateway.dialects import robot_with
 from tests.stepper_gateway.processes import DEVICE, Processes
 from tests.stepper_gateway.pty_board import PtyBoard
@@ -196,7 +197,7 @@ def test_a_line_says_its_positions_to_the_last_decimal(positions: list[float], s
     assert all(abs(float(a) - b) <= 0.5e-6 + 1e-12 for a, b in zip(numbers, positions, strict=True))
 
 
-@settings(max_examples=100)
+@examples(quick=25)
 @given(st.lists(st.binary(max_size=40) | st.just(b"<ACK,7,12>"), max_size=8))
 def test_any_bytes_are_answers_or_counted_and_take_no_memory(pieces: list[bytes]) -> None:
     reader = AnswerReader()

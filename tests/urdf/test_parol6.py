@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from services.arm.checks.check import check
@@ -20,6 +20,7 @@ from services.arm.kinematics.chain import link_transforms
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import load_arm
 from services.arm.motors.speed import speed_limits
+from tests.profiles import examples
 from tests.urdf.nearness import nearest_distances
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")
@@ -58,7 +59,7 @@ def dh_tool(thetas: tuple[float, ...]) -> np.ndarray:
     return reduce(np.matmul, links)
 
 
-@settings(max_examples=500)
+@examples(full=500)
 @given(ANGLES)
 def test_the_tool_is_where_the_dh_table_puts_it(thetas: tuple[float, ...]):
     expected, pose = dh_tool(thetas), KINEMATICS.tool(thetas)
@@ -66,7 +67,7 @@ def test_the_tool_is_where_the_dh_table_puts_it(thetas: tuple[float, ...]):
     assert np.abs(pose.rotation - expected[:3, :3]).max() < 1e-9
 
 
-@settings(max_examples=100)
+@examples(quick=30)
 @given(ANGLES)
 def test_the_light_chain_puts_it_there_too(thetas: tuple[float, ...]):
     """What state_publisher computes frames with."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.joints import JointState
@@ -20,6 +20,7 @@ from services.planner.kinematics.targets import ToolTarget
 from services.planner.request.deadline import NEVER
 from services.planner.timing.profile import joint_limits
 from services.planner.verification.verify import require_within_limits, sample
+from tests.profiles import examples
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")
 PLANNER = Planner(ARM)
@@ -64,7 +65,7 @@ def test_a_pose_with_an_orientation_is_reached():
     assert np.abs(reached.rotation - turned).max() < 1e-5
 
 
-@settings(max_examples=150)
+@examples(quick=15, full=150)
 @given(CONFIGURATIONS, CONFIGURATIONS)
 def test_a_tool_position_is_reached_or_refused_for_touching(start: tuple[float, ...], goal: tuple[float, ...]):
     point = tuple(PLANNER.kinematics.tool(goal).position.tolist())

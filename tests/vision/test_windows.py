@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from services.vision.camera_model import CameraModel
 from services.vision.windows import MARGIN, Window, halved, regions_of, windows_around
+from tests.profiles import examples
 from tests.vision.tag_views import BARREL
 
 
-@settings(deadline=None, max_examples=60)
+@examples(quick=15, full=60)
 @given(st.integers(60, 131), st.integers(60, 131), st.data())
 def test_a_region_is_whole_in_its_window_with_paper_around_it(width: int, height: int, data: st.DataObject) -> None:
     left, top = data.draw(st.integers(0, width - 12)), data.draw(st.integers(0, height - 12))

@@ -17,6 +17,7 @@ from services.visualizer.program.screenshot import free_port
 from services.visualizer.render.arms_layout import SharedView
 from services.visualizer.render.layout import ArmLayout
 from services.visualizer.render.outputs import Outputs, VisualizerParameters
+from tests.optional import need
 
 START = 1_795_000_000_000_000_000
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")
@@ -24,6 +25,7 @@ NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")
 
 @contextmanager
 def headless_viewer(port):
+    need("vulkan")  # it draws, though nobody sees it
     command = [rerun_binary(), "--headless", "--bind", "127.0.0.1", "--port", str(port), "--memory-limit", "200MB"]
     process = subprocess.Popen(
         command, env=environment(os.environ), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
@@ -70,6 +72,7 @@ def shows_the_arm(url, root=""):
     return visual in text and f"{root}/{entities.executed('brazo_joint')}" in text
 
 
+@pytest.mark.full
 def test_a_viewer_that_comes_back_is_told_everything_again(core, tmp_path):
     viewer = ViewerSection(mode=ViewerMode.WEB, port=free_port())
     rig = Rig(core, tmp_path, viewer)
@@ -85,6 +88,7 @@ def test_a_viewer_that_comes_back_is_told_everything_again(core, tmp_path):
     assert rig.slowest < 1.0
 
 
+@pytest.mark.full
 def test_several_arms_meet_in_one_recording_of_one_viewer_and_one_that_comes_back_is_in_it_again(model, tmp_path):
     viewer = ViewerSection(mode=ViewerMode.WEB, port=free_port())
     arms = tuple(ArmLayout(model, 20.0, 20.0, robot=name) for name in ("left", "right"))

@@ -107,6 +107,7 @@ def stream_to(viewer):
     return stream
 
 
+@pytest.mark.full
 def test_a_viewer_that_is_opened_late_gets_the_newest_first(viewer, tmp_path):
     """As a page does that is opened after hours: it shows the arm as it is, and then fills in the past."""
     viewer.start()
@@ -152,6 +153,7 @@ for number in range(10_000_000):
 """
 
 
+@pytest.mark.full
 def test_a_sender_that_is_killed_is_said_in_words_without_the_protocols_own(viewer):
     viewer.start()
     viewer.wait_until_ready()
@@ -166,6 +168,7 @@ def test_a_sender_that_is_killed_is_said_in_words_without_the_protocols_own(view
     assert said == f"{CUT_OFF}\n"
 
 
+@pytest.mark.full
 def test_kill_9_of_the_parent_leaves_no_orphan(viewer):
     viewer.start()
     viewer.wait_until_ready()
@@ -176,6 +179,7 @@ def test_kill_9_of_the_parent_leaves_no_orphan(viewer):
     assert gone(children)
 
 
+@pytest.mark.full
 def test_it_ends_with_an_error_when_the_program_dies(viewer):
     viewer.start()
     viewer.wait_until_ready()

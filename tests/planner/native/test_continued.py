@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from services.planner.collision_geometry.shapes import ShapeKind
@@ -15,6 +15,7 @@ from services.planner.path.curve import spline_rows
 from services.planner.path.smoothing import Rounded, smooth, smooth_unknown
 from services.planner.request.deadline import NEVER
 from tests.planner.native.scenes import random_shape
+from tests.profiles import examples
 
 SIMPLE = [kind for kind in ShapeKind if kind not in (ShapeKind.MESH, ShapeKind.HULL)]
 ROWS = 24  # of a span of a curve
@@ -56,7 +57,7 @@ def test_the_shares_of_a_path_are_those_of_its_curve(core, configurations):
     assert sharp > 0
 
 
-@settings(max_examples=60, deadline=None)
+@examples(quick=15, full=60)
 @given(seed=st.integers(0, 10_000), count=st.integers(2, 6), is_at_end=st.booleans())
 def test_what_is_continued_is_free_begins_and_ends_where_it_should_and_else_stays(
     seed: int, count: int, is_at_end: bool

@@ -15,13 +15,15 @@ from services.planner.native.binding import motion
 from services.planner.native.native_planner import NativePlanner
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import random_shape
+from tests.profiles import count
 
 SLACK = 1e-5  # [m]: half of what the radii have in excess for the floats
 
 
+@pytest.mark.scaled
 def test_the_spheres_are_where_pinocchio_puts_them(arm, core, configurations):
     kinematics = Kinematics(arm)
-    for row in configurations(8, 1):
+    for row in configurations(count(quick=2, full=8), 1):
         poses = kinematics.link_poses(row)
         expected = []
         for link, cover in core.covers.items():

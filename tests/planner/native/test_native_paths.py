@@ -18,6 +18,7 @@ from services.planner.native.paths import Effort, FreePath
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import random_shape
+from tests.profiles import count
 
 MARGIN = 1e-3  # [m]
 UNSURE = 1e-5  # [m] of coal's own distances
@@ -25,10 +26,11 @@ UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 TRIANGLES = (ShapeKind.MESH, ShapeKind.HULL)  # of these the compiled core knows the surface, and so less for sure
 
 
+@pytest.mark.scaled
 def test_no_line_is_free_that_touches_anything_between_its_ends(arm, core, configurations):
     rng = np.random.default_rng(21)
     refused = passed = 0
-    for round_ in range(4):
+    for round_ in range(count(quick=2, full=4)):
         scene = [random_shape(rng, kind, kind) for kind in ShapeKind if kind not in TRIANGLES]
         core.set_scene(scene)
         truth, rows = Truth(arm, scene), configurations(60, round_)
@@ -40,8 +42,7 @@ def test_no_line_is_free_that_touches_anything_between_its_ends(arm, core, confi
                 assert min(truth.distance(row) for row in ways) > core.margin - UNSURE
             else:
                 refused += 1
-    assert refused > 5
-    assert passed > 5
+    assert min(refused, passed) > count(quick=2, full=5)
 
 
 def test_a_refused_line_comes_within_the_margin_and_the_bulge(arm, core, configurations):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from services.arm.model.description import load_arm
@@ -26,6 +26,7 @@ from services.planner.timing.profile import (
 from services.planner.timing.timing import timed_path, timed_path_in_python
 from services.planner.verification.verify import at_times
 from tests.optional import need
+from tests.profiles import examples
 
 ARM = load_arm(Path(__file__).parents[3] / "urdf" / "parol6")
 LOWER, UPPER = np.array([(joint.lower, joint.upper) for joint in ARM.joints]).T
@@ -76,7 +77,7 @@ def test_lines_with_stops_are_the_same_to_rounding(
         assert np.abs(compiled - python).max() <= 1e-11 * max(1.0, float(np.abs(python).max()))
 
 
-@settings(max_examples=60)
+@examples(quick=20, full=60)
 @given(st.integers(0, 10_000), st.integers(2, 6), st.sampled_from((1.0, 0.03)), SCALINGS, SCALINGS)
 def test_curves_take_the_same_time_and_are_at_the_same_place_at_every_moment(
     seed: int, count: int, size: float, speed: float, acceleration: float

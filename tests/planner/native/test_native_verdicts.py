@@ -12,24 +12,27 @@ from services.planner.native.native_planner import ContactPair, NativePlanner
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import box_mesh, random_shape
+from tests.profiles import count
 
 BULGE = 0.005  # [m]
 UNSURE = 1e-5  # [m] of coal's own distances
 
 
+@pytest.mark.scaled
 def test_no_configuration_is_free_that_touches_itself(arm, core, configurations):
-    rows, truth = configurations(3000, 1), Truth(arm)
+    rows, truth = configurations(count(quick=600, full=3000), 1), Truth(arm)
     distances = np.array([truth.distance(row) for row in rows])
     free = core.free(rows)
     assert distances[free].min() > core.margin - UNSURE
     assert distances[~free].max() < core.margin + BULGE + 1e-3
 
 
+@pytest.mark.scaled
 @pytest.mark.parametrize("kind", list(ShapeKind))
 def test_no_configuration_is_free_that_touches_an_obstacle(kind, arm, core, configurations):
     rng = np.random.default_rng(7)
     touching = 0
-    for round_ in range(6):
+    for round_ in range(count(quick=2, full=6)):
         scene = [random_shape(rng, kind, f"{kind} {i}") for i in range(1 if kind is ShapeKind.HALF_SPACE else 3)]
         core.set_scene(scene)
         truth, rows = Truth(arm, scene), configurations(150, round_)
@@ -172,6 +175,7 @@ def test_wrong_shapes_of_arrays_are_refused():
     assert core.free(np.zeros((0, 3))).shape == (0,)
 
 
+@pytest.mark.full
 def test_a_mesh_of_a_hundred_thousand_triangles_is_built_and_asked():
     from tests.planner.native.scenes import star_mesh
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from services.planner.collision_geometry.link_shapes import hull_mesh, link_shapes
@@ -20,6 +20,7 @@ from services.planner.native.sphere_cover import (
 )
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import star_mesh
+from tests.profiles import count, examples
 
 HAIR = 1e-9  # [m]
 
@@ -55,7 +56,7 @@ solids = st.one_of(
 )
 
 
-@settings(max_examples=40)
+@examples(quick=10, full=40)
 @given(solid=solids, bulge=st.floats(0.006, 0.02))
 def test_every_point_of_a_solid_is_in_a_sphere_and_no_sphere_bulges_more_than_reported(solid, bulge):
     cover = cover_of(solid, bulge)
@@ -79,6 +80,7 @@ def test_a_smaller_bulge_takes_more_spheres():
     assert len(cover_of(box, 0.003).spheres) > len(cover_of(box, 0.006).spheres) > len(cover_of(box, 0.012).spheres)
 
 
+@pytest.mark.scaled
 @pytest.mark.parametrize(("name", "links", "most"), [("rm1", 4, 2000), ("parol6", 7, 2600)])
 def test_every_link_of_the_arms_is_covered(name, links, most):
     shapes = link_shapes(load(name))
@@ -90,7 +92,7 @@ def test_every_link_of_the_arms_is_covered(name, links, most):
         assert 0.0 < cover.bulge <= 0.005 + HAIR
         for shape in several:
             solid = {"box": lambda s: Box(tuple(0.5 * x for x in s)), "cylinder": lambda s: Cylinder(s[0], 0.5 * s[1])}
-            points = inside(solid[shape.kind](shape.size), 4000)
+            points = inside(solid[shape.kind](shape.size), count(quick=500, full=4000))
             assert sticks_out(points @ shape.rotation.T + shape.pose[0], cover.spheres) <= HAIR
     assert 0 < total <= most
 
@@ -101,6 +103,7 @@ def test_links_of_few_spheres_bulge_no_more_than_was_asked_for(name):
         assert np.array_equal(link_cover(several, 0.005).spheres, cover_shapes(several, 0.005).spheres)
 
 
+@pytest.mark.full
 def test_a_large_link_of_many_shapes_bulges_more_and_has_no_more_spheres_than_are_sensible():
     """As the base of an industrial arm that is fitted with slices: 12,000 spheres that bulge 5 mm."""
     slices = [
@@ -113,6 +116,7 @@ def test_a_large_link_of_many_shapes_bulges_more_and_has_no_more_spheres_than_ar
         assert sticks_out(inside(Box((0.3, 0.025, 0.35)), 400) + each.pose[0], cover.spheres) <= HAIR
 
 
+@pytest.mark.scaled
 def test_a_mesh_is_covered_inside_too():
     mesh = star_mesh(np.random.default_rng(3))
     cover = mesh_cover(*mesh.arrays, 0.006)
@@ -121,7 +125,7 @@ def test_a_mesh_is_covered_inside_too():
     surface = np.einsum("sfk,fkx->sfx", shares, vertices[faces]).reshape(-1, 3)
     depths = np.random.default_rng(5).random((len(surface), 1))
     points = np.vstack((surface, surface * depths))  # the star is seen whole from its middle
-    assert sticks_out(points, cover.spheres) <= HAIR
+    assert sticks_out(points[:: count(quick=5, full=1)], cover.spheres) <= HAIR
     spacing = 0.008  # [m] between these points, about
     skin = (cover.spheres[:, None, :3] + cover.spheres[:, None, 3:] * directions(8)[None, :, :]).reshape(-1, 3)
     assert sticks_out(skin[:400], np.column_stack((points, np.zeros(len(points))))) <= cover.bulge + spacing
