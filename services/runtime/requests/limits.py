@@ -45,11 +45,11 @@ class Newcomer(NamedTuple):
 class PrincipalRates:
     """The rates of one principal's requests, urgent or not; its clients are told apart by what they say."""
 
-    def __init__(self, of_a_client: Rate, now: float, debt_of_newcomers: int) -> None:
-        """`now` in [s] monotonic; with no debt the newcomers' rate is used to the full, also within a flood."""
+    def __init__(self, of_a_client: Rate, now: float) -> None:
+        """`now` in [s] monotonic."""
         self._of_a_client = of_a_client
         self._all = TokenBucket(OF_A_PRINCIPAL, now)
-        self._of_newcomers = TokenBucket(OF_NEWCOMERS, now, debt_of_newcomers)
+        self._of_newcomers = TokenBucket(OF_NEWCOMERS, now, DEBT)
         self._known: dict[str, TokenBucket] = {}
         self._new: dict[str, Newcomer] = {}  # that were permitted; oldest first
 
@@ -110,8 +110,7 @@ class RequestRates:
             self._of = {each: rates for each, rates in self._of.items() if not rates.is_idle(now)}
         if len(self._of) >= 2 * MAX_PRINCIPALS:
             principal = ""
-        # A stop is carried out whatever its rate: a flood of them leaves answers for those who are new in it.
-        return self._of.setdefault((principal, urgent), PrincipalRates(self._of_a_client, now, 0 if urgent else DEBT))
+        return self._of.setdefault((principal, urgent), PrincipalRates(self._of_a_client, now))
 
 
 @dataclass
