@@ -42,7 +42,8 @@ TWIN = (
     "host, or a process that was stopped and goes on"
 )
 TWIN_SEEN = 1.5  # [s] that an answer to a stranger's question counts; chosen: three of its questions
-LEAST_STRANGE = 2  # such answers; chosen: one may be forged, or be to the gateway before this one
+MOST_STRANGE = 8  # such answers that are compared; chosen: some garbled ones between two true ones do not hide these
+SAME_PACE = 0.1  # [s] by which the times in two questions and between their answers differ; chosen: a network's jitter
 KEPT_QUESTIONS = 512  # of ours, which are no stranger's however late the answer; chosen: 15 s of the most frequent
 QUESTIONS = 32  # that may be under way; chosen: 1 s of them at first, beyond which answers are late
 NOT_HEARD = "is it switched on, does it use the same broker, and does the broker's ACL let it write?"
@@ -78,7 +79,8 @@ class DeviceSession:
         self._offline_boot = 0  # whose last will has come
         self._questions: deque[int] = deque(maxlen=QUESTIONS)  # [us] SYNCs that may be answered
         self._asked: deque[int] = deque(maxlen=KEPT_QUESTIONS)  # [us] all of ours
-        self._strange: deque[float] = deque(maxlen=LEAST_STRANGE)  # [s] monotonic, of answers to questions of others
+        self._strange: deque[tuple[float, float]] = deque(maxlen=MOST_STRANGE)  # [s] t0 and arrival, to others
+        self._twin_seen = -1.0e9  # [s] monotonic
         self._unanswered = 0  # SYNCs since the last answer
         self._unanswered_since = 0.0  # [s] monotonic, of the first of them
         self.answered = -1.0e9  # [s] monotonic, when the device has answered a question last
@@ -184,7 +186,7 @@ class DeviceSession:
             return
         if reply.t0 not in self._questions:
             if reply.t0 not in self._asked:
-                self._strange.append(arrival_us * 1e-6)
+                self._on_strange_answer(reply.t0 * 1e-6, arrival_us * 1e-6)
             return
         if not self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us):  # the question stays open for the true answer
             raise BadFrame(f"an answer of {reply.t1} us, which is not the device's clock as it is known")
@@ -253,8 +255,21 @@ class DeviceSession:
 
     def has_twin(self, moment: Moment) -> bool:
         """True if the device answers another gateway: what each sends would move the arm of the other."""
-        is_enough = len(self._strange) == LEAST_STRANGE
-        return is_enough and moment.monotonic - self._strange[0] <= TWIN_SEEN
+        return moment.monotonic - self._twin_seen <= TWIN_SEEN
+
+    def _on_strange_answer(self, asked: float, arrival: float) -> None:
+        """An answer to what somebody has asked by his clock at `asked` [s]: a gateway's clock goes on with ours.
+
+        One answer may be forged or garbled, or be to the gateway before this one.
+        """
+        for before, came in self._strange:
+            if (
+                0.0 < arrival - came <= TWIN_SEEN
+                and asked > before
+                and abs(asked - before - (arrival - came)) < SAME_PACE
+            ):
+                self._twin_seen = arrival
+        self._strange.append((asked, arrival))
 
     def is_deaf(self, moment: Moment) -> bool:
         """True if nothing that is asked has been answered for DEAF_AFTER: what is sent does not arrive."""
