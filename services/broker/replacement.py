@@ -84,7 +84,7 @@ class OwnClient:
                 return self._exchange(CONNECT, CONNACK, 4)
             return self._exchange(PINGREQ, PINGRESP, 2)
         except OSError:
-            self._leave()
+            self.leave()
             return False
 
     def _exchange(self, said: bytes, wanted: bytes, length: int) -> bool:
@@ -93,10 +93,11 @@ class OwnClient:
         answer = self._link.recv(length)
         # One that is refused, as a stranger to a locked broker, was answered too; it has no connection then.
         if answer[:1] != wanted or (wanted == CONNACK and answer[3:4] != b"\x00"):
-            self._leave()
+            self.leave()
         return answer[:1] == wanted
 
-    def _leave(self) -> None:
+    def leave(self) -> None:
+        """Closes its connection; the next question makes another."""
         if self._link is not None:
             with contextlib.suppress(OSError):
                 self._link.close()

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import resource
 from contextlib import suppress
 from pathlib import Path
 
-LEAST = 3  # numbers: 0, 1 and 2 are in use for ever
 PLENTY = 4096
 MOST = Path("/proc/sys/fs/nr_open")  # of what the kernel takes for a limit, whatever one was inherited
 
 
 def take_descriptors(pid: int) -> None:
-    """The process gets no descriptor from now on; raises OSError where there is no such process."""
-    _limit(pid, LEAST)
+    """The process gets no further descriptor from now on; raises OSError where there is no such process."""
+    used = {int(each.name) for each in Path(f"/proc/{pid}/fd").iterdir()}
+    _limit(pid, next(number for number in itertools.count(3) if number not in used))
 
 
 def give_descriptors(pid: int) -> None:

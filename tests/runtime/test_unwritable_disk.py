@@ -9,12 +9,19 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 
+from schemas.deployment import MqttSection, RouterSection
+from services.broker.replacement import OwnClient
+from services.chaos.descriptors import give_descriptors, take_descriptors
 from services.runtime import endpoints
+from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.deployment import project_root
+from services.runtime.errors import BusError
 from services.runtime.process.beat_socket import newest_beat
 from services.runtime.process.readiness import Readiness, is_fresh, says_ready
 from services.runtime.process.unwritten import UnwrittenFiles
@@ -137,8 +144,9 @@ def test_systemd_hears_of_a_beat_without_a_free_descriptor(tmp_path, monkeypatch
         assert systemd.recv(100).startswith(b"WATCHDOG=1")
 
 
-@pytest.mark.parametrize("process", ["router", "broker embedded", "broker mosquitto"])
-def test_router_and_broker_start_while_the_disk_refuses_and_live_on_when_it_begins_to(disk, process):
+@contextmanager
+def started(process: str, folder: Path) -> Iterator[tuple[subprocess.Popen[bytes], str, int]]:
+    """Router or broker, with `folder` as its run folder; its name and port."""
     name, _, broker = process.partition(" ")
     if broker == "mosquitto":
         need("mosquitto")
@@ -146,12 +154,48 @@ def test_router_and_broker_start_while_the_disk_refuses_and_live_on_when_it_begi
     environ = os.environ | {
         f"GEMELO_{'ROUTER' if name == 'router' else 'MQTT'}_PORT": str(port),
         "GEMELO_MQTT_BROKER": broker or "embedded",
-        "GEMELO_PATHS_RUN": str(disk.folder),
+        "GEMELO_PATHS_RUN": str(folder),
     }
     module = "services.runtime.router" if name == "router" else "services.broker.main"
-    disk.refuse()
     running = subprocess.Popen([sys.executable, "-m", module], cwd=project_root(), env=environ)
     try:
+        yield running, name, port
+    finally:
+        running.kill()
+        running.wait()
+
+
+@pytest.mark.parametrize("process", ["router", "broker embedded"])
+def test_router_and_broker_without_a_descriptor_beat_on_and_take_clients_again_afterwards(tmp_path, process):
+    with started(process, tmp_path) as (running, name, port):
+        assert until(lambda: says_ready(tmp_path, name), 30.0)
+        take_descriptors(running.pid)
+        for _ in range(3):
+            grow_old(tmp_path)
+            assert until(lambda: is_fresh(tmp_path / f"{name}.ready"), 10.0)
+        give_descriptors(running.pid)
+        assert until(lambda: accepts(name, port), 10.0)
+        assert running.poll() is None
+
+
+def accepts(name: str, port: int) -> bool:
+    """A router takes a session; a broker answers a client."""
+    if name == "router":
+        with suppress(BusError):
+            ZenohBus(RouterSection(port=port), "rm1").close()
+            return True
+        return False
+    client = OwnClient(MqttSection(port=port))
+    try:
+        return client.is_answered()
+    finally:
+        client.leave()
+
+
+@pytest.mark.parametrize("process", ["router", "broker embedded", "broker mosquitto"])
+def test_router_and_broker_start_while_the_disk_refuses_and_live_on_when_it_begins_to(disk, process):
+    disk.refuse()
+    with started(process, disk.folder) as (running, name, port):
         assert until(lambda: says_ready(disk.folder, name), 30.0)
         socket.create_connection(("127.0.0.1", port), 5.0).close()
         disk.take()
@@ -165,6 +209,3 @@ def test_router_and_broker_start_while_the_disk_refuses_and_live_on_when_it_begi
         assert running.poll() is None
         running.terminate()
         assert running.wait(10.0) == 0
-    finally:
-        running.kill()
-        running.wait()

@@ -80,11 +80,11 @@ class Readiness:
             self._unwritten.written(self._what)
 
     def _touch_all(self) -> None:
-        _touch(self._alive_file, self._process)
         if self._written != (self._is_ready, self._problem):
             self._write()
         elif self._is_ready:
             _touch(self._file, str(os.getpid()))
+        _touch(self._alive_file, self._process)
 
     def _write(self) -> None:
         """Brings the files of state and problem up to date."""
