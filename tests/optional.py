@@ -15,21 +15,27 @@ from typing import Any, NoReturn
 import pytest
 
 OPTIONAL = Path(__file__).parents[1] / "deploy/optional"
+PATH = os.environ.get("PATH", os.defpath)  # not that of a test which has made another for itself
 
 
 @cache
 def lack(name: str) -> str:
     """What is missing and the remedy, or nothing where `name` of deploy/optional is here."""
-    done = subprocess.run([OPTIONAL, name], capture_output=True, text=True, check=False)
+    done = _ask(name)
     assert done.returncode in (0, 1), done.stderr
     return done.stdout.strip()
+
+
+def _ask(word: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [OPTIONAL, word], capture_output=True, text=True, env={**os.environ, "PATH": PATH}, check=False
+    )
 
 
 @cache
 def programs() -> dict[str, str]:
     """The row of deploy/optional that each program belongs to."""
-    done = subprocess.run([OPTIONAL, "programs"], capture_output=True, text=True, check=True)
-    rows = (line.split("|") for line in done.stdout.splitlines())
+    rows = (line.split("|") for line in _ask("programs").stdout.splitlines())
     return {program: name for name, several in rows for program in several.split()}
 
 
