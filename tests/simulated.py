@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,10 @@ import pytest
 import gemelo
 from gemelo.simulation import SimulatedArm
 from schemas.topics import DEVICE_SHAFT
+from services.cli import simulated
+from services.cli.errors import ExitCode
+from services.cli.main import run
+from services.runtime.node import Node
 
 NUMBERS = itertools.count(2)
 STANDS = 0.5  # [s] for which an arm that rests does not move
@@ -68,3 +73,25 @@ def rests(arm: SimulatedArm, timeout: float) -> bool:
         if stood > end:
             return False
     return True
+
+
+class TypedAt:
+    """The command line as it is typed at a simulated arm that outlives each command."""
+
+    def __init__(self, arm: SimulatedArm) -> None:
+        self._arm = arm
+
+    def connect(self, robot: gemelo.Robot, name: str) -> gemelo.Arm:
+        return self._arm.sim.connect(name)
+
+    def node(self, robot: gemelo.Robot, name: str) -> Node:
+        return self._arm.sim.node(name)
+
+    def __call__(self, *words: str, code: ExitCode = ExitCode.OK) -> str:
+        """Everything that the command has printed; it must end with `code`."""
+        printed = io.StringIO()
+        with pytest.MonkeyPatch.context() as patch, redirect_stdout(printed), redirect_stderr(printed):
+            patch.setattr(simulated, "chosen", lambda: self)
+            ended = run(words)
+        assert ended == code, f"{words} ended with {ended}:\n{printed.getvalue()}"
+        return printed.getvalue()

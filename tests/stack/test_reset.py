@@ -16,7 +16,7 @@ def test_what_a_test_leaves_behind_is_named_and_put_right(
     rm1_stack: Stack, arm: gemelo.Arm, shared_stacks: SharedStacks
 ) -> None:
     reset = shared_stacks.reset("rm1_stack")
-    before = reset.before({})
+    before = reset.before()
     program = Path(rm1_stack.deployment["GEMELO_PATHS_PROGRAMS"]) / "left.toml"
     program.write_text("version = 1\nsteps = []\n")
     command(rm1_stack, "param", "set", "stepper_gateway", "feedback_rate", "7.0")
@@ -38,4 +38,4 @@ def test_what_a_test_leaves_behind_is_named_and_put_right(
     assert not program.exists()
     assert arm.scene.objects == {}
     assert arm.device.state.speed == 1.0
-    assert reset.after(reset.before({})) == []
+    assert reset.after(reset.before()) == []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -49,9 +49,9 @@ class Reset:
         """Leaves the bus."""
         self._arm.close()
 
-    def before(self, stands_at: Mapping[str, float]) -> Before:
-        """Leads the arm to `stands_at` [rad] or [m], home where a joint is not named; to be given to `after`."""
-        self._stand({**self._arm.states["home"], **stands_at})
+    def before(self) -> Before:
+        """Leads the arm home; to be given to `after`."""
+        self._stand(self._arm.states["home"])
         return Before(
             frozenset(each.pid for each in psutil.Process().children()),
             {name: len(self._stack.logs(name)) for name in self._stack.processes},

@@ -151,7 +151,7 @@ def parol6_stack(shared_stacks: SharedStacks) -> Stack:
 def left_as_found(request: pytest.FixtureRequest) -> Iterator[None]:
     """Where a test has a shared stack: afterwards that is led back to how it was, and what the test left fails it.
 
-    The arm stands at home when a test begins, or where its mark `stands_at` says.
+    The arm stands at home when a test begins.
     """
     name = kind_of(request.node)
     if not name:
@@ -159,8 +159,7 @@ def left_as_found(request: pytest.FixtureRequest) -> Iterator[None]:
         return
     stacks: SharedStacks = request.getfixturevalue("shared_stacks")
     reset = stacks.reset(name)
-    stands = request.node.get_closest_marker("stands_at")
-    before = reset.before(stands.kwargs if stands else {})
+    before = reset.before()
     yield
     try:
         left = reset.after(before)
