@@ -135,10 +135,13 @@ class Subscription(Generic[M]):
 
 def _require_own_name(key: str, message: Message, writer: str) -> None:
     """Raises `BadMessage` for a message of a key of every node that speaks of another node than its writer."""
-    said = getattr(message, "node", "") if is_by_every_node(key) else ""
+    if not is_by_every_node(key):
+        return
+    said = getattr(message, "node", "")
+    if not writer:
+        raise BadMessage("it comes from nobody's branch (services/runtime/bus/branches.py)")
     if said and said != name_in(writer):
-        who = f'"{writer}"' if writer else "nobody's branch (services/runtime/bus/branches.py)"
-        raise BadMessage(f'it speaks of node "{said[:64]}", and comes from {who}')
+        raise BadMessage(f'it speaks of node "{said[:64]}", and comes from "{writer}"')
 
 
 class Latest(Generic[M]):

@@ -62,6 +62,7 @@ from services.cli.session import CommandSession
 from services.recordings.table import exchanges_of
 from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
+from services.runtime.topics import Publisher
 from tests.runtime.support import hear, spinning
 
 WHOLE = FieldPath(FrameTransform, "")
@@ -408,22 +409,21 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, text: bytes):
         node_parameters.read(str(tmp_path / "knobs.toml"))
 
 
-def test_the_figures_of_a_node_that_was_started_again_begin_anew(session, deployment, network):
+def test_the_figures_of_a_node_that_was_started_again_begin_anew(session, network):
     figures = top.figures_by_node(session)
 
     def say(started: int, seconds: int, received: int) -> None:
         topics = (TopicStatistics(key="joint_states", received=received),)
         statistics.put(NodeStatistics(stamp=seconds * 10**9, node="planner", started=started, topics=topics))
 
-    with Node("diver", deployment, robot="rm1", bus=MemoryBus(network)) as node:
-        statistics = node.publisher(STATISTICS)
-        say(1, 7, 9_000)
-        say(1, 8, 9_050)
-        assert hear(session.node, lambda: "planner" in figures)
-        say(2, 9, 10)
-        assert hear(session.node, lambda: "planner" not in figures)
-        say(2, 10, 60)
-        assert hear(session.node, lambda: "planner" in figures)
+    statistics = Publisher(MemoryBus(network), STATISTICS, "planner")
+    say(1, 7, 9_000)
+    say(1, 8, 9_050)
+    assert hear(session.node, lambda: "planner" in figures)
+    say(2, 9, 10)
+    assert hear(session.node, lambda: "planner" not in figures)
+    say(2, 10, 60)
+    assert hear(session.node, lambda: "planner" in figures)
     assert figures["planner"].received() == {"joint_states": 50.0}
 
 
@@ -468,7 +468,7 @@ def test_top_goes_on_where_a_node_hangs(session, stack, deployment, network):
         Node("hanging", deployment, robot="rm1", bus=MemoryBus(network)),  # and nobody lets it spin
         Node("speaker", deployment, robot="rm1", bus=MemoryBus(network)) as speaker,
     ):
-        words = speaker.publisher(STATISTICS)
+        words = Publisher(MemoryBus(network), STATISTICS, "hanging")
         with spinning(speaker, lambda now: words.put(NodeStatistics(stamp=now, node="hanging")), rate=1.0):
             assert top.watch(session, 1, lambda report: reports.append(report) or "") is ExitCode.OK
     rows = {each.node: each for each in reports[-1].nodes}

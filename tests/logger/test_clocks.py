@@ -20,6 +20,7 @@ from services.recordings.reader import RecordingReader
 from services.recordings.table import NODES
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
+from services.runtime.topics import Publisher
 from tests.runtime.support import hear, spinning
 from tests.runtime.test_clock_offset import Skewed
 
@@ -48,14 +49,12 @@ def test_names_that_nobody_has_hold_up_nobody(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(MemoryBus, "wait_served", lambda bus, key, timeout: pytest.fail(f"it waits for {key}"))
     deployment = Deployment(paths=PathsSection(run=str(tmp_path / "run"), out=str(tmp_path / "out")))
     network, records, heard = MemoryNetwork(), [], []
-    with (
-        Node("stranger", deployment, robot="rm1", bus=MemoryBus(network)) as stranger,
-        Node("logger", deployment, robot="rm1", bus=MemoryBus(network)) as logger,
-    ):
+    with Node("logger", deployment, robot="rm1", bus=MemoryBus(network)) as logger:
         Census(logger, records.append)
         logger.subscribe(STATISTICS, lambda message: heard.append(message.node))
         for number in range(50):
-            stranger.publisher(STATISTICS).put(NodeStatistics(node=f"nobody_{number}"))
+            nobody = Publisher(MemoryBus(network), STATISTICS, f"nobody_{number}")
+            nobody.put(NodeStatistics(node=f"nobody_{number}"))
         assert hear(logger, lambda: "nobody_49" in heard)
         logger.wait(0.0)  # what the answers have left to do
     assert records == []
@@ -67,10 +66,7 @@ def test_a_node_that_was_started_again_is_asked_at_once_and_one_of_long_ago_make
     network, records = MemoryNetwork(), []
     asked: list[tuple[str, int]] = []
     monkeypatch.setattr(Census, "ask", lambda census, one: asked.append((one.name, one.at)))
-    with (
-        Node("diver", deployment, robot="rm1", bus=MemoryBus(network)) as diver,
-        Node("logger", deployment, robot="rm1", bus=MemoryBus(network)) as logger,
-    ):
+    with Node("logger", deployment, robot="rm1", bus=MemoryBus(network)) as logger:
         Census(logger, records.append)
         at, heard = 0, list[NodeStatistics]()
         logger.now, logger.monotonic = lambda: at, lambda: float(at)
@@ -78,7 +74,7 @@ def test_a_node_that_was_started_again_is_asked_at_once_and_one_of_long_ago_make
         said = ((100, "planner", 1), (101, "planner", 1), (102, "planner", 2), (103, "cli-7", 3), (200, "cli-8", 4))
         for count, (now, node, started) in enumerate(said, 1):
             at = now
-            diver.publisher(STATISTICS).put(NodeStatistics(node=node, started=started))
+            Publisher(MemoryBus(network), STATISTICS, node).put(NodeStatistics(node=node, started=started))
             assert hear(logger, lambda count=count: len(heard) == count)
     assert asked == [("planner", 100), ("planner", 102), ("cli-8", 200)]
 
