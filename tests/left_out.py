@@ -4,32 +4,43 @@ from __future__ import annotations
 
 import pytest
 
-LEFT_OUT = "gemelo/left_out"
-_left_out: list[str] = []
+KEY = "gemelo/left_out"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--left-out", action="store_true", help="only what the last run left out as something was missing")
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Chooses the tests of --left-out."""
+def pytest_configure(config: pytest.Config) -> None:
+    """Nothing is kept where nothing may be (-p no:cacheprovider), nor by the workers of pytest-xdist."""
+    cache = getattr(config, "cache", None)
+    if cache is None:
+        return
     if config.getoption("--left-out"):
-        chosen = set(_cache(config).get(LEFT_OUT, []))
-        items[:] = [item for item in items if item.nodeid in chosen]
+        config.pluginmanager.register(Chosen(set(cache.get(KEY, []))))
+    elif not hasattr(config, "workerinput") and not config.option.collectonly:
+        config.pluginmanager.register(Kept(cache))
 
 
-def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    if report.skipped and "sudo apt-get install" in str(report.longrepr):
-        _left_out.append(report.nodeid)
+class Chosen:
+    """Leaves of all tests those that were left out."""
+
+    def __init__(self, names: set[str]) -> None:
+        self._names = names
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        items[:] = [item for item in items if item.nodeid in self._names]
 
 
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    config = session.config
-    if not config.getoption("--left-out") and not hasattr(config, "workerinput") and not config.option.collectonly:
-        _cache(config).set(LEFT_OUT, _left_out)
+class Kept:
+    """Keeps the names of what is left out."""
 
+    def __init__(self, cache: pytest.Cache) -> None:
+        self._cache, self._names = cache, list[str]()
 
-def _cache(config: pytest.Config) -> pytest.Cache:
-    assert config.cache is not None
-    return config.cache
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.skipped and "sudo apt-get install" in str(report.longrepr):
+            self._names.append(report.nodeid)
+
+    def pytest_sessionfinish(self) -> None:
+        self._cache.set(KEY, self._names)
