@@ -122,10 +122,11 @@ class Loop:
             return math.inf
         if not self.tasks.is_empty:
             return self.clock.monotonic()
-        deadlines = [each.due for each in self._periodic_tasks]
-        if self._schedule is not None:
-            deadlines.append(self._schedule.deadline)
-        return min(deadlines, default=math.inf)
+        due = math.inf if self._schedule is None else self._schedule.deadline
+        for periodic in self._periodic_tasks:
+            if periodic.due < due:
+                due = periodic.due
+        return due
 
     def turn(self) -> None:
         """Does what is due now: the step, the periodic tasks, and one queued task."""
