@@ -74,6 +74,8 @@ FIGURES = {
     "pick_mm": FigureRow("vision.picks:pick_mm", "mm", takes_count=True, takes_seed=True),
     "pick_success": FigureRow("vision.picks:pick_success", "%", takes_count=True, takes_seed=True),
     "replay_speed": FigureRow("recording:replay_speed", "x real time"),
+    "simulate_speed": FigureRow("simulation:simulate_speed", "x real time"),
+    "simulate_start_ms": FigureRow("simulation:simulate_start_ms", "ms"),
     "lost_of_45000_at_25hz": FigureRow("virtual_time:lost_of_45000_at_25hz", "chunks"),
     "seed_move_percent": FigureRow("old_dialects:seed_move_percent", "%"),
     "ra_remainder_steps": FigureRow("old_dialects:ra_remainder_steps", "steps"),
