@@ -92,6 +92,9 @@ class Motion:
         True
         """
         self._session.clock.look()
+        return self._has_ended()
+
+    def _has_ended(self) -> bool:
         return self._handle is not None and self._handle.is_over
 
     @property
@@ -206,7 +209,7 @@ class Motion:
                 told[0] = self.feedback
                 on_progress(self)
 
-        return self._session.wait_for(lambda: self.is_over, timeout, tell if on_progress is not None else None)
+        return self._session.wait_for(self._has_ended, timeout, tell if on_progress is not None else None)
 
     def _interrupted(self, on_cancel: OnMotion | None) -> Interrupted:
         """Decelerates and waits for the rest; a second Ctrl-C leaves this at once. Raises `Lost`."""

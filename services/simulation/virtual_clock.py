@@ -249,9 +249,11 @@ class VirtualClock:
         elif event.at is not None and event.at <= self.now and not event.is_busy:
             event.at, event.is_busy = None, True
             try:
+                now, due = self.monotonic(), 0.0
                 for _ in range(AT_ONCE):
                     event.loop.turn()
-                    if event.loop.due() > self.monotonic():
+                    due = event.loop.due()
+                    if due > now:
                         break
             finally:
                 event.is_busy = False

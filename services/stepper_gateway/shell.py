@@ -118,6 +118,7 @@ class Shell:
         self._inputs = InputLog(core, began, self._moment(), node.publisher(GATEWAY_INPUTS).put)
         self._told = began.parameters
         self._link: links.Link | None = None
+        self._link_told: tuple[bool, str] | None = None  # what the core was given of it last
         self._silent = False
         self._is_woken = threading.Event()
         self._callers: dict[int, Pending[Any]] = {}  # by ticket: who waits for the device's answer
@@ -172,7 +173,9 @@ class Shell:
         link = self._link
         if link is None or self._is_silent():  # what came stays where it is until the loop goes on
             return
-        self._give(LinkInput(link.connected, link.reason))
+        if self._link_told != (present := (link.connected, link.reason)):
+            self._link_told = present
+            self._give(LinkInput(*present))
         received = link.take(AT_ONCE)
         for payload in received:
             self._give(FrameInput(*payload))
