@@ -54,7 +54,7 @@ class Person:
 
     def open(self) -> None:
         """Until the state is live and drawn."""
-        self.page.goto(self._address)
+        self.page.goto(self._address, timeout=OPENING)
         expect(self.page.locator("[data-gemelo-sent]")).to_be_attached(timeout=OPENING)
         expect(self.page.get_by_role("tab").first).to_be_visible(timeout=PATIENCE)
 
