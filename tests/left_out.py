@@ -1,4 +1,4 @@
-"""What a run went without as something of deploy/optional was missing, and a run of that alone (--left-out)."""
+"""The tests that a run left out as something of deploy/optional was missing, and a run of those alone (--left-out)."""
 
 from __future__ import annotations
 

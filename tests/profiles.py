@@ -1,4 +1,4 @@
-"""How many examples a property has: some in `make test`, all of them in `make test-all` (HYPOTHESIS_PROFILE=full)."""
+"""The number of examples of a property: some in `make test`, all in `make test-all` (HYPOTHESIS_PROFILE=full)."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ class NodeEndpoints:
             robot=robot,
             host=clock.host(),
             pid=clock.process(),
-            version=_own_version(),
+            version=own_version(),
             started=identity.started,
             publishes=tuple(sorted(key for key in self.publishers if not key.startswith("@"))),
             subscribes=tuple(sorted({each.topic.key for each in self.subscriptions})),
@@ -95,16 +95,16 @@ class NodeEndpoints:
             each.report_losses()
 
 
-def _own_version() -> str:
+def own_version() -> str:
     """Empty where the process has no descriptor left to read it."""
     try:
-        return _read_version()
+        return read_version()
     except (OSError, ImportError):
         return ""
 
 
 @cache
-def _read_version() -> str:
+def read_version() -> str:
     from importlib.metadata import version  # 20 ms that most nodes never need
 
     return version("gemelo")

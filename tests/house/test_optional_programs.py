@@ -1,4 +1,4 @@
-"""What a test needs that not every machine has stands in deploy/optional, and is asked for by tests.optional."""
+"""Every optional program of a test stands in deploy/optional, and is asked for by tests.optional."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests import optional
 
 ROOT = Path(__file__).parents[2]
 # On every machine where gemelo is set up: Python, make, a compiler with its binutils, and what is essential in Debian.
-BASE = {"bash", "sh", "python", "make", "c++", "cc", "nm", "unshare", "script", "setsid", "setpriv", "true"}
+BASE = {"bash", "sh", "python", "make", "c++", "cc", "nm", "unshare", "script", "setsid", "setpriv", "sleep", "true"}
 MADE = {"ssh": "sshd"}  # a test writes it, or needs the row beside
 
 

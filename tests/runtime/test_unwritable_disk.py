@@ -121,10 +121,10 @@ def test_without_a_disk_and_a_descriptor_a_beat_still_finds_a_socket(tmp_path):
 
 
 def test_a_version_that_cannot_be_read_now_is_read_later():
-    endpoints._read_version.cache_clear()
+    endpoints.read_version.cache_clear()
     with few_descriptors():
-        assert endpoints._own_version() == ""
-    assert endpoints._own_version() == version("gemelo")
+        assert endpoints.own_version() == ""
+    assert endpoints.own_version() == version("gemelo")
 
 
 def test_systemd_hears_of_a_beat_without_a_free_descriptor(tmp_path, monkeypatch):

@@ -60,8 +60,7 @@ def test_a_connection_that_closes_stops_its_motion(arm: gemelo.SimulatedArm) -> 
     with arm.sim.connect("other") as other:
         motion = other.start(named="left")
         arm.sim.sleep(0.5)
-    assert motion._handle is not None
-    assert motion._handle.status is gemelo.GoalStatusCode.CANCELED
+    assert motion.status is gemelo.GoalStatusCode.CANCELED
 
 
 def test_a_cut_wire_holds_the_arm_and_says_so(arm: gemelo.SimulatedArm) -> None:

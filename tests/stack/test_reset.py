@@ -1,4 +1,4 @@
-"""What a test leaves on a shared stack is named and put right, so that the next one finds the stack as it was."""
+"""A shared stack is led back after each test: what was left is named and put right."""
 
 from __future__ import annotations
 
