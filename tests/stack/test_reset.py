@@ -36,6 +36,6 @@ def test_what_a_test_leaves_behind_is_named_and_put_right(
         assert [sentence for sentence in left if words in sentence], (words, left)
     assert len(left) == 6, left
     assert not program.exists()
-    assert arm.scene.objects == {}
-    assert arm.device.state.speed == 1.0
+    assert arm.wait_for(lambda: arm.scene.objects == {}, 5.0)
+    assert arm.wait_for(lambda: arm.device.state.speed == 1.0, 5.0)
     assert reset.after(reset.before()) == []
