@@ -26,7 +26,7 @@ test: setup ## what one process can show, ten minutes; ROOM=planner: that folder
 
 test-all: test test-rest ## also stacks, browsers, real time, and every property with all its examples
 
-.PHONY: test-core test-python test-left-out test-rest test-properties test-stacks test-alone
+.PHONY: test-core test-python test-left-out test-rest test-core-rest test-properties test-stacks test-alone
 test-core:
 	@$(if $(filter firmware,$(or $(ROOM),firmware)),deploy/test_firmware)
 test-python:
@@ -36,8 +36,10 @@ test-left-out: # what the run before went without, where it is here: .ci/run mak
 	@$(pytest) -n $(workers) --maxprocesses 8 --dist worksteal --left-out tests
 
 test-rest: setup # without `make test`, which .ci/run has made before
-	@$(MAKE) --keep-going test-properties test-stacks test-alone
+	@$(MAKE) --keep-going test-core-rest test-properties test-stacks test-alone
 	@deploy/optional
+test-core-rest:
+	@deploy/test_firmware full
 test-properties:
 	@HYPOTHESIS_PROFILE=full $(pytest) -n $(workers) --maxprocesses 8 --dist worksteal -m "(hypothesis or scaled) and not full" tests
 test-stacks: # a stack on each of two workers: with three on two slow cores one loses its heartbeats
