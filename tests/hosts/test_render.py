@@ -18,6 +18,7 @@ from schemas.site import Site
 from services.hosts import install
 from services.hosts.checks import load_site
 from services.hosts.containers import IN_IMAGE
+from services.hosts.firewall import UNIT_NAME, ports
 from services.hosts.layout import Process, processes, robots
 from services.hosts.render import rendered, write
 from services.hosts.site_file import SiteError
@@ -83,7 +84,8 @@ def require_nothing_injected(lab: Site, plain: Site) -> None:
             assert values(unit, "User") == [lab.user]
         whole, of_plain = (directives(each["systemd/gemelo.target"]) for each in (files, ordinary))
         assert whole == of_plain
-        assert values(whole, "Wants")[0].split() == [f"{process.unit}.service" for process in processes(lab, host)]
+        units = [f"{process.unit}.service" for process in processes(lab, host)]
+        assert values(whole, "Wants")[0].split() == [*units, *([UNIT_NAME] if ports(lab, host) else [])]
         supervised = yaml.safe_load(files["process-compose.yaml"])["processes"]
         contained = yaml.safe_load(files["compose.yaml"])["services"]
         for process in processes(lab, host):
@@ -274,10 +276,15 @@ def test_only_what_a_stop_or_a_heartbeat_goes_through_may_take_a_real_time_prior
             assert values(unit, "RestrictRealtime") == ([] if asks else ["yes"]), process
 
 
+def is_of_a_process(name: str) -> bool:
+    """What is loaded once at boot is no process: nothing of it could end, or stand still."""
+    return name.endswith(".service") and not name.endswith(UNIT_NAME)
+
+
 def test_a_service_is_started_again_however_often_and_nobody_waits_until_all_are_ready(tmp_path):
     files = rendered(site(tmp_path), "cell")
     for name, text in files.items():
-        if name.endswith(".service"):
+        if is_of_a_process(name):
             assert ("Unit", "StartLimitIntervalSec", "0") in directives(text)
     # Else a target comes after all that it wants, and neither a boot nor `systemctl enable --now` ends before it.
     assert ("Unit", "DefaultDependencies", "no") in directives(files["systemd/gemelo.target"])
@@ -287,7 +294,7 @@ def test_a_start_may_last_as_long_as_it_is_said_to_go_on_and_no_longer(tmp_path)
     lab = site(tmp_path)
     for host in lab.hosts:
         for name, text in rendered(lab, host).items():
-            if name.endswith(".service"):
+            if is_of_a_process(name):
                 unit = directives(text)
                 assert int(*values(unit, "TimeoutStartSec")) > 0  # `infinity` would wait for one that is frozen too
                 assert values(unit, "WatchdogSec") == [str(GOES_ON)]
