@@ -33,6 +33,7 @@ test-python:
 	@$(pytest) -n $(workers) --maxprocesses 8 --dist worksteal -m "not full" tests/$(ROOM)
 
 test-left-out: # what the run before went without, where it is here: .ci/run makes `make test` on a bare machine
+	@deploy/test_firmware left-out
 	@$(pytest) -n $(workers) --maxprocesses 8 --dist worksteal --left-out tests
 
 test-rest: setup # without `make test`, which .ci/run has made before

@@ -333,4 +333,5 @@ class VirtualClock:
 
 
 def _ns(seconds: float) -> int:
-    return max(0, round(seconds * 1e9))
+    """At least 1 of what is above 0: whoever waits for the rest of a time, until none is left, comes to its end."""
+    return max(1, round(seconds * 1e9)) if seconds > 0.0 else 0

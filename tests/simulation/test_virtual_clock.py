@@ -20,3 +20,11 @@ def test_a_look_ends_also_where_nothing_happens_and_where_time_runs_faster_than_
     looking.join(10.0)
     assert not looking.is_alive()
     assert clock.now >= 0.009 * scale * 1e9
+
+
+def test_a_wait_for_less_than_a_nanosecond_takes_time_too() -> None:
+    """The rest of 0.2 s may be 1e-13 s by rounding: waited for in no time it would be left for ever."""
+    clock = VirtualClock()
+    before = clock.monotonic()
+    assert not clock.wait_until(lambda: False, 1e-13)
+    assert clock.monotonic() > before
