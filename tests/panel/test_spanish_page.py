@@ -143,6 +143,7 @@ NOT_ON_THE_PAGE = {  # of files, logs and clients that a page does not have, and
     "gemelo/programs/program.py": ('program "{}" was read from no file',),
     "gemelo/scene.py": ("attach=True needs frame=",),
     "gemelo/session.py": ("this connection belongs to process", "this waits for messages"),
+    "gemelo/simulation.py": ("motors: ", "press(", "start", 'there is no "{}" to press', "wire="),
     "gemelo/targets.py": (
         "{}= names no joint", "say where to by one of",
         "{}= is a quaternion", "{}= has {} rad", "axis= is an axis", "offset= leaves",

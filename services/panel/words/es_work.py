@@ -262,6 +262,13 @@ _SILENT: dict[str, str] = {
     "{server} did not answer {key} within {timeout} s, sent {tries} times: nobody serves it now (`gemelo node list`), "
     "and whether it was carried out is not known": "{server} no respondió en {timeout} s, y ya no está. No se sabe si "
     "lo hizo.",
+    "{asked}: it is alive, and carries out what arrives, but answers {most} of that kind of one client; ask again "
+    "after {pause}": "{asked}: sigue en marcha y hace lo que le llega, pero solo responde {most} de ese tipo a cada "
+    "cliente; pregunte de nuevo pasados {pause}.",
+    "{asked}: nobody serves it now (`gemelo node list`), and whether it was carried out is not known": "{asked}: ya no "
+    "está, y no se sabe si lo hizo.",
+    '{key}: {most}, all of clients with the certificate "{principal}"': "{key}: {most}, todas de clientes con el "
+    "certificado «{principal}».",
     "{server} did not answer {key} within {timeout} s, sent {tries} times: it is alive, and carries out what arrives, "
     "but answers {most} of that kind of one client; ask again after {pause}": "{server} hace lo que le llega, pero se "
     "le pide demasiado a la vez y no respondió. Pruebe en {pause}.",
