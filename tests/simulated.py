@@ -40,6 +40,7 @@ def found_by_connect(arm: SimulatedArm) -> Iterator[None]:
 
 def make_ready(arm: gemelo.Arm) -> None:
     """Does what a person would do after whatever a test has left."""
+    assert arm.wait_for(lambda: arm.device.mode is not gemelo.DeviceMode.RUN and not is_moving(arm), 20.0)
     if arm.device.mode is gemelo.DeviceMode.HOLD:
         arm.stop()
     if not arm.device.state.armed:
