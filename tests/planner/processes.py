@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import psutil
 
+from services.planner.workers.process import CHILD
+
 
 def planning_processes(of: int | None = None) -> list[psutil.Process]:
     """Those of the process `of`, or of this one."""
@@ -11,8 +13,8 @@ def planning_processes(of: int | None = None) -> list[psutil.Process]:
 
 
 def _plans(child: psutil.Process) -> bool:
-    """False for one that has ended, and for the helper that Python starts for other processes, as those of a fit."""
+    """False for one that has ended, and for what other tests have left to run: a browser, Python's own helper."""
     try:
-        return child.status() != psutil.STATUS_ZOMBIE and "resource_tracker" not in " ".join(child.cmdline())
+        return child.status() != psutil.STATUS_ZOMBIE and CHILD in child.cmdline()
     except psutil.NoSuchProcess:
         return False
