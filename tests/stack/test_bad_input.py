@@ -117,7 +117,7 @@ class Neighbour(Operator):
         strays = list(strays_for(topic.message))
         for schema, payload in strays:
             if schema not in publications:
-                publications[schema] = self.stranger.publish(topic.key, schema, topic.delivery)
+                publications[schema] = self.stranger.publish(topic.key, schema, topic.delivery, "stranger")
             publications[schema].put(payload)
             self.node.wait(0.002)  # LATEST keeps one message only
         for publication in publications.values():
@@ -189,7 +189,7 @@ def test_rubbish_on_every_topic_is_dropped_counted_and_named(stranger, operator)
     operator.wait_for(lambda: False, 0.3)
     for topic in TOPICS:
         for schema, payload in rubbish_for(topic.message):
-            publication = stranger.publish(topic.key, schema, topic.delivery)
+            publication = stranger.publish(topic.key, schema, topic.delivery, "stranger")
             publication.put(payload)
             operator.node.wait(0.01)  # LATEST keeps one message only
             publication.close()

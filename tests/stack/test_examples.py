@@ -48,9 +48,10 @@ class OnAnArm:
         arm.move(named="ready")
         for words, end in (("check", "it can run, "), ("run", "done, 10 steps")):
             command = [sys.executable, "-m", "services.cli.main", "program", words, "tour"]
+            programs = {"GEMELO_PATHS_PROGRAMS": str(twin.root / "programs")}
             done = subprocess.run(
-                command, cwd=twin.root, env={**os.environ, **twin.deployment}, capture_output=True, text=True,
-                timeout=LONGEST, check=True,
+                command, cwd=twin.root, env={**os.environ, **twin.deployment, **programs}, capture_output=True,
+                text=True, timeout=LONGEST, check=True,
             )  # fmt: skip
             assert done.stderr == ""
             assert done.stdout.splitlines()[-1].startswith(f"tour: {end}")

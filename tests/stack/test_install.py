@@ -160,8 +160,10 @@ def test_systemd_is_given_every_unit_as_rendered_and_told_to_start_them(installe
     wanted = {name: text for name, text in rendered(installed.site, "one").items() if name.startswith("systemd/")}
     for name, text in wanted.items():
         assert installed.host.run(f"cat /etc/systemd/system/{name.removeprefix('systemd/')}").stdout == text
-    assert len(wanted) == len(list(processes(installed.site, "one"))) + 1
-    assert installed.host.calls.read_text().splitlines()[-2:] == ["daemon-reload", "enable --now gemelo.target"]
+    assert len(wanted) == len(list(processes(installed.site, "one"))) + 2  # the target, and the firewall
+    assert installed.host.calls.read_text().splitlines()[-3:] == [
+        "daemon-reload", "enable --now gemelo.target", "restart gemelo-firewall.service"
+    ]  # fmt: skip
 
 
 def test_what_is_renewed_goes_out_again_by_the_same_command(installed: Lab) -> None:
@@ -202,7 +204,8 @@ def test_a_service_that_has_left_the_host_is_stopped_there_and_its_unit_goes_but
     finally:
         installed.file.write_text(text)
     calls = installed.host.calls.read_text().splitlines()
-    assert calls[-3:] == [f"stop {left}", "daemon-reload", "enable --now gemelo.target"]
+    firewall = "restart gemelo-firewall.service"
+    assert calls[-4:] == [f"stop {left}", "daemon-reload", "enable --now gemelo.target", firewall]
     assert [call for call in calls if call.startswith("stop")] == [f"stop {left}"]
     for folder in (units, "/etc/gemelo/systemd"):
         assert installed.host.run(f"ls {folder}/{left}").returncode != 0

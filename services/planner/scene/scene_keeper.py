@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
@@ -30,6 +31,7 @@ from services.runtime.topics import Latest
 
 SETTLING = 0.003  # [m] chosen: by less the jaws settle, and plans stay those of the present scene
 PUBLISH_AGAIN = 0.5  # [s] between two answers to the scenes of others; chosen: two planners do not flood each other
+OWN = 8  # of its own scenes that a planner knows again; chosen: more than are published within a reader's delay
 OnWorld = Callable[[World], None]
 
 
@@ -54,6 +56,7 @@ class SceneKeeper:
         self._what, self._is_unsaved = f"the scene in {self._file}, which a restart forgets otherwise,", False
         self._folders = (project_root(), arm.folder)
         self._scene, self._contacts = node.publisher(SCENE), node.publisher(CONTACTS)
+        self._published: deque[PlanningScene] = deque(maxlen=OWN)
         self._store = SceneStore(arm, self._folders, self._restored(), node.clock)
         self._is_touching = False
         self._apart: float | None = None  # [m] of the jaws; None before the first word of them
@@ -84,7 +87,12 @@ class SceneKeeper:
 
     def _on_other_scene(self, other: PlanningScene) -> None:
         """Another process has published a scene under this planner's name: a second planner, or a stray message."""
-        self._other = other
+        if other not in self._published:  # a late joiner is given the last one, which may be this planner's own
+            self._other = other
+
+    def _publish(self) -> None:
+        self._published.append(self._store.scene)
+        self._scene.put(self._store.scene)
 
     def _publish_again(self) -> None:
         """Whoever followed the other scene gets this planner's; of two planners the older ends (bus/name_holder.py)."""
@@ -94,7 +102,7 @@ class SceneKeeper:
                 "another process has published a scene as this planner, version %d of epoch %d: is there a second one? "
                 "The scene of this one is published again", other.version, other.epoch,
             )  # fmt: skip
-            self._scene.put(self._store.scene)
+            self._publish()
 
     def _on_gripper(self, state: GripperState) -> None:
         """The jaws have another opening: everything is checked with them there from now on.
@@ -110,7 +118,7 @@ class SceneKeeper:
         self.world = self._built(self._store.scene)
         self._on_world(self._built(self._store.scene))
         if has_opened:
-            self._scene.put(self._store.scene)
+            self._publish()
 
     def _edit(self, request: SceneRequest) -> SceneResponse:
         before, apart, stamp = self._store.scene, self._apart, self._node.now()
@@ -157,7 +165,7 @@ class SceneKeeper:
     def _show(self) -> None:
         """Tells the planner and the bus; a world is no thing for two threads, so the planner has one of its own."""
         self._on_world(self._built(self._store.scene))
-        self._scene.put(self._store.scene)
+        self._publish()
 
     def _configuration(self) -> Vector | None:
         """Where the arm stands, or None without a fresh joint state of all joints."""
