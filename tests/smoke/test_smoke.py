@@ -36,6 +36,8 @@ def test_an_arm_moves_stops_is_led_by_its_page_and_all_of_it_is_recorded(
                 with Person(chromium, stack.deployment["GEMELO_PANEL_PORT"], "en-US", SIZE) as person:
                     is_led_by_its_page(person, arm)
                     person.require_no_errors()
+        was_started_once = [state.restarts for state in stack.compose.processes() if state.name in processes]
+        assert was_started_once == [0] * len(processes)
         stack.kill("logger", signal.SIGTERM)
         recording = min((stack.out / "recordings").glob("*.mcap"))
         until(lambda: recording.read_bytes()[-len(MAGIC) :], lambda end: end == MAGIC)
