@@ -58,6 +58,7 @@ def tour(served: Served, arm: gemelo.Arm) -> None:
     teaching = served.operator.teaching
     teaching.stop()
     until(lambda: teaching.is_running, lambda runs: not runs)
+    teaching.points.reload()  # the stack is shared: its points go with each test
     for name in tuple(teaching.points):
         teaching.remove_point(name)
     for name, state in POINTS.items():

@@ -48,6 +48,17 @@ def send_slowly(operator):
     return handle
 
 
+def stop_in_a_move(stack, operator):
+    """Presses the emergency stop; the move's handle, and the black box."""
+    handle = send_slowly(operator)
+    pressed = time.time_ns()
+    gemelo(stack, "device", "press", "estop")
+    handle.wait(10.0)
+    stop = next_box(stack, pressed)
+    assert stop["kind"] == "emergency stop"
+    return handle, stop
+
+
 def test_a_killed_planner_and_an_emergency_stop_are_told_afterwards(stack, operator, tmp_path):
     began = time.time_ns()
     stack.kill("planner")
@@ -56,12 +67,7 @@ def test_a_killed_planner_and_an_emergency_stop_are_told_afterwards(stack, opera
     assert "planner" in lost["sentence"]
     stack.wait_ready(20.0)
 
-    handle = send_slowly(operator)
-    pressed = time.time_ns()
-    gemelo(stack, "device", "press", "estop")
-    handle.wait(10.0)
-    stop = next_box(stack, pressed)
-    assert stop["kind"] == "emergency stop"
+    handle, stop = stop_in_a_move(stack, operator)
     assert f"s into goal {handle.goal_id[:8]}" in stop["sentence"]
     story = [each["text"] for each in stop["story"]]
     goal = f"goal {handle.goal_id[:8]}"
@@ -90,7 +96,10 @@ def test_a_killed_planner_and_an_emergency_stop_are_told_afterwards(stack, opera
 
 
 def test_the_six_lines_of_the_readme_say_what_happened(stack, operator, tmp_path):
-    """Ledger, black boxes and replay, as they are printed there, on the stack whose arm was just stopped."""
+    """Ledger, black boxes and replay, as they are printed there, on a stack whose arm has just been stopped."""
+    stop_in_a_move(stack, operator)
+    gemelo(stack, "device", "press", "release")
+    gemelo(stack, "reset")
     found = SECTION.search((stack.root / "README.md").read_text(encoding="utf-8"))
     assert found is not None
     lines = [shlex.split(line, comments=True) for line in found[1].splitlines()]
