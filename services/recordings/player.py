@@ -43,13 +43,14 @@ class Roles:
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
         self._publications: dict[tuple[str, str, str], Publication] = {}
-        self._claimed: set[str] = set()
+        self._claimed: dict[str, str] = {}  # by name, the instance that this player is of it
 
     def claim(self, writers: set[str]) -> None:
         """Takes the names; raises `NodeNameTaken` where a living node has one of them."""
-        for name in sorted(writers - self._claimed):
-            identity.claim(self._bus, identity.identify(name, self._bus.common_name))
-            self._claimed.add(name)
+        for name in sorted(writers - self._claimed.keys()):
+            role = identity.identify(name, self._bus.common_name)
+            identity.claim(self._bus, role)
+            self._claimed[name] = role.instance
 
     def put(self, row: Row) -> None:
         """Publishes one message as it was said."""
@@ -57,7 +58,8 @@ class Roles:
         writer = writer_of(row)
         publication = self._publications.get((key, schema, writer))
         if publication is None:
-            publication = self._bus.publish(key, schema, delivery_of(row), writer)
+            instance = self._claimed.get(writer, "") if delivery_of(row) is Delivery.LATCHED else ""
+            publication = self._bus.publish(key, schema, delivery_of(row), writer, instance)
             self._publications[key, schema, writer] = publication
         publication.put(payload_of(row))
 

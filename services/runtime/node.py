@@ -135,7 +135,7 @@ class Node:
         """The publisher of a topic; the same one for every call."""
         publishers = self._endpoints.publishers
         if topic.key not in publishers:
-            publishers[topic.key] = Publisher(self._bus, topic, self.name)
+            publishers[topic.key] = Publisher(self._bus, topic, self.name, self._identity.instance)
         return publishers[topic.key]
 
     def subscribe(
@@ -151,7 +151,10 @@ class Node:
         return subscription
 
     def subscribe_signed(self, topic: Topic[M], on_message: Callable[[M, str], object]) -> Subscription[M]:
-        """As `subscribe`; `on_message(message, writer)` is told the name of the node that wrote it, as that says."""
+        """As `subscribe`; `on_message(message, writer)` is told the name of the node that wrote it, as that says.
+
+        Of a LATCHED topic, whose node the table names, it is told the instance of that node: see `watch_service`.
+        """
         subscription = Subscription(
             self._bus, self._loop, topic, lambda message: None, self.log.warning, False, None, on_message
         )
@@ -236,6 +239,18 @@ class Node:
     def absences(self) -> Absences:
         """Tells for how long the liveliness tokens of other nodes have been missing."""
         return Absences(self._watch_alive, lambda: self._bus.is_connected)
+
+    def watch_service(self, name: str, on_change: Callable[[str, bool], None]) -> None:
+        """`on_change(instance, is_there)` runs in the thread of logic for every process that bears a service's name.
+
+        Of two instances that live the greater started later, and the other gives way.
+        """
+
+        def on_token(key: str, is_there: bool) -> None:
+            if identity.is_token(key):
+                self.post(lambda: on_change(key.rpartition("/")[2], is_there))
+
+        self._bus.watch_tokens(identity.bearers_of(principal_of(name, ""), name), on_token)
 
     @property
     def token(self) -> str:

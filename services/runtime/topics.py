@@ -31,10 +31,11 @@ class Warn(Protocol):
 class Publisher(Generic[M]):
     """The right to publish on one topic."""
 
-    def __init__(self, bus: Bus, topic: Topic[M], writer: str) -> None:
-        """`writer` is the name of the node that publishes."""
+    def __init__(self, bus: Bus, topic: Topic[M], writer: str, instance: str = "") -> None:
+        """`writer` is the name of the node that publishes, `instance` that of its process (bus/identity.py)."""
         self.topic = topic
-        self._publication = bus.publish(topic.key, schema_of(topic.message), topic.delivery, writer)
+        signed = instance if topic.delivery is Delivery.LATCHED else ""
+        self._publication = bus.publish(topic.key, schema_of(topic.message), topic.delivery, writer, signed)
 
     def put(self, message: M) -> None:
         """Raises `TypeError` for another message than the table's, `BadMessage` where it is too large."""
@@ -60,7 +61,8 @@ class Subscription(Generic[M]):
     ) -> None:
         """With `batch` [s] the messages are handled together, once in this time; with 0 each as it comes, but all.
 
-        `on_signed` takes the place of `handler`, and is told the node that wrote the message too.
+        `on_signed` takes the place of `handler`, and is told the node that wrote the message too; of a LATCHED topic,
+        whose node the table names, the instance of that node.
         What lands in `queue` waits there for `take_in`.
         """
         self.topic = topic
@@ -118,7 +120,8 @@ class Subscription(Generic[M]):
             return
         self._received += 1
         if self._on_signed is not None:
-            self._on_signed(message, arrival.writer)
+            is_latched = self.topic.delivery is Delivery.LATCHED
+            self._on_signed(message, arrival.instance if is_latched else arrival.writer)
         else:
             self._handler(message)
 

@@ -129,16 +129,21 @@ class GatewayCore:
         reason = self._components.gripper.cancel(goal_id, moment)
         return reason, self._finish(moment)
 
-    def on_scene(self, scene: PlanningScene) -> None:
-        """The planner's newest scene: goals planned in another are refused. One that cannot be is said once."""
+    def on_planner(self, instance: str, is_there: bool, moment: Moment) -> list[Output]:
+        """A process that bears the planner's name has come or gone: the scene is that of the living one."""
+        self._components.goals.scenes.on_planner(instance, is_there)
+        return self._finish(moment)
+
+    def on_scene(self, scene: PlanningScene, instance: str = "") -> None:
+        """A planner's newest scene: goals planned in another are refused. One that is dropped is logged once."""
         scenes = self._components.goals.scenes
-        objection = scenes.take(scene)
+        objection = scenes.take(scene, instance)
         if objection and scenes.dropped == 1:
             self._components.out.log(LogLevel.WARNING, f"scene: dropped: {objection} (further ones are only counted)")
 
     @property
     def scenes_dropped(self) -> int:
-        """How many scenes had a version that no planner gives."""
+        """How many scenes had a version that no planner gives, or came from another than the living one."""
         return self._components.goals.scenes.dropped
 
     def on_targets(self, targets: JointTargets, moment: Moment, caller: MotionCaller = NOBODY) -> list[Output]:

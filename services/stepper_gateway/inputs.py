@@ -94,6 +94,14 @@ class SceneInput(_Input, frozen=True):
 
     version: int
     epoch: int
+    instance: str = ""  # of the planner that has published it
+
+
+class PlannerInput(_Input, frozen=True):
+    """A process that bears the planner's name has come or gone."""
+
+    instance: str
+    is_there: bool
 
 
 class TargetsInput(_Input, frozen=True):
@@ -147,8 +155,8 @@ class GiveControlInput(_Input, frozen=True):
 
 Input = (
     BeganInput | ParametersInput | StepInput | LinkInput | FrameInput | GoalInput | CancelInput | GripInput
-    | GripCancelInput | SceneInput | TargetsInput | CommandInput | StopInput | ConfigureInput | InjectInput | EchoInput
-    | TakeControlInput | JoinControlInput | GiveControlInput
+    | GripCancelInput | SceneInput | PlannerInput | TargetsInput | CommandInput | StopInput | ConfigureInput
+    | InjectInput | EchoInput | TakeControlInput | JoinControlInput | GiveControlInput
 )  # fmt: skip
 Reply = GoalVerdict | str | None  # what is said at once
 
@@ -185,8 +193,10 @@ def give(core: GatewayCore, given: Input, moment: Moment) -> tuple[Reply, list[O
             return core.on_grip(goal_id, goal, moment, MotionCaller(session))
         case GripCancelInput(goal_id):
             return core.on_grip_cancel(goal_id, moment)
-        case SceneInput(version, epoch):
-            core.on_scene(PlanningScene(version=version, epoch=epoch))
+        case SceneInput(version, epoch, instance):
+            core.on_scene(PlanningScene(version=version, epoch=epoch), instance)
+        case PlannerInput(instance, is_there):
+            return None, core.on_planner(instance, is_there, moment)
         case CommandInput(ticket, request, session):
             return None, core.on_command(request, ticket, moment, MotionCaller(session))
         case StopInput(ticket, request):

@@ -67,6 +67,7 @@ from services.stepper_gateway.inputs import (
     JoinControlInput,
     LinkInput,
     ParametersInput,
+    PlannerInput,
     Reply,
     SceneInput,
     StepInput,
@@ -93,7 +94,7 @@ from services.stepper_gateway.outputs import (
 )
 from services.stepper_gateway.parameters import GatewayParameters
 
-JOGGER = "planner"  # the node that streams targets for others
+PLANNER = "planner"  # the node whose scene counts, and which streams targets for others
 AT_ONCE = 16  # payloads handled before the loop looks at its deadline and for stops; chosen: about 1 ms
 
 WAS_STOPPED = "this gateway's process was stopped: it looks whether another has taken its place: wait two seconds"
@@ -127,7 +128,8 @@ class Shell:
         self._gripper: Gripper = node.serve_action(GRIPPER_COMMAND, self._on_grip, self._on_grip_cancel)
         self._absences = node.absences()
         node.subscribe_signed(JOINT_TARGETS, self._on_targets)
-        node.subscribe(SCENE, lambda scene: self._give(SceneInput(scene.version, scene.epoch)))
+        node.watch_service(PLANNER, self._on_planner)
+        node.subscribe_signed(SCENE, lambda scene, by: self._give(SceneInput(scene.version, scene.epoch, by)))
         self._commands = node.serve_later(DEVICE_COMMAND, self._on_command)
         node.serve_later(DEVICE_STOP, self._on_stop)
         node.serve_later(DEVICE_CONFIGURE, self._on_configure)
@@ -212,7 +214,10 @@ class Shell:
         """The planner's are those of whom it jogs for; of anybody else it does not count what they say of that."""
         if self._is_silent():
             return
-        self._give(TargetsInput(targets, targets.client or writer if writer == JOGGER else writer))
+        self._give(TargetsInput(targets, targets.client or writer if writer == PLANNER else writer))
+
+    def _on_planner(self, instance: str, is_there: bool) -> None:
+        self._give(PlannerInput(instance, is_there))
 
     def _on_command(self, request: DeviceCommandRequest, pending: Pending[DeviceCommandResponse]) -> None:
         self._give(CommandInput(self._ticket(pending), request, pending.client))

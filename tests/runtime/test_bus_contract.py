@@ -16,16 +16,21 @@ def ignore(count: int) -> None:
     pass
 
 
-def test_a_message_arrives_with_its_key_schema_and_bytes(buses: Buses) -> None:
+def test_a_message_arrives_with_its_key_schema_bytes_and_signature(buses: Buses) -> None:
     for delivery in (LATEST, EVERY, LATCHED):
         heard: list[Arrival] = []
         key = f"joint_states/{delivery.value}"
         buses.open().subscribe(key, delivery, heard.append, ignore)
-        publication = buses.open().publish(key, "JointState", delivery)
+        unsigned = buses.open().publish(key, "JointState", delivery)
+        signed = buses.open().publish(key, "JointState", delivery, "planner", "1.2.here")
         buses.settle()
-        publication.put(b"\x80")
+        unsigned.put(b"\x80")
         assert until(lambda heard=heard: heard)
-        assert heard == [Arrival(key, "JointState", b"\x80")]
+        signed.put(b"\x81")
+        assert until(lambda heard=heard: len(heard) == 2)
+        assert heard == [
+            Arrival(key, "JointState", b"\x80"), Arrival(key, "JointState", b"\x81", "planner", "1.2.here")
+        ]  # fmt: skip
 
 
 def test_every_keeps_order_and_loses_nothing_in_a_flood(buses: Buses) -> None:

@@ -15,8 +15,9 @@ from schemas.frames import RobotDescription
 from schemas.joints import JointState, JointTargets
 from schemas.message import BadMessage, encode
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
+from schemas.scene import PlanningScene
 from schemas.system import Empty, LogRecord, NodeStatistics, SetParameter, TopicStatistics
-from schemas.topics import COMMAND_ACKS, DESCRIPTION, JOINT_STATES, LOG, PLAN, STATISTICS, Request
+from schemas.topics import COMMAND_ACKS, DESCRIPTION, JOINT_STATES, LOG, PLAN, SCENE, STATISTICS, Request
 from services.runtime import topics
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
@@ -226,6 +227,24 @@ def test_a_latched_message_is_taken_from_its_writer_alone(buses: Buses) -> None:
     assert heard == ["the truth"]
     assert [record.text for record in said if record.node == "reader"] == [said[0].text]
     assert 'only "state_publisher" writes this key' in said[0].text
+
+
+def test_a_latched_message_is_signed_by_the_process_that_bears_the_name(buses: Buses) -> None:
+    living: dict[str, bool] = {}
+    signed: dict[int, str] = {}
+    reader = buses.node("reader")
+    reader.watch_service("planner", living.__setitem__)
+    reader.subscribe_signed(SCENE, lambda scene, instance: signed.update({scene.version: instance}))
+    planner = buses.node("planner")
+    buses.settle()
+    planner.publisher(SCENE).put(PlanningScene(version=1))
+    buses.open().publish(SCENE.key, "PlanningScene", SCENE.delivery, "planner").put(encode(PlanningScene(version=2)))
+    assert hear(reader, lambda: len(signed) == 2 and living)
+    assert planner.token.endswith(f"/{signed[1]}")
+    assert signed == {1: signed[1], 2: ""}
+    assert living == {signed[1]: True}
+    planner.close()
+    assert hear(reader, lambda: living == {signed[1]: False})
 
 
 def test_a_publisher_takes_only_its_own_message_and_size(buses: Buses) -> None:

@@ -113,3 +113,75 @@ def test_an_edit_does_not_stop_what_is_under_way():
     rig.run(0.2)
     rig.core.on_scene(PlanningScene(version=5))
     assert rig.finish()[0] is GoalStatusCode.SUCCEEDED
+
+
+OLDER, NEWER = "00000000000000000100.12.workshop", "00000000000000000200.34.office"
+
+
+def alive(*instances: str) -> VirtualArm:
+    """A gateway for which these planners live, and have published scene 4 of epochs 1, 2 ... in this order."""
+    rig = VirtualArm().ready()
+    for epoch, instance in enumerate(instances, 1):
+        rig.core.on_planner(instance, True, rig.moment)
+        rig.core.on_scene(PlanningScene(version=4, epoch=epoch), instance)
+    return rig
+
+
+@pytest.mark.parametrize("stranger", ["", OLDER, "00000000000000000300.56.nowhere"])
+def test_a_scene_of_a_planner_that_does_not_live_changes_nothing_and_is_logged_once(stranger: str):
+    rig = alive(NEWER)
+    for version in (7, 8):
+        rig.core.on_scene(PlanningScene(version=version, epoch=9), stranger)
+    assert rig.goal(goal(8, epoch=9)).code is FollowErrorCode.SCENE_CHANGED
+    assert rig.goal(goal(4, epoch=1)).accepted
+    assert rig.finish()[0] is GoalStatusCode.SUCCEEDED
+    assert rig.core.scenes_dropped == 2
+    assert sum("the planner that lives is process 34 on office" in line for line in rig.log) == 1
+
+
+def test_of_two_planners_that_live_no_plan_is_followed_until_one_has_ended():
+    rig = alive(OLDER, NEWER)
+    for epoch in (1, 2):
+        verdict = rig.goal(goal(4, epoch=epoch))
+        assert verdict.code is FollowErrorCode.SCENE_CHANGED
+        assert "two planners live, process 12 on workshop and process 34 on office" in verdict.reason
+    rig.core.on_planner(OLDER, False, rig.moment)
+    assert rig.goal(goal(4, epoch=1)).code is FollowErrorCode.SCENE_CHANGED
+    assert rig.goal(goal(4, epoch=2)).accepted
+
+
+def test_a_planner_beside_which_a_second_one_came_and_went_is_followed_again():
+    rig = alive(OLDER, NEWER)
+    rig.core.on_planner(NEWER, False, rig.moment)
+    assert rig.goal(goal(4, epoch=2)).code is FollowErrorCode.SCENE_CHANGED
+    assert rig.goal(goal(4, epoch=1)).accepted
+
+
+def test_a_planner_that_starts_and_gives_way_at_once_hinders_nothing():
+    """A second node of a name declares its token for a moment, and publishes nothing."""
+    rig = alive(OLDER)
+    rig.core.on_planner(NEWER, True, rig.moment)
+    assert rig.goal(goal(4, epoch=1)).accepted
+
+
+def test_a_scene_that_comes_before_its_planners_token_counts_once_that_is_there():
+    rig = alive(OLDER)
+    rig.core.on_planner(OLDER, False, rig.moment)
+    rig.core.on_scene(PlanningScene(version=1, epoch=2), NEWER)
+    assert rig.goal(goal(1, epoch=2)).code is FollowErrorCode.SCENE_CHANGED
+    rig.core.on_planner(NEWER, True, rig.moment)
+    assert rig.goal(goal(1, epoch=2)).accepted
+
+
+def test_a_router_that_takes_all_tokens_with_it_leaves_the_scene_as_it_is():
+    rig = alive(OLDER)
+    rig.core.on_planner(OLDER, False, rig.moment)
+    assert rig.goal(goal(3, epoch=1)).code is FollowErrorCode.SCENE_CHANGED
+    assert rig.goal(goal(4, epoch=1)).accepted
+
+
+def test_scenes_of_many_strangers_do_not_push_out_that_of_the_living_planner():
+    rig = alive(OLDER)
+    for number in range(100):
+        rig.core.on_scene(PlanningScene(version=9, epoch=9), f"{number:020d}.1.nowhere")
+    assert rig.goal(goal(4, epoch=1)).accepted

@@ -36,7 +36,12 @@ class Identity:
 
     @property
     def key(self) -> str:
-        return f"{IDENTITY}/{self.principal}/{self.name}/{self.started:020d}.{self.pid}.{self.host}"
+        return f"{IDENTITY}/{self.principal}/{self.name}/{self.instance}"
+
+    @property
+    def instance(self) -> str:
+        """Which of the processes that bear the name; of two the one that started later has the greater."""
+        return f"{self.started:020d}.{self.pid}.{self.host}"
 
     @property
     def address(self) -> str:
@@ -92,7 +97,12 @@ def is_token(key: str) -> bool:
 
 def bearers(identity: Identity) -> str:
     """The pattern of the tokens of all nodes with this name."""
-    return f"{IDENTITY}/{identity.principal}/{identity.name}/*"
+    return bearers_of(identity.principal, identity.name)
+
+
+def bearers_of(principal: str, name: str) -> str:
+    """The pattern of the tokens of all nodes with this name."""
+    return f"{IDENTITY}/{principal}/{name}/*"
 
 
 def _bearers(bus: Bus, identity: Identity, warn: Warn) -> set[str]:

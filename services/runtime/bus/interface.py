@@ -21,12 +21,14 @@ class Arrival:
     """One message as it came: `schema` and `writer` (a node's name) are empty where the sender named none.
 
     Of a key that every node writes, `writer` is the node's address as the key has it (branches.py), else as it says.
+    `instance` is which of the processes with that name, of a LATCHED key: the end of its token (identity.py).
     """
 
     key: str
     schema: str
     payload: bytes
     writer: str = ""
+    instance: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,8 +119,9 @@ class Bus(Protocol):
         """Call once a second; raises `BusError` if the router listens but this session stays disconnected."""
         ...
 
-    def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> Publication:
-        """EVERY and LATCHED are kept for readers that miss them while the router is away; `writer` goes with each."""
+    def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "", instance: str = "") -> Publication:
+        """EVERY and LATCHED are kept for readers that miss them while the router is away; `writer` and `instance` go
+        with each."""
         ...
 
     def subscribe(

@@ -54,8 +54,10 @@ class MemoryBus:
     def require_reconnection(self) -> None:
         pass
 
-    def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> MemoryPublication:
-        publication = MemoryPublication(self, key, schema, delivery, writer)
+    def publish(
+        self, key: str, schema: str, delivery: Delivery, writer: str = "", instance: str = ""
+    ) -> MemoryPublication:
+        publication = MemoryPublication(self, key, schema, delivery, writer, instance)
         with self.network.lock:
             self.network.publications[publication] = None
         self._declared.append(publication)

@@ -50,11 +50,12 @@ class MemoryPublication:
     schema: str
     delivery: Delivery
     writer: str = ""
+    instance: str = ""
     last: Arrival | None = None
     unsent: deque[Arrival] = field(default_factory=lambda: deque(maxlen=KEPT))
 
     def put(self, payload: bytes) -> None:
-        arrival = Arrival(self.key, self.schema, payload, self.writer)
+        arrival = Arrival(self.key, self.schema, payload, self.writer, self.instance)
         network = self.bus.network
         with network.lock:
             if self.delivery is Delivery.LATCHED:

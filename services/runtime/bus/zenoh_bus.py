@@ -51,7 +51,7 @@ from services.runtime.bus.zenoh_declarations import (
     forget,
     is_timeout,
     schema_in,
-    writer_in,
+    signature_in,
 )
 from services.runtime.clock import SYSTEM
 from services.runtime.errors import BusError
@@ -134,13 +134,15 @@ class ZenohBus:
         if time.monotonic() - self._disconnected_since > RECONNECTION_TIMEOUT:
             raise BusError(f"the router is there, but did not take this session back within {RECONNECTION_TIMEOUT:g} s")
 
-    def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> ZenohPublication:
+    def publish(
+        self, key: str, schema: str, delivery: Delivery, writer: str = "", instance: str = ""
+    ) -> ZenohPublication:
         encoding = encoding_of(schema)
         key = written_under(key, principal_of(writer, self._common_name), writer)
         if delivery is Delivery.LATEST:
             drop = zenoh.CongestionControl.DROP
             plain = self._session.declare_publisher(key, encoding=encoding, congestion_control=drop)
-            return ZenohPublication(plain, writer)
+            return ZenohPublication(plain, writer, instance)
         latched = delivery is Delivery.LATCHED
         publisher = zx.declare_advanced_publisher(
             self._session,
@@ -152,7 +154,7 @@ class ZenohBus:
             sample_miss_detection=zx.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None),
             publisher_detection=latched,
         )
-        return ZenohPublication(publisher, writer)
+        return ZenohPublication(publisher, writer, instance)
 
     def subscribe(
         self,
@@ -165,8 +167,8 @@ class ZenohBus:
         is_branched, read = is_by_every_node(key), read_under(key)
 
         def on_sample(sample: zenoh.Sample) -> None:
-            writer = (writer_at(str(sample.key_expr)) or "") if is_branched else writer_in(sample)
-            on_arrival(Arrival(key, schema_in(sample.encoding), bytes(sample.payload), writer))
+            signature = ((writer_at(str(sample.key_expr)) or ""), "") if is_branched else signature_in(sample)
+            on_arrival(Arrival(key, schema_in(sample.encoding), bytes(sample.payload), *signature))
 
         origin = zenoh.Locality.ANY if own else zenoh.Locality.REMOTE
         if delivery is Delivery.LATEST:

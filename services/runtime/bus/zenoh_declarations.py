@@ -23,14 +23,14 @@ QUERIES = 1024  # of one key that wait for Python; chosen: a client's burst (req
 
 
 class ZenohPublication:
-    """A declared publisher, plain or advanced; the writer's name is attached to every message."""
+    """A declared publisher, plain or advanced; the writer's name and instance are attached to every message."""
 
-    def __init__(self, publisher: Any, writer: str) -> None:
+    def __init__(self, publisher: Any, writer: str, instance: str) -> None:
         self._publisher = publisher
-        self._writer = writer.encode() or None
+        self._signature = f"{writer} {instance}".strip().encode() or None
 
     def put(self, payload: bytes) -> None:
-        self._publisher.put(payload, attachment=self._writer)
+        self._publisher.put(payload, attachment=self._signature)
 
     def close(self) -> None:
         self._publisher.undeclare()
@@ -164,10 +164,11 @@ def schema_in(encoding: zenoh.Encoding | None) -> str:
     return schema if kind == ENCODING else ""
 
 
-def writer_in(sample: zenoh.Sample) -> str:
-    """The name that the writer attached; empty where there is none."""
+def signature_in(sample: zenoh.Sample) -> tuple[str, str]:
+    """The name and the instance that the writer attached; empty where there is none."""
     attached = sample.attachment
-    return "" if attached is None else bytes(attached).decode(errors="replace")
+    writer, _, instance = ("" if attached is None else bytes(attached).decode(errors="replace")).partition(" ")
+    return writer, instance
 
 
 def is_timeout(error: zenoh.ReplyError) -> bool:

@@ -1,4 +1,8 @@
-"""The newest planning scene: a plan that was made in an older one may lead through what stands there now."""
+"""The newest planning scene: a plan that was made in an older one may lead through what stands there now.
+
+The scene is that of one living planner. Each process of that name signs its scenes with its instance, the end of its
+liveliness token, in which the one that started later is the greater.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ from schemas.scene import PlanningScene
 from services.stepper_gateway.goals.rejections import GoalRejected
 
 MOST_UNHEARD = 10_000  # chosen: edits of one scene that may be missed in a row; more is no planner's version
+MOST_PLANNERS = 8  # whose scenes are kept; chosen: more than are started within a reader's delay
 
 
 class PlannedIn(NamedTuple):
@@ -23,21 +28,39 @@ class PlannedIn(NamedTuple):
 
 
 class SceneVersions:
-    """Compares goals with the newest scene that the planner has told; before the first, every goal will do."""
+    """Compares goals with the newest scene of the living planner; before the first, every goal will do.
+
+    While no planner is known to live, the newest scene of any counts.
+    """
 
     def __init__(self) -> None:
-        self.dropped = 0  # scenes with a version that no planner gives
-        self._newest: PlanningScene | None = None
+        self.dropped = 0  # scenes that no planner gives, or not the living one
+        self._newest: dict[str, PlanningScene] = {}  # by instance, the one that has published last at the end
+        self._living: set[str] = set()
+        self._holder: str | None = None  # the instance whose scene it is; None before the first that lives
 
-    def take(self, scene: PlanningScene) -> str:
-        """The planner tells its scene: after every change, and again after a restart; why it is dropped, or empty.
+    def on_planner(self, instance: str, is_there: bool) -> None:
+        """The token of a planner's process has come or gone.
+
+        A router that is away takes all tokens with it: the scene stays that of the last one.
+        """
+        (self._living.add if is_there else self._living.discard)(instance)
+        self._choose()
+
+    def take(self, scene: PlanningScene, instance: str = "") -> str:
+        """A planner publishes its scene: after every change, and again after a restart; why it is dropped, or empty.
 
         Versions grow by one within an epoch, and go back only where a restart finds an older file.
         """
-        if objection := self._objection(scene):
+        if objection := self._objection(scene, instance):
             self.dropped += 1
             return objection
-        self._newest = scene
+        self._newest.pop(instance, None)
+        self._newest[instance] = scene
+        self._choose()
+        if self._holder is not None and instance != self._holder:
+            self.dropped += 1
+            return f"it comes from {_process(instance)}; the planner that lives is {_process(self._holder)}"
         return ""
 
     def require_newest(self, planned: PlannedIn) -> None:
@@ -45,9 +68,11 @@ class SceneVersions:
 
         A higher version of the same epoch is news that the client had sooner than the gateway.
         """
-        newest = self._newest
+        newest = self._scene
         if planned.version is None or newest is None:
             return
+        if rivals := self.rivals:
+            raise GoalRejected(FollowErrorCode.SCENE_CHANGED, rivals)
         if planned.epoch not in (None, newest.epoch):
             raise _changed(
                 f"planned in version {planned.version} of a scene that the planner holds no more; another one is at "
@@ -56,15 +81,46 @@ class SceneVersions:
         if planned.version < newest.version:
             raise _changed(f"planned in scene version {planned.version}, the scene is version {newest.version} now")
 
-    def _objection(self, scene: PlanningScene) -> str:
+    @property
+    def rivals(self) -> str:
+        """The sentence for two living planners that have both published a scene; empty if there is one at most."""
+        both = sorted(self._living & self._newest.keys())
+        if len(both) < 2:
+            return ""
+        older, newer = map(_process, both[-2:])
+        return (
+            f"two planners live, {older} and {newer}: which scene stands around the arm is not known. The older one "
+            "ends by itself within seconds; if not, end it"
+        )
+
+    @property
+    def _scene(self) -> PlanningScene | None:
+        if self._holder is not None:
+            return self._newest[self._holder]
+        return next(reversed(self._newest.values()), None)
+
+    def _choose(self) -> None:
+        """The holder is the living planner that started last, of those that have published a scene."""
+        self._holder = max(self._living & self._newest.keys(), default=self._holder)
+        while len(self._newest) > MOST_PLANNERS:
+            del self._newest[next(one for one in self._newest if one != self._holder)]
+
+    def _objection(self, scene: PlanningScene, instance: str) -> str:
         if scene.version < 0:
             return f"version {scene.version} is negative"
-        newest = self._newest
+        newest = self._newest.get(instance)
         if newest is None or scene.epoch != newest.epoch:
             return ""
         if scene.version > newest.version + MOST_UNHEARD:
             return f"version {scene.version} is more than {MOST_UNHEARD} changes after version {newest.version}"
         return ""
+
+
+def _process(instance: str) -> str:
+    """`process 123 on this-host`."""
+    _, _, place = instance.partition(".")
+    pid, _, host = place.partition(".")
+    return f"process {pid} on {host}" if host else "a process that does not sign with its instance"
 
 
 def _changed(what: str) -> GoalRejected:
