@@ -11,8 +11,8 @@ import msgspec
 import gemelo
 from services.arm.device.device_config import device_config
 from services.chaos.faults import BYSTANDERS, FAULTS, READY, Fault
-from services.chaos.invariants import jerks, jumps, misses, moved, segments
-from services.chaos.person import Person, quietly_cancel
+from services.chaos.invariants import is_starved, jerks, jumps, misses, moved, segments
+from services.chaos.person import quietly_cancel
 from services.chaos.site import ChaosSite
 from services.chaos.slots import steps_in
 from services.chaos.slots import violations as slot_violations
@@ -20,8 +20,6 @@ from services.stack.stack import StackError
 
 TO_END = 25.0  # [s] beyond the move's own time in which its client must know its end
 TO_BEGIN = 5.0  # [s] for a move to get under way
-# Reasons of a machine without time for gateway and device.
-STARVED = ("lost the gateway's heartbeat", "is silent for more than", "has been silent for")
 MUTED = 2.0  # [s] after such a fault until everything is recorded again
 
 
@@ -60,7 +58,7 @@ class Campaign:
     """Carries out episodes on a site, one after the other."""
 
     def __init__(self, site: ChaosSite, say: Callable[[str], object]) -> None:
-        self.person = Person(site.arm)
+        self.person = site.person
         self.muted: list[tuple[int, int]] = []  # [ns] UNIX, from and to when records may be lost
         self._site, self._say = site, say
         self._config = device_config(site.arm.description)
@@ -68,6 +66,7 @@ class Campaign:
     def episode(self, number: int, fault: Fault, random: Random) -> Episode:
         """One move with one fault; never raises for what the stack does."""
         person, violations = self.person, list[str]()
+        self._use_wire(fault, violations)
         if unready := person.make_ready(READY, reference=False):
             violations.append(f"not ready to move: {unready}")
         person.forget()
@@ -75,18 +74,19 @@ class Campaign:
         motion = self._start(random, violations)
         if motion is None:
             return Episode(number=number, fault=fault.name, chosen="", ended="not begun", violations=tuple(violations))
+        self._site.motion = motion
         self._site.slots.forget()  # a reference before the move has set the counters
         self._reach(motion, random.uniform(0.1, 0.8))
         begun_at, begun = time.monotonic(), time.time_ns()
         chosen = self._begin(fault, random, violations)
         person.pause(random.uniform(*fault.lasts))
-        self._heal(fault)
+        self._heal(fault, violations)
         healed = time.monotonic()
         ended, reason = self._end(motion, begun_at)
         to_end = time.monotonic() - begun_at
         if ended == "unknown":
             violations.append(f"its client heard no end within {TO_END:g} s of the move's own time")
-        violations += meddled(fault, ended, reason)
+        violations += meddled(fault, ended, reason) + self._site.take_found()
         to_ready = self._await_ready(healed, violations)
         if fault.mutes:
             self.muted.append((begun - int(MUTED * 1e9), time.time_ns() + int(MUTED * 1e9)))
@@ -127,7 +127,7 @@ class Campaign:
             violations.append(f"the fault could not be begun: {error}")
             return ""
 
-    def _heal(self, fault: Fault) -> None:
+    def _heal(self, fault: Fault, violations: list[str]) -> None:
         """The hand that heals a device may come when its link is not back yet."""
         end = time.monotonic() + READY
         while time.monotonic() < end:
@@ -135,6 +135,16 @@ class Campaign:
                 return fault.heal(self._site)
             except gemelo.Error:
                 self.person.pause(0.1)
+            except (StackError, OSError) as error:
+                violations.append(f"the fault could not be healed: {error}")
+                return None
+        return None
+
+    def _use_wire(self, fault: Fault, violations: list[str]) -> None:
+        try:
+            self._site.use_wire(fault.wire)
+        except (StackError, OSError) as error:
+            violations.append(f"the wire could not become {fault.wire}: {error}")
 
     def _end(self, motion: gemelo.Motion, begun_at: float) -> tuple[str, str]:
         left = motion.plan.duration + TO_END - (time.monotonic() - begun_at)
@@ -191,7 +201,7 @@ def words_of(error: StackError) -> list[str]:
 
 def meddled(fault: Fault, ended: str, reason: str) -> list[str]:
     """That a process which takes no part in a move, as ARCHITECTURE.md's table has it, had to do with its end."""
-    if fault.of not in BYSTANDERS or ended == "succeeded" or any(words in reason for words in STARVED):
+    if fault.of not in BYSTANDERS or ended == "succeeded" or is_starved(reason):
         return []
     return [f"{fault.of} takes no part in a move, and yet it ended {ended}: {reason or 'no reason was given'}"]
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 from dataclasses import dataclass
 
+from schemas.deployment import Wire
+from services.chaos.flutters import fluttering_holds, fluttering_stops, goal_and_stop
 from services.chaos.injections import (
     Begin,
     Heal,
@@ -11,19 +14,24 @@ from services.chaos.injections import (
     clocks_set_back,
     clocks_stepped,
     cut,
+    deaf,
     disk_freed,
     disk_full,
     doubled_frames,
     frames_of_noise,
     frozen,
     garbled,
+    garbled_line,
     healed,
+    healed_line,
     held,
     injected,
     killed,
     lossy,
+    lossy_line,
     noise_on_the_bus,
     nothing,
+    one_of_twins_is_left,
     released,
     restarted,
     resumed,
@@ -31,14 +39,30 @@ from services.chaos.injections import (
     run_folder_full,
     run_folder_read_only,
     run_folder_writable,
+    signalled,
     slipped,
     slowed,
+    spoiled_line,
     stalled,
     stopped,
     thawed,
+    twin,
+    twin_client_left,
+    twin_gave_way,
+    twin_of_a_frozen,
+    twin_of_the_devices_client,
+    unplugged_line,
     with_descriptors,
     without_descriptors,
     worker_killed,
+)
+from services.chaos.replays import (
+    by_another_client,
+    by_the_same_client,
+    replayed_after_a_restart,
+    replayed_after_a_stop,
+    replayed_during_another_move,
+    replayed_later,
 )
 
 READY = 20.0  # [s] after the heal in which every process is ready again: ARCHITECTURE.md's table, on a busy machine
@@ -58,12 +82,18 @@ class Fault:
     slips: bool = False  # the shafts may have moved without their counters
     mutes: bool = False  # records may be lost while it lasts: the logger or the router is away
     of: str = ""  # the process that it is done to; empty: to none or to several
+    wire: Wire = Wire.MQTT  # between gateway and device, from before the move on
 
 
 SHORT, LONG = (0.05, 0.6), (0.8, 3.0)  # [s] within what motion and clients bear, and beyond it
 # They take no part in a move that has begun.
 BYSTANDERS = ("state_publisher", "planner", "visualizer", "viewer", "panel", "camera", "detector")
 CLOSED_BY_ITS_USER = "viewer"  # and not started anew, where it is asked to end
+RECORDED_THROUGH = ("router", "logger")
+# The device's own twin is another device, of which the arm would have two.
+ALONE = ("router", "broker", "stepper_gateway", "logger", *BYSTANDERS)
+NAMED = tuple(name for name in ALONE if name not in ("router", "broker", "viewer", "panel"))  # others by their port
+SERIAL = Wire.SERIAL
 FAULTS: tuple[Fault, ...] = (
     *(Fault(f"kill {name}", "kill -9", killed(name), of=name) for name in (*BYSTANDERS, "stepper_gateway", "broker")),
     Fault("kill router", "kill -9", killed("router"), mutes=True),
@@ -83,13 +113,38 @@ FAULTS: tuple[Fault, ...] = (
         for name in ("stepper_gateway", "broker", "router", "virtual_esp32", "logger", *BYSTANDERS)
         for length, lasts in (("shortly", SHORT), ("long", LONG))
     ),
+    *(
+        Fault(f"{number.name} {name}", "as from a terminal that is closed", signalled(name, number),
+              mutes=name in RECORDED_THROUGH, boots=name == "virtual_esp32", of=name)
+        for name in (*ALONE, "virtual_esp32") for number in (signal.SIGHUP, signal.SIGQUIT)
+    ),
+    *(
+        Fault(f"twin {name}", "a second one is started, and gives way", twin(name), heal=twin_gave_way, of=name)
+        for name in ALONE
+    ),
+    *(
+        Fault(f"twin of a frozen {name}", "a second one in its place, then it goes on", twin_of_a_frozen(name),
+              heal=one_of_twins_is_left, mutes=name == "logger", of=name)
+        for name in NAMED
+    ),
+    Fault("twin of the device's client", "its id at the broker is another's too", twin_of_the_devices_client, LONG,
+          twin_client_left),
     Fault("cut link", "the link to the broker is cut", cut, SHORT, healed),
     Fault("cut link long", "the link to the broker is cut", cut, LONG, healed),
     Fault("stall link", "connections stay open, nothing passes", stalled, SHORT, healed),
     Fault("stall link long", "connections stay open, nothing passes", stalled, LONG, healed),
+    *(
+        Fault(f"nothing {way} the device{length}", "its link is deaf in one direction", deaf(way == "to"), lasts,
+              healed)
+        for way in ("to", "from") for length, lasts in (("", SHORT), (" long", LONG))
+    ),
     Fault("slow link", "every piece is late", slowed, LONG, healed),
     Fault("lossy link", "frames of QoS 0 never arrive", lossy, LONG, healed),
     Fault("garble link", "bits change on the way", garbled, LONG, healed),
+    Fault("lossy serial line", "runs of bytes never arrive", lossy_line, LONG, healed_line, wire=SERIAL),
+    Fault("garbled serial line", "bits change on the way", garbled_line, LONG, healed_line, wire=SERIAL),
+    Fault("spoiled serial line", "bytes are lost and changed", spoiled_line, LONG, healed_line, wire=SERIAL),
+    Fault("unplugged serial line", "there is no port", unplugged_line, (0.2, 3.0), healed_line, wire=SERIAL),
     Fault("doubled frames", "frames of the wire are said again", doubled_frames),
     Fault("changed frames", "frames of the wire are said with bytes changed", changed_frames),
     Fault("noise on the wire", "random bytes on the broker's topics", frames_of_noise),
@@ -114,4 +169,12 @@ FAULTS: tuple[Fault, ...] = (
           mutes=True),
     Fault("stop", "a person's stop", stopped),
     Fault("hold", "a person's hold, and go on", held, SHORT, resumed),
+    Fault("flutter of holds", "many holds and resumes", fluttering_holds, heal=resumed),
+    Fault("flutter of stops", "many moves, each stopped soon", fluttering_stops),
+    Fault("goal and stop", "in one breath", goal_and_stop),
+    Fault("goal replayed", "by its client, after its end", replayed_later(by_the_same_client)),
+    Fault("goal replayed by another", "after its end", replayed_later(by_another_client)),
+    Fault("goal replayed after a restart", "of the gateway", replayed_after_a_restart),
+    Fault("goal replayed after a stop", "by its client or another", replayed_after_a_stop),
+    Fault("goal replayed during a move", "by its client or another", replayed_during_another_move),
 )  # fmt: skip

@@ -14,7 +14,10 @@ import psutil
 
 import gemelo
 from services.chaos.descriptors import give_descriptors, take_descriptors
+from services.chaos.noisy_line import NoisyLine
 from services.chaos.site import ChaosSite, program
+from services.chaos.slow_link import OneWay, Way
+from services.chaos.twins import TwinClient, TwinProcess
 from services.stack.stack import StackError
 
 Begin = Callable[[ChaosSite, Random], str]  # does it; the words for what was chosen
@@ -43,6 +46,115 @@ def restarted(name: str) -> Begin:
         return f"restart {name}"
 
     return begin
+
+
+def signalled(name: str, number: signal.Signals) -> Begin:
+    """A signal by which a terminal ends what was started in it."""
+
+    def begin(site: ChaosSite, random: Random) -> str:
+        pid = site.stack.pid(name)
+        if pid:
+            resource.prlimit(pid, resource.RLIMIT_CORE, (0, resource.prlimit(pid, resource.RLIMIT_CORE)[1]))
+        site.stack.kill(name, number)
+        return f"{number.name} to {name}"
+
+    return begin
+
+
+def twin(name: str) -> Begin:
+    """A second process beside one that lives: it gives way."""
+
+    def begin(site: ChaosSite, random: Random) -> str:
+        site.twin = TwinProcess(site.stack, name)
+        site.twin.start()
+        return f"a second {name}"
+
+    return begin
+
+
+def twin_gave_way(site: ChaosSite) -> None:
+    site.found += site.end_twin(TwinProcess.gave_way)
+
+
+def twin_of_a_frozen(name: str) -> Begin:
+    """A second process in the place of one that is frozen, which then goes on: one of both gives way."""
+
+    def begin(site: ChaosSite, random: Random) -> str:
+        site.twin = TwinProcess(site.stack, name)
+        site.stack.kill(name, signal.SIGSTOP)
+        site.twin.start()
+        if not site.twin.has_begun():
+            site.found.append(f"a second {name} has not taken the place of one that is frozen")
+        thawed(name)(site)
+        return f"freeze {name}, a second one in its place, then thaw"
+
+    return begin
+
+
+def one_of_twins_is_left(site: ChaosSite) -> None:
+    site.found += site.end_twin(TwinProcess.one_is_left)
+
+
+def twin_of_the_devices_client(site: ChaosSite, random: Random) -> str:
+    """A client of the broker with the id of the device, as of a copy of its card."""
+    prefix = f"gemelo-device-{site.arm.description.device.name}-"
+    client_id = site.link.newest_client(prefix)
+    if not client_id:
+        raise StackError(f"no client {prefix}... has joined the broker")
+    comes_back = random.random() < 0.5
+    site.twin_client = TwinClient(site.broker_port, client_id, comes_back)
+    return f"a second client {prefix}..., {'again and again' if comes_back else 'once'}"
+
+
+def twin_client_left(site: ChaosSite) -> None:
+    client, site.twin_client = site.twin_client, None
+    if client is not None:
+        client.close()
+
+
+def deaf(to_device: bool) -> Begin:
+    """Nothing passes in one direction, on the gateway's or the device's side of the broker; the other one is whole."""
+
+    def begin(site: ChaosSite, random: Random) -> str:
+        of_device = random.random() < 0.5
+        way = Way.FROM_BROKER if of_device is to_device else Way.TO_BROKER
+        client = "gemelo-device-" if of_device else "gemelo-gateway-"
+        site.link.stalled_ways = frozenset({OneWay(client, way)})
+        side = "the device's" if of_device else "the gateway's"
+        return f"nothing {'to' if to_device else 'from'} the device, on {side} side of the broker"
+
+    return begin
+
+
+def line_of(site: ChaosSite) -> NoisyLine:
+    """Raises `StackError` where the wire is no serial line."""
+    if site.line is None:
+        raise StackError("there is no serial line")
+    return site.line
+
+
+def lossy_line(site: ChaosSite, random: Random) -> str:
+    line_of(site).losing = random.uniform(0.01, 0.1)
+    return f"lose bytes of {line_of(site).losing:.0%} of the pieces on the serial line"
+
+
+def garbled_line(site: ChaosSite, random: Random) -> str:
+    line_of(site).garbling = random.uniform(0.01, 0.1)
+    return f"change bits in {line_of(site).garbling:.0%} of the pieces on the serial line"
+
+
+def spoiled_line(site: ChaosSite, random: Random) -> str:
+    line_of(site).losing, line_of(site).garbling = random.uniform(0.01, 0.05), random.uniform(0.01, 0.05)
+    return "lose and change bytes on the serial line"
+
+
+def unplugged_line(site: ChaosSite, random: Random) -> str:
+    line_of(site).unplug()
+    return "unplug the serial line"
+
+
+def healed_line(site: ChaosSite) -> None:
+    line_of(site).heal()
 
 
 def frozen(name: str) -> Begin:

@@ -14,6 +14,14 @@ SHORTEST = 0.015  # [s] between two states of which an acceleration is computed
 AROUND = 50_000_000  # [ns] between what the device said of a late slot and the states that show it
 FREE = 1.3  # an acceleration computed from positions 20 ms apart may be above the limit by this factor
 
+# Reasons of a machine without time for gateway and device.
+STARVED = ("lost the gateway's heartbeat", "is silent for more than", "has been silent for")
+
+
+def is_starved(reason: str) -> bool:
+    """True if `reason` says that the machine had no time for gateway or device."""
+    return any(words in reason for words in STARVED)
+
 
 def segments(states: Sequence[DeviceState], late: Sequence[int]) -> list[list[DeviceState]]:
     """The states in pieces within which counters and clock go on: a boot or a reference begins a new one.

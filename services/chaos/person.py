@@ -12,6 +12,7 @@ from gemelo import DeviceMode
 from schemas.device import DeviceEvent, DeviceState, ShaftPositions
 from schemas.joints import JointState
 from schemas.topics import DEVICE_EVENTS, DEVICE_SHAFT, DEVICE_STATE, JOINT_STATES
+from services.arm.model.description import ArmDescription
 
 SHARES = (0.2, 0.8)  # of a joint's travel between which goals lie
 SPEEDS = (0.3, 1.0)
@@ -60,10 +61,7 @@ class Person:
         """A move to a random place where the arm can be; raises `gemelo.Error` where none of some is accepted."""
         error: gemelo.Error | None = None
         for _ in range(10):
-            goal = {
-                joint.name: joint.lower + random.uniform(*SHARES) * (joint.upper - joint.lower)
-                for joint in self.arm.description.joints
-            }
+            goal = random_goal(self.arm.description, random)
             try:
                 return self.arm.start(joints=goal, speed=random.uniform(*SPEEDS))
             except gemelo.Refused as refused:
@@ -147,6 +145,11 @@ class Person:
         if word not in self.hands:
             self.hands.append(word)
         return f"{word} has just been done"
+
+
+def random_goal(arm: ArmDescription, random: Random) -> dict[str, float]:
+    """[rad] or [m] by joint, in the middle of each one's travel."""
+    return {joint.name: joint.lower + random.uniform(*SHARES) * (joint.upper - joint.lower) for joint in arm.joints}
 
 
 def quietly_cancel(motion: gemelo.Motion) -> None:

@@ -3,39 +3,48 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
-from collections import deque
-from collections.abc import Sequence
+import signal
+import time
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from functools import cached_property
 from pathlib import Path
-from random import Random
 from types import TracebackType
-
-from paho.mqtt.client import Client, MQTTMessage
-from paho.mqtt.enums import CallbackAPIVersion
 
 import gemelo
 from firmware.platform.host.slot_record import VARIABLE
-from schemas.deployment import Deployment, RouterSection
-from schemas.topics import ACTIONS, CAMERA_TOPICS, TOPICS, Delivery
+from schemas.actions import GoalRequest
+from schemas.deployment import Deployment, Wire
+from schemas.message import BadMessage, decode
+from schemas.system import Exchange
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY
 from services.arm.cell.cell_file import deployed_cell
 from services.broker import mosquitto
 from services.broker.replacement import NotInstalled
 from services.chaos.clocks import ClockError, SteppingClocks
-from services.chaos.slots import SlotFile
+from services.chaos.noisy_line import NoisyLine
+from services.chaos.person import Person
+from services.chaos.slots import SlotFile, steps_in
 from services.chaos.slow_link import SlowLink
 from services.chaos.small_disk import SmallDisk, may_mount
-from services.mqtt.client import stop_loop
-from services.runtime.actions.keys import feedback_topic, status_topic
-from services.runtime.bus.zenoh_bus import ZenohBus
-from services.runtime.deployment import load_deployment, project_root
+from services.chaos.strangers import BusStranger, WireStranger
+from services.chaos.twins import TwinClient, TwinProcess
+from services.runtime.actions.keys import goal_request
+from services.runtime.deployment import deployment_file, load_deployment, project_root
+from services.runtime.requests.exchanges import exchange_topic
 from services.runtime.saved_parameters import SavedParameters
 from services.stack.stack import PROCESSES, Stack, StackError, free_ports
 
 EYES = ("camera", "detector")
-KEPT = 200  # frames of the wire that can be said again
+KEPT_GOALS = 20  # that can be sent again
 TO_CONNECT = 30.0  # [s] for the arm to be there
+TO_RECORD = 3.0  # [s] for the gateway to publish a goal that it was sent
+TO_RESTART = 20.0  # [s] for a process to run again, on a busy machine
+STANDS = 0.3  # [s] without a step: the arm stands
+CONFIG = "deployment.toml"  # the deployment of the stack, in the folder of the results
+VIRTUAL_LINE = "virtual_esp32.tty"
 
 
 def program(process: str) -> str:
@@ -57,6 +66,13 @@ def cell_of(deployment: Deployment) -> str:
     return deployment.cell or (own if (project_root() / own).is_file() else "")
 
 
+def with_wire(deployment: str, wire: Wire) -> str:
+    """The text of a deployment file with this wire."""
+    line = f'wire = "{wire}"'
+    changed, count = re.subn(r"^wire\s*=.*$", line, deployment, count=1, flags=re.MULTILINE)
+    return changed if count else f"{line}\n{deployment}"
+
+
 def processes_of(deployment: Deployment) -> tuple[str, ...]:
     """What runs in chaos: everything, but for those that have nothing to do without a cell."""
     return tuple(name for name in PROCESSES if name not in EYES or cell_of(deployment))
@@ -71,9 +87,17 @@ class ChaosSite:
 
     def __init__(self, out: Path, broker: str, seed: int, is_judged: bool = True) -> None:
         out.mkdir(parents=True, exist_ok=True)
+        self._config, self._wire = out / CONFIG, Wire.MQTT
+        self._deployment = deployment_file(None, os.environ).read_text(encoding="utf-8")
+        self._config.write_text(with_wire(self._deployment, self._wire), encoding="utf-8")
+        self.line: NoisyLine | None = None  # while the wire is a serial line
+        self.twin: TwinProcess | None = None  # while there are two of one process
+        self.twin_client: TwinClient | None = None  # while there are two of one client of the broker
+        self.motion: gemelo.Motion  # of this episode
+        self.found: list[str] = []  # what the injections of this episode saw themselves and must not be
         self.slots = SlotFile(out / "slots")
         self._out = out
-        self._port, self._broker_port = free_ports(2)
+        self._port, self.broker_port = free_ports(2)
         self.stack = Stack(
             broker=broker,
             viewer="web" if is_judged else "none",
@@ -81,15 +105,17 @@ class ChaosSite:
             out=out,
             environment={
                 "GEMELO_MQTT_PORT": str(self._port),
-                "GEMELO_MQTT_LISTEN_PORT": str(self._broker_port),
+                "GEMELO_MQTT_LISTEN_PORT": str(self.broker_port),
                 "GEMELO_DEVICE": "virtual",
-                "GEMELO_WIRE": "mqtt",
+                "GEMELO_WIRE": "",  # as its file says, which `use_wire` writes
+                "GEMELO_CONFIG": str(out / CONFIG),
                 **(self._judged() if is_judged else {}),
             },
         )
         self.disk: SmallDisk | None = None  # of the run folder alone, while the site stands; only root may mount one
         self._keep_all_recordings()
         self._seed = seed
+        self._goals: dict[str, GoalRequest] = {}  # by id, the newest last
         self._closing = ExitStack()
 
     def _judged(self) -> dict[str, str]:
@@ -106,7 +132,7 @@ class ChaosSite:
 
     def __enter__(self) -> ChaosSite:
         with ExitStack() as closing:
-            self.link = SlowLink(self._port, self._broker_port, self._seed)
+            self.link = SlowLink(self._port, self.broker_port, self._seed)
             closing.callback(self.link.close)
             if may_mount():
                 closing.callback(shutil.rmtree, self.stack.folder, ignore_errors=True)  # after the disk has gone
@@ -115,7 +141,10 @@ class ChaosSite:
             closing.enter_context(self.stack)
             os.environ.update(self.stack.deployment)  # where the arm is found
             self.arm = closing.enter_context(self._connect())
-            self.wire = WireStranger(self._broker_port)
+            self.arm.node.subscribe(exchange_topic(goal_request(FOLLOW_JOINT_TRAJECTORY)), self._note_goal)
+            closing.callback(self._close_line)
+            closing.callback(self._end_twins)
+            self.wire = WireStranger(self.broker_port)
             closing.callback(self.wire.close)
             cameras = deployed_cell(load_deployment()).camera_names
             self.bus = BusStranger(int(self.stack.deployment["GEMELO_ROUTER_PORT"]), self.arm.name, cameras)
@@ -128,6 +157,103 @@ class ChaosSite:
     ) -> None:
         self._closing.close()
 
+    @cached_property
+    def person(self) -> Person:
+        """Beside the arm from the first look on."""
+        return Person(self.arm)
+
+    def pause(self, seconds: float) -> None:
+        """Lets time [s] pass."""
+        self.arm.wait_for(lambda: False, seconds)
+
+    def steps_since(self, offset: int) -> int:
+        """In how many slots there was a step since the record of slots had `offset` [bytes]."""
+        return steps_in(self.slots.rows(offset))
+
+    def stands_within(self, seconds: float) -> bool:
+        """Waits until the device has made no step for 0.3 s; False if it still makes some after `seconds` [s]."""
+        end = time.monotonic() + seconds
+        while True:
+            before = self.slots.size
+            self.pause(STANDS)
+            if not self.steps_since(before):
+                return True
+            if time.monotonic() > end:
+                return False
+
+    def end_twin(self, judge: Callable[[TwinProcess], list[str]]) -> list[str]:
+        """Ends the second process, if there is one; what `judge` has found of it before."""
+        twin, self.twin = self.twin, None
+        if twin is None:
+            return []
+        try:
+            return judge(twin)
+        finally:
+            twin.end()
+
+    def _end_twins(self) -> None:
+        self.end_twin(lambda twin: [])
+        if self.twin_client is not None:
+            self.twin_client.close()
+
+    def take_found(self) -> list[str]:
+        """What the injections saw themselves since the last call."""
+        found, self.found = self.found, []
+        return found
+
+    def recorded_goal(self) -> GoalRequest:
+        """The request that began this episode's motion, as the gateway has published it; raises `StackError`."""
+        goal_id = self.motion.goal_id
+        if not self.arm.wait_for(lambda: goal_id in self._goals, TO_RECORD):
+            raise StackError(f"the gateway has not published its goal {goal_id} within {TO_RECORD:g} s")
+        return self._goals[goal_id]
+
+    def restart(self, name: str) -> None:
+        """SIGTERM, and waits until process-compose has started it again; raises `StackError` where it has not."""
+        before = self.stack.kill(name, signal.SIGTERM)
+        end = time.monotonic() + TO_RESTART
+        while (pid := self.stack.pid(name)) in (0, before):
+            if time.monotonic() > end:
+                raise StackError(f"{name} (process {before or pid}) is not started again within {TO_RESTART:g} s")
+            self.pause(0.05)
+
+    def use_wire(self, wire: Wire) -> None:
+        """The link between gateway and device from now on; both start anew where it is another. Raises `StackError`."""
+        if wire is self._wire:
+            return
+        self._close_line()
+        self._wire = wire
+        self._config.write_text(with_wire(self._deployment, wire), encoding="utf-8")
+        self.restart("virtual_esp32")
+        if wire is Wire.SERIAL:
+            self.line = self._line()
+        self.restart("stepper_gateway")
+        self.stack.wait_ready(TO_RESTART, ("virtual_esp32", "stepper_gateway"))
+
+    def _line(self) -> NoisyLine:
+        """In the place of the device's own line, once that is there."""
+        path = self.stack.run / VIRTUAL_LINE
+        end = time.monotonic() + TO_RESTART
+        while True:
+            try:
+                return NoisyLine(path, self._seed)
+            except OSError as error:
+                if time.monotonic() > end:
+                    raise StackError(f"no serial line at {path} within {TO_RESTART:g} s: {error}") from error
+            self.pause(0.05)
+
+    def _close_line(self) -> None:
+        line, self.line = self.line, None
+        if line is not None:
+            line.close()
+
+    def _note_goal(self, exchange: Exchange) -> None:
+        with suppress(BadMessage):
+            request = decode(GoalRequest, bytes(exchange.question))
+            self._goals[request.goal_id] = request
+        while len(self._goals) > KEPT_GOALS:
+            del self._goals[next(iter(self._goals))]
+
     def _keep_all_recordings(self) -> None:
         """None is removed: all are judged at the end."""
         SavedParameters(self.stack.run, "logger").keep({"keep_files": 0})
@@ -139,73 +265,3 @@ class ChaosSite:
         except gemelo.Error as error:
             unready = self.stack.why_not_ready()
             raise StackError("\n".join([f"no arm to move: {error}", *map(str, unready)]), unready) from error
-
-
-class WireStranger:
-    """A client of the broker that hears every frame, and says old, changed or meaningless ones."""
-
-    def __init__(self, port: int) -> None:
-        self._heard: deque[tuple[str, bytes]] = deque(maxlen=KEPT)
-        self._client = Client(CallbackAPIVersion.VERSION2, client_id="chaos")
-        self._client.on_connect = lambda client, *_: client.subscribe("gemelo/v1/#", qos=0)
-        self._client.on_message = self._hear
-        self._client.reconnect_delay_set(1, 2)
-        self._client.connect("127.0.0.1", port)
-        self._client.loop_start()
-
-    def close(self) -> None:
-        """Leaves the broker."""
-        self._client.disconnect()
-        stop_loop(self._client)
-
-    def repeat(self, random: Random, count: int) -> None:
-        """Says `count` of the newest frames once more."""
-        self._say(self._some(random, count))
-
-    def garble(self, random: Random, count: int) -> None:
-        """Says `count` of the newest frames with some of their bytes changed."""
-        self._say([(topic, _changed(random, frame)) for topic, frame in self._some(random, count) if frame])
-
-    def noise(self, random: Random, count: int) -> None:
-        """Says `count` frames of random bytes on topics that are in use."""
-        self._say([(topic, random.randbytes(random.randrange(300))) for topic, _ in self._some(random, count)])
-
-    def _some(self, random: Random, count: int) -> list[tuple[str, bytes]]:
-        return [random.choice(self._heard) for _ in range(count) if self._heard]
-
-    def _say(self, frames: list[tuple[str, bytes]]) -> None:
-        for topic, frame in frames:
-            self._client.publish(topic, frame, qos=0)
-
-    def _hear(self, _client: Client, _data: object, message: MQTTMessage) -> None:
-        self._heard.append((message.topic, bytes(message.payload)))
-
-
-class BusStranger:
-    """A participant of the bus that puts what nobody can read on every key."""
-
-    def __init__(self, router_port: int, robot: str, cameras: Sequence[str]) -> None:
-        self._bus = ZenohBus(RouterSection(port=router_port), robot)
-        seen = [make(camera) for camera in cameras for make in CAMERA_TOPICS]
-        actions = [make(action) for action in ACTIONS for make in (feedback_topic, status_topic)]
-        self._keys: list[tuple[str, str, Delivery]] = [
-            (topic.key, topic.message.__name__, topic.delivery) for topic in (*TOPICS, *seen, *actions)
-        ]
-
-    def close(self) -> None:
-        """Leaves the bus."""
-        self._bus.close()
-
-    def noise(self, random: Random) -> None:
-        """Random bytes on every key, under its own schema's name or another."""
-        for key, schema, delivery in self._keys:
-            publication = self._bus.publish(key, random.choice((schema, "", "Nonsense")), delivery)
-            publication.put(random.randbytes(random.randrange(300)))
-            publication.close()
-
-
-def _changed(random: Random, frame: bytes) -> bytes:
-    changed = bytearray(frame)
-    for _ in range(random.randint(1, 4)):
-        changed[random.randrange(len(changed))] = random.randrange(256)
-    return bytes(changed)

@@ -24,7 +24,6 @@ import gemelo
 from schemas.deployment import DeviceKind
 from schemas.system import SetParameter
 from services.chaos.options import add_soak_options
-from services.chaos.person import Person
 from services.chaos.site import ChaosSite, installed_broker
 from services.runtime.deployment import load_deployment
 from services.runtime.endpoints import parameter_request
@@ -94,7 +93,7 @@ def run(seconds: float, seed: int, broker: str, out: Path) -> bool:
     random, samples, failures, moves = Random(seed), dict[str, list[ProcessSample]](), list[str](), 0
     with ChaosSite(out, broker, seed, is_judged=False) as site:
         change_files_often(site.arm, seconds)
-        person, begun = Person(site.arm), time.monotonic()
+        person, begun = site.person, time.monotonic()
         due, told = begun, begun + TOLD_EVERY
         while (now := time.monotonic()) < begun + seconds:
             try:

@@ -59,8 +59,7 @@ def load_deployment(path: Path | None = None, environ: Mapping[str, str] | None 
     """The deployment of `path`, else of $GEMELO_CONFIG, else of deploy/local.toml; its paths are absolute."""
     environ = os.environ if environ is None else environ
     root = project_root()
-    chosen = path or Path(environ.get("GEMELO_CONFIG") or root / DEFAULT_FILE)
-    file = chosen if chosen.is_absolute() or chosen.exists() else root / chosen
+    file = deployment_file(path, environ)
     raw = _read(file)
     _require_known(raw, _defaults(), file, ())
     sources = _override(raw, environ)
@@ -71,6 +70,13 @@ def load_deployment(path: Path | None = None, environ: Mapping[str, str] | None 
         raise DeploymentError(f"{file}{said}: {error}{_choices(str(error))}") from error
     _require_no_nul(raw, file, ())
     return _with_absolute_paths(deployment, root)
+
+
+def deployment_file(path: Path | None, environ: Mapping[str, str]) -> Path:
+    """The file that `load_deployment` reads, whether or not it is there."""
+    root = project_root()
+    chosen = path or Path(environ.get("GEMELO_CONFIG") or root / DEFAULT_FILE)
+    return chosen if chosen.is_absolute() or chosen.exists() else root / chosen
 
 
 def robot_name(deployment: Deployment) -> str:
