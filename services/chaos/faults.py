@@ -134,9 +134,9 @@ FAULTS: tuple[Fault, ...] = (
     Fault("stall link", "connections stay open, nothing passes", stalled, SHORT, healed),
     Fault("stall link long", "connections stay open, nothing passes", stalled, LONG, healed),
     *(
-        Fault(f"nothing {way} the device{length}", "its link is deaf in one direction", deaf(way == "to"), lasts,
-              healed)
-        for way in ("to", "from") for length, lasts in (("", SHORT), (" long", LONG))
+        Fault(f"deaf {end}{length}", f"nothing reaches the {end} over a link that is open", deaf(end == "device"),
+              lasts, healed)
+        for end in ("device", "host") for length, lasts in (("", SHORT), (" long", LONG))
     ),
     Fault("slow link", "every piece is late", slowed, LONG, healed),
     Fault("lossy link", "frames of QoS 0 never arrive", lossy, LONG, healed),

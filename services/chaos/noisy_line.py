@@ -33,6 +33,11 @@ class NoisyLine:
         self._thread = threading.Thread(target=self._run, name="noisy line", daemon=True)
         self._thread.start()
 
+    @property
+    def is_running(self) -> bool:
+        """True until its thread has ended."""
+        return self._thread.is_alive()
+
     def plug(self) -> None:
         """There is a port at the path, as there was before `unplug`."""
         with self._lock:

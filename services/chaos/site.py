@@ -172,13 +172,13 @@ class ChaosSite:
 
     def stands_within(self, seconds: float) -> bool:
         """Waits until the device has made no step for 0.3 s; False if it still makes some after `seconds` [s]."""
-        end = time.monotonic() + seconds
+        end = self.arm.node.monotonic() + seconds
         while True:
             before = self.slots.size
             self.pause(STANDS)
             if not self.steps_since(before):
                 return True
-            if time.monotonic() > end:
+            if self.arm.node.monotonic() > end:
                 return False
 
     def end_twin(self, judge: Callable[[TwinProcess], list[str]]) -> list[str]:

@@ -9,7 +9,7 @@ from argparse import ArgumentParser
 
 import msgspec
 
-from schemas.deployment import Deployment
+from schemas.deployment import Deployment, Wire
 from services.chaos.campaign import Episode, meddled, order, unexpected_hands, words_of
 from services.chaos.faults import FAULTS, Fault
 from services.chaos.main import chosen_faults, possible_faults, unfit
@@ -148,4 +148,19 @@ def test_what_is_done_to_a_process_that_does_not_run_is_left_out():
     assert set(PROCESSES) - set(blind) == {"camera", "detector"}
     left_out = {each.name for each in FAULTS} - {each.name for each in possible_faults(FAULTS, blind)}
     assert left_out == {each.name for each in FAULTS if "camera" in each.name or "detector" in each.name}
-    assert len(left_out) == 8
+    assert len(left_out) == 16
+
+
+def test_every_process_gets_the_signals_of_a_terminal_and_every_one_but_the_device_a_twin():
+    names = {each.name for each in FAULTS}
+    for process in PROCESSES:
+        assert {f"SIGHUP {process}", f"SIGQUIT {process}"} <= names
+    assert {name for name in PROCESSES if f"twin {name}" not in names} == {"virtual_esp32"}
+    by_port = {"router", "broker", "virtual_esp32", "viewer", "panel"}  # which a frozen one keeps
+    assert {name for name in PROCESSES if f"twin of a frozen {name}" not in names} == by_port
+
+
+def test_only_what_is_done_to_a_serial_line_needs_one():
+    on_a_line = {each.name for each in FAULTS if each.wire is Wire.SERIAL}
+    assert on_a_line == {each.name for each in FAULTS if "serial line" in each.name}
+    assert len(on_a_line) == 4

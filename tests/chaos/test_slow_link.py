@@ -8,9 +8,13 @@ from collections.abc import Iterator
 from contextlib import closing
 
 import pytest
+from paho.mqtt.client import Client
+from paho.mqtt.enums import CallbackAPIVersion
 
-from services.chaos.slow_link import SlowLink
+from services.chaos.slow_link import OneWay, SlowLink, Way, client_id_in
+from services.mqtt.client import stop_loop
 from services.stack.stack import free_ports
+from tests.broker.running import VERSIONS
 
 SHORTLY = 0.3  # [s] in which an echo would be back many times
 
@@ -85,6 +89,48 @@ def test_a_stall_keeps_what_is_said_until_it_is_healed(link: SlowLink) -> None:
         link.heal()
         peer.settimeout(5.0)
         assert peer.recv(100) == b"late"
+
+
+def connect_of(version: str, client_id: str) -> bytes:
+    """What paho sends first."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        client = Client(CallbackAPIVersion.VERSION2, client_id=client_id, protocol=VERSIONS[version])
+        client.connect_async("127.0.0.1", server.getsockname()[1])
+        client.loop_start()
+        peer, _ = server.accept()
+        with peer:
+            packet = peer.recv(4096)
+        client.disconnect()
+        stop_loop(client)
+    return packet
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_id_of_a_client_is_read_in_its_first_packet_alone(version: str) -> None:
+    packet = connect_of(version, "gemelo-device-rm1-0a1b")
+    assert client_id_in(packet) == "gemelo-device-rm1-0a1b"
+    assert [client_id_in(piece) for piece in (b"", packet[:9], packet[:-30], b"\x30" + packet[1:])] == [""] * 4
+
+
+def test_a_way_that_stalls_keeps_what_goes_that_way_of_that_client_alone(link: SlowLink) -> None:
+    device, gateway = connect_of("5", "gemelo-device-rm1-0a1b"), connect_of("5", "gemelo-gateway-0a1b")
+    with client(link) as one, client(link) as other:
+        for peer, first in ((one, device), (other, gateway)):
+            peer.settimeout(5.0)
+            peer.sendall(first)
+            assert peer.recv(4096) == first
+        assert link.newest_client("gemelo-device-") == "gemelo-device-rm1-0a1b"
+        assert link.newest_client("nobody-") == ""
+        link.stalled_ways = frozenset({OneWay("gemelo-device-", Way.FROM_BROKER)})
+        for peer in (one, other):
+            peer.sendall(b"there")
+        assert other.recv(100) == b"there"
+        one.settimeout(SHORTLY)
+        with pytest.raises(TimeoutError):
+            one.recv(100)
+        link.heal()
+        one.settimeout(5.0)
+        assert one.recv(100) == b"there"
 
 
 def test_garbling_changes_one_bit_of_a_piece(link: SlowLink) -> None:
