@@ -82,7 +82,7 @@ def test_an_unplugged_line_fails_for_who_has_it_open_and_is_there_again(
 ) -> None:
     host = opened(tmp_path / "tty")
     line.unplug()
-    with pytest.raises(OSError):
+    with pytest.raises(OSError, match="Input/output error"):
         os.write(host, FRAME)
     os.close(host)
     assert not (tmp_path / "tty").is_symlink()
