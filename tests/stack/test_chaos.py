@@ -95,3 +95,25 @@ def test_disks_that_refuse_and_processes_without_a_descriptor_end_no_move(tmp_pa
     report = json.loads((tmp_path / "out/report.json").read_text())
     assert {each["fault"] for each in report["episodes"]} == {"run folder full", "run folder read-only"}
     assert [each["reason"] for each in report["episodes"] if each["ended"] != "succeeded"] == []
+
+
+def test_twins_deafness_flutters_replays_and_a_bad_serial_line_violate_nothing(tmp_path, pytestconfig):
+    names = (
+        "spoiled serial line",
+        "twin stepper_gateway",
+        "deaf device long",
+        "goal and stop",
+        "goal replayed during a move",
+        "SIGHUP stepper_gateway",
+    )
+    command = [sys.executable, "-m", "services.chaos", "--only", *names, "--broker", "embedded", "--seed", str(SEED)]
+    done = subprocess.run(
+        [*command, "--minutes", "0.8", "--out", str(tmp_path / "out")],
+        cwd=pytestconfig.rootpath, capture_output=True, text=True, timeout=200.0,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    report = json.loads((tmp_path / "out/report.json").read_text())
+    faults = [each["fault"] for each in report["episodes"]]
+    assert len(faults) >= 3
+    assert set(faults) <= set(names)
+    assert (report["states_lost"], report["violations"]) == (0, [])
