@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import cast
 
 from msgspec.structs import asdict, replace
@@ -41,6 +41,7 @@ LookUp = Callable[[str, str], Pose]  # (target, source): where the frame `source
 LARGEST = 10.0  # [m] from the base; what is farther was meant in mm
 FASTEST = 5.0  # [m/s] of the tool; what is faster was meant in mm/s
 LONGEST_PLAN = 3600.0  # [s]
+ALLOWED, ALLOWED_OF_A_POINT, MOST_ALLOWED = 5.0, 0.01, 120.0  # [s] for a plan, and for each point that it passes
 FULL = 6  # joints that an arm has at least if it can turn its tool as it likes
 
 
@@ -59,11 +60,18 @@ def request_of(arm: ArmDescription, target: Target, look_up: LookUp) -> PlanRequ
         start=None if start is None else joint_state(arm, start, "from_joints"),
         velocity_scaling=speed,
         acceleration_scaling=_share("acceleration", target.get("acceleration", speed)),
-        allowed_time=_positive("allowed_time", target.get("allowed_time", 5.0), "s", LONGEST_PLAN),
+        allowed_time=_positive("allowed_time", target.get("allowed_time", _usual_time(target)), "s", LONGEST_PLAN),
         clearance=_clearance(target),
         motion=_motion_of(target),
         timing=Timing.TIME_OPTIMAL if target.get("time_optimal") else Timing.JERK_LIMITED,
     )
+
+
+def _usual_time(target: Target) -> float:
+    """[s] that a plan is allowed where nothing is said: more for each point on the way, as far as a planner grants."""
+    via = target.get("via", ())
+    points = len(via) if isinstance(via, Sequence) else 0
+    return min(ALLOWED + ALLOWED_OF_A_POINT * points, MOST_ALLOWED)
 
 
 def ik_request(

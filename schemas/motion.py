@@ -7,6 +7,10 @@ from enum import IntEnum
 
 from schemas.message import Message, Vector
 
+MOST_POINTS = (
+    100_000  # of a trajectory; chosen: half an hour at the gateway's own knots, and the device follows no more
+)
+
 
 class TrajectoryPoint(Message, frozen=True, kw_only=True):
     """One point of a trajectory; `velocities` and `accelerations` may be empty.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cv2
 
-from schemas.camera import CameraCondition
+from schemas.camera import CameraCondition, CameraImage
 from schemas.cell import CameraRecord, FileSource, FolderSource, V4l2Source, VirtualSource
 from schemas.topics import (
     GATEWAY,
@@ -21,11 +21,12 @@ from services.arm.cell.cell_file import Cell
 from services.arm.model.description import ArmDescription
 from services.camera.core import CameraCore
 from services.camera.reader import ClockedReader, ImageReader
-from services.camera.sources.source import CameraSource, EncodedImage
+from services.camera.sources.source import CameraFault, CameraSource, EncodedImage
 from services.camera.sources.stored import FolderOfImages, Video
 from services.camera.sources.v4l2 import V4l2Camera
 from services.camera.virtual.virtual_camera import VirtualCamera, true_detections
 from services.camera.virtual.world import CameraWorld
+from services.runtime.bus.wire import TooLarge
 from services.runtime.node import Node
 from services.runtime.node_clock import NodeClock
 
@@ -95,9 +96,15 @@ class _Camera:
             if isinstance(event, EncodedImage):
                 image = self._core.on_frame(event, now)
                 if image is not None:
-                    self._image.put(image)
+                    self._put(image, now)
             else:
                 self._core.on_fault(event, now)
+
+    def _put(self, image: CameraImage, now: int) -> None:
+        try:
+            self._image.put(image)
+        except TooLarge as error:
+            self._core.on_fault(CameraFault(CameraCondition.REFUSED, f'camera "{self._record.name}": {error}'), now)
 
     def _log(self) -> None:
         """A change of condition, once."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.joints import JointState
-from schemas.motion import JointTrajectory
+from schemas.motion import MOST_POINTS, JointTrajectory
 from schemas.planning import (
     MOST_ATTEMPTS,
     CircularMotion,
@@ -44,6 +44,7 @@ from services.planner.request.refusals import (
     no_path_around,
     scaling_refused,
     timed_out,
+    too_long,
 )
 from services.planner.request.start_state import resolve_start
 from services.planner.timing.profile import JointLimits, joint_limits
@@ -150,6 +151,8 @@ class Planner:
             finished, planner_id = self._waypoints.plan(request.goal, context)
         else:
             finished, planner_id = self._found(context)
+        if len(finished.trajectory.points) > MOST_POINTS:
+            raise too_long(len(finished.trajectory.points))
         self._hold_against_newest(finished.trajectory, deadline)
         return PlanResponse(
             code=PlanCode.SUCCESS,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+TOO_LARGE = "too large"  # the kind of a refusal of what no receiver would take
+
 
 class BusError(Exception):
     """The bus cannot be used: no router, a name that is taken, a bus that is closed."""

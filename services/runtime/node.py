@@ -42,6 +42,7 @@ from services.runtime.endpoints import (
     parameters_request,
 )
 from services.runtime.errors import NodeNameTaken
+from services.runtime.loop.failures import Failures
 from services.runtime.loop.loop import Loop
 from services.runtime.loop.task_queue import Worker
 from services.runtime.parameters import ParameterRegistry, ParameterSet
@@ -94,7 +95,8 @@ class Node:
         self.log = line_logger(name, log_level)
         self._signals = stop is None
         self._stop = stop or ShutdownRequest()
-        self._loop = Loop(self._stop, self.clock)
+        # A script's own error ends it where it happens; a service goes on, as others depend on it.
+        self._loop = Loop(self._stop, self.clock, None if self._signals else Failures(self.log).take)
         self._worker = Worker(self.clock)
         self.unwritten = UnwrittenFiles(self.log.warning)
         self._readiness: Readiness | None = None
@@ -322,7 +324,8 @@ class Node:
     def spin(self, step: Callable[[int], object] = lambda now: None, rate: float = 50.0) -> None:
         """Calls `step(now [ns])` at `rate` [Hz], with queued tasks between, until SIGTERM, SIGINT or `stop()`.
 
-        What a handler or the step raises is logged and ends the spin.
+        What the step raises is logged and ends the spin; so does what a handler raises, but in a service, which
+        logs it and goes on.
         """
         self._loop.every(BEAT, self._beat)
         if not self._signals:

@@ -11,7 +11,7 @@ from schemas.system import TopicStatistics
 from schemas.topics import ANY, Delivery, Topic
 from services.runtime.bus.branches import is_by_every_node, name_in
 from services.runtime.bus.interface import Arrival, Bus
-from services.runtime.bus.wire import from_arrival, schema_of, to_payload
+from services.runtime.bus.wire import Encoded, encoded, from_arrival, schema_of
 from services.runtime.clock import SYSTEM, Clock
 from services.runtime.loop.loop import Loop
 from services.runtime.loop.task_queue import ArrivalQueue, EveryQueue, LatestQueue, UnreadQueue
@@ -37,11 +37,20 @@ class Publisher(Generic[M]):
         signed = instance if topic.delivery is Delivery.LATCHED else ""
         self._publication = bus.publish(topic.key, schema_of(topic.message), topic.delivery, writer, signed)
 
-    def put(self, message: M) -> None:
-        """Raises `TypeError` for another message than the table's, `BadMessage` where it is too large."""
-        if type(message) is not self.topic.message:
-            raise TypeError(f"{self.topic.key} carries {schema_of(self.topic.message)}, not {type(message).__name__}")
-        self._publication.put(to_payload(message))
+    def put(self, message: M | Encoded[M]) -> None:
+        """Raises `TypeError` for another message than the table's, `TooLarge` where it is too large.
+
+        With one that was `encoded` before, as a message of what has changed is, neither can happen after the change.
+        """
+        self._publication.put(self.encoded(message).payload)
+
+    def encoded(self, message: M | Encoded[M]) -> Encoded[M]:
+        """What `put` would send; raises as it does."""
+        ready = encoded(message)
+        if type(ready.message) is not self.topic.message:
+            found = type(ready.message).__name__
+            raise TypeError(f"{self.topic.key} carries {schema_of(self.topic.message)}, not {found}")
+        return ready
 
 
 class Subscription(Generic[M]):
@@ -121,9 +130,9 @@ class Subscription(Generic[M]):
         self._received += 1
         if self._on_signed is not None:
             is_latched = self.topic.delivery is Delivery.LATCHED
-            self._on_signed(message, arrival.instance if is_latched else arrival.writer)
+            self._loop.carry_out(self._on_signed, message, arrival.instance if is_latched else arrival.writer)
         else:
-            self._handler(message)
+            self._loop.carry_out(self._handler, message)
 
     def _require_writer(self, arrival: Arrival) -> None:
         """Raises `BadMessage` for a latched message of a stranger, which would stay valid until the writer's next.

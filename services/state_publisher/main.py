@@ -7,12 +7,14 @@ from typing import Annotated
 import msgspec
 
 from schemas.deployment import Deployment
+from schemas.errors import ConfigurationError
 from schemas.frames import RobotDescription
 from schemas.joints import JointState
 from schemas.text_file import read_text
 from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
 from services.arm.model.description import ArmDescription, load_arm
 from services.runtime.application import service
+from services.runtime.bus.wire import TooLarge
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.state_publisher.core import StatePublisher
@@ -43,7 +45,10 @@ def run(node: Node, deployment: Deployment) -> None:
     parameters = node.parameters(StatePublisherParameters)
     states = node.latest(JOINT_STATES)
     frames = node.publisher(FRAMES)
-    node.publisher(DESCRIPTION).put(describe(arm))
+    try:
+        node.publisher(DESCRIPTION).put(describe(arm))
+    except TooLarge as error:
+        raise ConfigurationError(f"{arm.folder}: its files cannot be published: {error}") from error
     node.publisher(STATIC_FRAMES).put(publisher.static_frames(node.now()))
 
     def on_joint_state(state: JointState) -> None:

@@ -56,7 +56,7 @@ class InputLog:
             self._number += 1
             self._given, self._size = [], 0
         self.is_on = is_on
-        if self._given and (moment.monotonic - self._first.monotonic >= PERIOD or self._size >= LARGE):
+        if self._given and moment.monotonic - self._first.monotonic >= PERIOD:
             self._close_message()
         if moment.monotonic - self._began >= HELD_BACK:
             self._publish_waiting()
@@ -73,6 +73,8 @@ class InputLog:
         encoded = self._encode(Given(moment.unix, moment.monotonic, digest, given))
         self._given.append(encoded)
         self._size += len(encoded)
+        if self._size >= LARGE:  # at once: so a message has at most one large input, and that much beside it
+            self._close_message()
 
     def _close_message(self) -> None:
         self._waiting.append(

@@ -200,13 +200,33 @@ def test_what_a_thread_still_holds_at_the_end_is_not_called_a_leak(start: Start)
     assert end(process) == (0, "")
 
 
-def test_a_callback_that_raises_ends_the_process_with_one_report(start: Start, router: RouterProcess) -> None:
+def test_a_step_that_raises_ends_the_process_with_one_report(start: Start) -> None:
+    process = start(
+        """
+        def fail(now):
+            raise ZeroDivisionError("oh")
+
+        service("failing", lambda node, deployment: node.spin(fail))
+        """
+    )
+    _, errors = process.communicate(timeout=PROMPT)
+    assert process.returncode == 1
+    assert "failing ERROR ended by an error" in errors
+    assert errors.count("ZeroDivisionError: oh") == 1
+
+
+def test_a_callback_that_raises_is_reported_and_the_service_goes_on(start: Start, router: RouterProcess) -> None:
     process = start(
         """
         def fail(message):
+            print("called", message.stamp, flush=True)
+            if message.stamp == 3:
+                node_.stop()
             raise ZeroDivisionError("oh")
 
         def run(node, deployment):
+            global node_
+            node_ = node
             node.subscribe(JOINT_STATES, fail)
             print("spins", flush=True)
             node.spin()
@@ -216,12 +236,12 @@ def test_a_callback_that_raises_ends_the_process_with_one_report(start: Start, r
     )
     await_line(process, "spins")
     with Node("writer", router.deployment, robot="rm1") as writer:
-        while process.poll() is None:
-            writer.publisher(JOINT_STATES).put(JOINT_STATES.message())
-            time.sleep(0.02)
+        for stamp in (1, 2, 3):
+            writer.publisher(JOINT_STATES).put(JOINT_STATES.message(stamp=stamp))
+            await_line(process, f"called {stamp}")
         _, errors = process.communicate(timeout=PROMPT)
-    assert process.returncode == 1
-    assert "failing ERROR ended by an error" in errors
+    assert process.returncode == 0
+    assert "failing ERROR a handler failed; what it was given is lost, and the service goes on" in errors
     assert errors.count("ZeroDivisionError: oh") == 1
 
 

@@ -60,7 +60,8 @@ def between(states: States, parts: int) -> Samples:
 
 def _near_enough(run: Run, deadline: Deadline) -> States:
     """With points so dense that what is executed is not off the path."""
-    times = run.law.times(run.marks, max(SPACING, run.law.duration / MOST_POINTS))
+    most = max(MOST_POINTS, len(run.marks))  # wider apart they would not follow what is between the marks
+    times = run.law.times(run.marks, max(SPACING, run.law.duration / most))
     states, doubtful = _states(run, times), np.arange(len(times) - 1)
     for _ in range(HALVINGS):
         bad = doubtful if run.error is None else _off(run, states, doubtful, deadline)

@@ -28,6 +28,7 @@ from services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
+MOST_CONTACTS = 500  # that are told of one configuration; chosen: a person reads ten, and they fit into a message
 MANY = 2000  # triangles; chosen: one distance then takes as long as a thousand others
 Positions = Sequence[float] | Array
 
@@ -161,12 +162,15 @@ class World:
         return list(dict.fromkeys(near))
 
     def contacts(self, positions: Positions, margin: float = 0.0) -> list[Contact]:
-        """The pairs nearer than `margin` [m] with their distance and the point between them, the nearest first."""
+        """The pairs nearer than `margin` [m] with their distance and the point between them, the nearest first, and
+        `MOST_CONTACTS` at most."""
         found: dict[LinkPair, Contact] = {}
         for index, distance in sorted(self._near(positions, margin), key=lambda near: near[1]):
             pair = self.geometry.names[index]
             point = self._point_between(index)
             found.setdefault(pair, Contact(first=pair[0], second=pair[1], distance=distance, point=point))
+            if len(found) == MOST_CONTACTS:
+                break
         return list(found.values())
 
     def _place(self, positions: Positions) -> None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 
+import msgspec
+
 from schemas.joints import JointState, JointTargets
 from schemas.message import encode
 from schemas.planning import JogCommand, JogInputs, JogStatus, JogTaken, JogTick, SceneVersion
 
 MOST = 25  # inputs of one message; chosen: half a second of periods
+LARGE = 256 * 1024  # [bytes] of one message; chosen: a command may be as large as any message (bus/wire.py)
 DIGEST = 8  # [B] chosen: two periods of one jog differ by chance once in 2^64
 
 
@@ -23,6 +26,7 @@ class JogLog:
         self._publish, self._is_on = publish, is_on
         self._inputs: list[JogTaken | JogTick] = []
         self._number, self._stamp, self._has_gap = 0, 0, False
+        self._size = 0  # [bytes] of the inputs
         self._told: SceneVersion | None = None  # the scene of the tick before
 
     def taken(self, now: float, command: JogCommand, client: str, begins: bool, stamp: int) -> None:
@@ -49,14 +53,18 @@ class JogLog:
         """Publishes what is left: the jog stands."""
         if self._inputs:
             self._publish(JogInputs(stamp=self._stamp, number=self._number, inputs=tuple(self._inputs)))
-            self._number, self._inputs = self._number + 1, []
+            self._number, self._inputs, self._size = self._number + 1, [], 0
 
     def _add(self, given: JogTaken | JogTick, stamp: int) -> None:
         if not self._is_on():
-            self._inputs, self._told, self._has_gap = [], None, True
+            self._inputs, self._size, self._told, self._has_gap = [], 0, None, True
             return
         self._number, self._has_gap = self._number + self._has_gap, False
         self._stamp = self._stamp if self._inputs else stamp
+        size = len(msgspec.msgpack.encode(given))
+        if self._size + size > LARGE:
+            self.finish()
+        self._size += size
         self._inputs.append(given)
         if len(self._inputs) >= MOST:
             self.finish()

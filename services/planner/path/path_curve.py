@@ -13,6 +13,7 @@ from services.planner.path.curve import Derivatives
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
+NEAR = 0.1  # of the blend: a point so near to the one before is passed with it; chosen: a tenth of what may be cut
 NO_LENGTH = 1e-7  # [m] a leg that is shorter is none; chosen: far below a motor step
 
 
@@ -78,6 +79,9 @@ class RoundedLines:
         self._directions = np.diff(configurations, axis=0) / lengths[:, None]
         self._radii = radii
         inner = self._corners[1:-1]
+        self._between = 0.5 * (
+            inner[1:] - radii[1:] + inner[:-1] + radii[:-1]
+        )  # where one cut has ended, and the next not begun
         self.marks = np.unique(np.concatenate((inner - radii, inner + radii, self._corners[[0, -1]])))
         self.knots = np.unique(np.concatenate((self.marks, inner)))
 
@@ -88,13 +92,17 @@ class RoundedLines:
         first = self._directions[leg].copy()
         value = self._configurations[leg] + (along - self._corners[leg])[:, None] * first
         second, third = np.zeros_like(first), np.zeros_like(first)
-        for index, radius in enumerate(self._radii.tolist()):
-            near = np.abs(along - self._corners[index + 1]) < radius
-            coming, leaving = self._directions[index : index + 2]
-            width, change = 2.0 * radius, (leaving - coming)[None, :]
-            offset = (along[near] - self._corners[index + 1])[:, None]
+        if len(self._radii):
+            corner = np.clip(
+                np.searchsorted(self._between, along), 0, len(self._radii) - 1
+            )  # the nearest: cuts meet there
+            offset, radius = along - self._corners[corner + 1], self._radii[corner]
+            near = np.flatnonzero(np.abs(offset) < radius)
+            corner, offset, radius = corner[near], offset[near, None], radius[near, None]
+            coming, leaving = self._directions[corner], self._directions[corner + 1]
+            width, change = 2.0 * radius, leaving - coming
             u = (offset + radius) / width
-            value[near] = self._configurations[index + 1] + offset * coming + width * blending(u) * change
+            value[near] = self._configurations[corner + 1] + offset * coming + width * blending(u) * change
             first[near] = coming + u * u * (3.0 - 2.0 * u) * change
             second[near] = 6.0 * u * (1.0 - u) / width * change
             third[near] = (6.0 - 12.0 * u) / width**2 * change
@@ -108,6 +116,7 @@ def rounded_runs(configurations: Array, scale: Array, reach: Array, blend: float
     A corner is cut only as far as no point of the arm leaves it by more than `blend` [m], by how far it can move at
     most per unit of each joint, `reach` (n,).
     """
+    configurations = _apart(configurations, reach, NEAR * blend)
     lengths = np.linalg.norm(np.diff(configurations, axis=0) / scale, axis=1)
     keep = lengths > NO_LENGTH
     configurations, lengths = np.vstack((configurations[:1], configurations[1:][keep])), lengths[keep]
@@ -123,6 +132,17 @@ def rounded_runs(configurations: Array, scale: Array, reach: Array, blend: float
         RoundedLines(configurations[low : high + 1], lengths[low:high], np.array(radii[low : high - 1]))
         for low, high in pairwise(stops)
     ]
+
+
+def _apart(configurations: Array, reach: Array, least: float) -> Array:
+    """Without the rows (n,) at which no point of the arm is farther than `least` [m] from the row kept before."""
+    if least <= 0.0:
+        return configurations
+    kept = [0]
+    for row in range(1, len(configurations) - 1):
+        if float(np.abs(configurations[row] - configurations[kept[-1]]) @ reach) > least:
+            kept.append(row)
+    return configurations[[*kept, len(configurations) - 1]]
 
 
 def _end_slope(knots: Array, values: Array) -> Array:

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 
 from schemas.message import Vector
-from schemas.planning import PlanCode, Refusal
+from schemas.motion import MOST_POINTS
+from schemas.planning import PlanCode, PlanResponse, Refusal
 from schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
 from services.arm.errors import nearest_name, suggestion
 from services.arm.model.description import ArmDescription, Joint
@@ -44,6 +45,30 @@ def timed_out() -> PlanRefused:
         "no plan was found within the time allowed",
         "allow more time, or ask for a goal nearer to where the arm is",
         check="allowed time",
+    )
+
+
+def too_long(points: int) -> PlanRefused:
+    """The refusal of a plan whose trajectory has more points than a goal may have."""
+    return PlanRefused(
+        PlanCode.PLANNING_FAILED,
+        Refusal(
+            check="points",
+            subject="trajectory",
+            value=float(points),
+            limit=float(MOST_POINTS),
+            message=f"the trajectory has {points} points, more than the {MOST_POINTS} that are followed",
+            remedy="split the path, and plan its parts one after the other",
+        ),
+    )
+
+
+def too_large(reason: str) -> PlanResponse:
+    """The answer in place of one that cannot be sent, as `reason` says with its size and limit."""
+    size, _, remedy = reason.partition("; ")
+    return PlanResponse(
+        code=PlanCode.PLANNING_FAILED,
+        refusal=Refusal(check="size", subject="trajectory", message=f"the plan is too large: {size}", remedy=remedy),
     )
 
 

@@ -10,8 +10,10 @@ from msgspec.structs import replace
 from schemas.planning import PlanCancel, PlanCancelResult, PlanCode, PlanInputs, PlanProgress, PlanRequest, PlanResponse
 from schemas.topics import PLAN, PLAN_CANCEL, PLAN_INPUTS, PLAN_PROGRESS, PLANNED_PATH
 from services.planner.core import Planner
+from services.planner.request.refusals import too_large
 from services.planner.scene.scene_keeper import SceneKeeper
 from services.planner.workers.pending_plan import Answer, OnInputs
+from services.runtime.bus.wire import TooLarge, encoded
 from services.runtime.node import Node
 from services.runtime.requests.server import Pending
 
@@ -33,6 +35,15 @@ class PlanMaker(Protocol):
         ...
 
     def close(self) -> None: ...
+
+
+def sendable(response: PlanResponse) -> PlanResponse:
+    """The response, or a refusal where it is too large: a path that nobody is given is not shown either."""
+    try:
+        encoded(response)
+    except TooLarge as error:
+        return too_large(str(error))
+    return response
 
 
 class PlanService:
@@ -67,6 +78,7 @@ class PlanService:
         return self._workers.cancel(request.request_id)
 
     def _answer(self, response: PlanResponse, pending: Pending[PlanResponse], began: float, inputs: PlanInputs) -> None:
+        response = sendable(response)
         if response.code is PlanCode.SUCCESS:
             self._path.put(self._planner.planned_path(response.trajectory, self._node.now()))
         elif response.refusal is not None:

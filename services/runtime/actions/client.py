@@ -25,6 +25,7 @@ Q = TypeVar("Q", bound=Message)
 A = TypeVar("A", bound=Message)
 
 PAUSE = 0.05  # [s] between two tries
+PACE = 2e6  # [bytes/s] at which a goal is sent, read and looked at, at the least; chosen: a busy small computer
 ATTEMPT = 1.0  # [s] of one try to send a goal; further tries carry the same id, so it is accepted once
 
 
@@ -55,23 +56,26 @@ class ActionClient(Generic[G, F, R]):
         timeout: float = 2.0,
         attached: bool = False,
     ) -> GoalHandle[F, R]:
-        """Sends a goal, blocks up to `timeout` [s] for the decision; raises `GoalRefused`, `Refused`, `NoAnswer`.
+        """Sends a goal, blocks up to `timeout` [s] for the decision, and longer for a large one.
+
+        Raises `GoalRefused`, `Refused`, `NoAnswer`.
 
         An `attached` goal is cancelled by the server when this node disappears, by its end or by the network's.
         """
-        goal_id = token(self._bus.clock)
+        goal_id, raw = token(self._bus.clock), _raw(goal)
+        more = len(bytes(raw)) / PACE
         handle: GoalHandle[F, R] = GoalHandle(self.action, goal_id, self._bus, self._loop, on_feedback)
         self._handles[goal_id] = handle
         end, number = (
-            self._bus.clock.monotonic() + timeout,
+            self._bus.clock.monotonic() + timeout + more,
             self._bus.take_number(),
         )  # one for all: no try overtakes a stop
         try:
             epoch = self._ask(keys.result_request(self.action), ResultRequest(), end).epoch
             request = GoalRequest(
-                goal_id=goal_id, client=self._client, goal=_raw(goal), attached=attached, epoch=epoch
+                goal_id=goal_id, client=self._client, goal=raw, attached=attached, epoch=epoch
             )  # fmt: skip
-            response = self._ask(keys.goal_request(self.action), request, end, number)
+            response = self._ask(keys.goal_request(self.action), request, end, number, ATTEMPT + more)
         except (NoAnswer, KeyboardInterrupt):
             handle.cancel()  # it may have been accepted all the same
             del self._handles[goal_id]
@@ -101,10 +105,13 @@ class ActionClient(Generic[G, F, R]):
             if handle.is_over:
                 del self._handles[handle.goal_id]
 
-    def _ask(self, request: Request[Q, A], question: Q, end: float, number: int = 0) -> A:
-        """Asks until it is answered; raises `NoAnswer` after `end` [s] monotonic. `number` as that of `Bus.ask`."""
+    def _ask(self, request: Request[Q, A], question: Q, end: float, number: int = 0, attempt: float = ATTEMPT) -> A:
+        """Asks until it is answered, `attempt` [s] each time; raises `NoAnswer` after `end` [s] monotonic.
+
+        `number` as that of `Bus.ask`.
+        """
         while True:
-            left = max(0.05, min(ATTEMPT, end - self._bus.clock.monotonic()))
+            left = max(0.05, min(attempt, end - self._bus.clock.monotonic()))
             try:
                 return requests.call(self._bus, request, question, left, number)
             except NoAnswer:

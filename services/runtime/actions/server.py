@@ -26,7 +26,7 @@ from services.runtime.bus.identity import is_token
 from services.runtime.client_watch import ClientWatch
 from services.runtime.clock import SYSTEM, Clock
 from services.runtime.errors import RequestRefused
-from services.runtime.requests.server import Pending, RequestServer
+from services.runtime.requests.server import Pending, RequestServer, shortened
 from services.runtime.topics import Publisher, Warn
 
 G = TypeVar("G", bound=Message)
@@ -34,6 +34,7 @@ F = TypeVar("F", bound=Message)
 R = TypeVar("R", bound=Message)
 
 EARLY_CANCEL_KEPT = 2.0  # [s] that a goal may come after its own cancel, which overtakes what waits
+LONGEST_NAME = 256  # characters of a goal's id and of its client's token; chosen: ours have 32 and some 60
 MAX_EARLY_CANCELS = 256  # such cancels that are remembered
 
 
@@ -153,6 +154,10 @@ class ActionServer(Generic[G, F, R]):
     def _decide(self, request: GoalRequest, session: str) -> GoalResponse:
         if not request.goal_id:
             raise RequestRefused(f"{self.action.key}: a goal needs an id", "bad request")
+        for what, text in (("its id", request.goal_id), ("the name of its client", request.client)):
+            if len(text) > LONGEST_NAME:
+                found = f"{what} has {len(text)} characters: at most {LONGEST_NAME}"
+                raise RequestRefused(f"{self.action.key}: {found}; give a shorter one", "bad request")
         if request.attached and not is_token(request.client):  # whose end nobody would ever see
             wanted_token = "an attached goal names the liveliness token of its client"
             raise RequestRefused(f'{self.action.key}: {wanted_token}, not "{request.client[:80]}"', "bad request")
@@ -171,7 +176,8 @@ class ActionServer(Generic[G, F, R]):
             decision = self._on_goal(request.goal_id, wanted)
         finally:
             if not decision.accepted:
-                refusal = GoalResponse(code=decision.code, reason=decision.reason, stamp=self._clock.unix())
+                reason = shortened(decision.reason)
+                refusal = GoalResponse(code=decision.code, reason=reason, stamp=self._clock.unix())
                 response = self._goals.refuse(request.goal_id, refusal)
         if decision.accepted and request.attached and not goal.status.is_terminal:
             self._clients.add(request.goal_id, request.client, self._clock.monotonic())
@@ -200,7 +206,7 @@ class ActionServer(Generic[G, F, R]):
             return f"it has ended as {known.status.name}"
         now = self._clock.monotonic()
         self._cancelled_early = {key: at for key, at in self._cancelled_early.items() if now - at < EARLY_CANCEL_KEPT}
-        if len(self._cancelled_early) < MAX_EARLY_CANCELS:
+        if len(self._cancelled_early) < MAX_EARLY_CANCELS and len(goal_id) <= LONGEST_NAME:
             self._cancelled_early[goal_id] = now
         return "no such goal is known here; one of that name that comes within 2 s is refused"
 

@@ -52,6 +52,11 @@ class Query(Protocol):
         ...
 
     @property
+    def size(self) -> int:
+        """[bytes] of its payload, which need not be read for it."""
+        ...
+
+    @property
     def client(self) -> str:
         """The session that asks, by a name that it alone can give; empty where it does not say."""
         ...

@@ -139,7 +139,7 @@ class MemoryQuery:
         clock: Clock = SYSTEM,
     ) -> None:
         """`timeout` in [s]; `on_answer` is called once, with None after it."""
-        self.arrival, self.client, self.number = arrival, client, number
+        self.arrival, self.client, self.number, self.size = arrival, client, number, len(arrival.payload)
         self._on_answer = on_answer
         self._lock = threading.Lock()
         self._is_open = True

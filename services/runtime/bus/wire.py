@@ -1,25 +1,61 @@
-"""Messages to payloads and back, refusing what is not what it claims to be."""
+"""Messages to payloads and back, refusing what is not what it claims to be, or is too large: THE place of both.
+
+Whoever changes a state and publishes it encodes first (`encoded`): what cannot be sent is refused before anything has
+changed.
+"""
 
 from __future__ import annotations
 
-from typing import TypeVar
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
+from schemas.actions import GoalRequest
 from schemas.camera import CameraImage
 from schemas.device import GatewayInputs
 from schemas.frames import RobotDescription
 from schemas.message import BadMessage, Message, decode, encode
+from schemas.planning import PlanRequest, PlanResponse
+from schemas.scene import SceneRequest
 from schemas.system import Exchange
 from services.runtime.bus.interface import Arrival
 
 M = TypeVar("M", bound=Message)
 
-MAX_PAYLOAD = 512 * 1024  # [bytes] a trajectory of 6 joints and 2,000 points is half of this
+KILOBYTE, MEGABYTE = 1024, 1024 * 1024
+MAX_PAYLOAD = 512 * KILOBYTE  # of all that is neither a list of points nor a file nor an image
+TRAJECTORY = 32 * MEGABYTE  # the 100,000 points that the gateway takes, of eight joints, are 28
 MAX_PAYLOAD_OF: dict[str, int] = {  # [bytes]
-    RobotDescription.__name__: 8 * 1024 * 1024,  # URDF text
-    GatewayInputs.__name__: 2 * 1024 * 1024,  # the largest goal, and all that has come beside it
-    CameraImage.__name__: 8 * 1024 * 1024,  # 1920 x 1080 in rgb8 is 6.2 million
-    Exchange.__name__: 2 * MAX_PAYLOAD + 64 * 1024,  # a question, its answer, and who asked
+    RobotDescription.__name__: 8 * MEGABYTE,  # URDF text
+    CameraImage.__name__: 8 * MEGABYTE,  # 1920 x 1080 in rgb8 is 6.2 million
+    PlanRequest.__name__: 8 * MEGABYTE,  # 10,000 goals on the way, of eight joints, are 2
+    PlanResponse.__name__: TRAJECTORY,
+    GoalRequest.__name__: TRAJECTORY,
+    SceneRequest.__name__: TRAJECTORY,  # the file of a mesh: 500,000 triangles are 25
+    GatewayInputs.__name__: TRAJECTORY + 2 * MEGABYTE,  # the largest goal, and all that has come beside it
+    Exchange.__name__: TRAJECTORY + 9 * MEGABYTE,  # a question, its answer (one of them is small), and who asked
 }
+LARGEST = max(MAX_PAYLOAD_OF.values())
+REMEDY_OF: dict[str, str] = {
+    PlanRequest.__name__: "split the path, and plan its parts one after the other",
+    PlanResponse.__name__: "split the path, and plan its parts one after the other",
+    GoalRequest.__name__: "send the trajectory in parts",
+    SceneRequest.__name__: "add the objects one by one, and simplify their meshes",
+    RobotDescription.__name__: "simplify the URDF",
+    CameraImage.__name__: "choose a smaller image",
+}
+ANY_REMEDY = "send it in parts"
+
+
+class TooLarge(BadMessage):
+    """A message that no receiver would take; the text has its size, the limit and the remedy."""
+
+
+@dataclass(frozen=True, slots=True)
+class Encoded(Generic[M]):
+    """A message that can be sent, as it travels: its encoding cannot fail any more."""
+
+    message: M
+    payload: bytes
 
 
 def schema_of(kind: type[Message]) -> str:
@@ -27,10 +63,15 @@ def schema_of(kind: type[Message]) -> str:
     return kind.__name__
 
 
+def encoded(message: M | Encoded[M]) -> Encoded[M]:
+    """The message with its payload, which is made once; raises `TooLarge` where a receiver would refuse the size."""
+    return message if isinstance(message, Encoded) else Encoded(message, to_payload(message))
+
+
 def to_payload(message: Message) -> bytes:
-    """Raises `BadMessage` where a receiver would refuse the size."""
+    """Raises `TooLarge` where a receiver would refuse the size."""
     payload = encode(message)
-    _check_size(type(message), len(payload))
+    _check_size(schema_of(type(message)), len(payload))
     return payload
 
 
@@ -38,11 +79,17 @@ def from_arrival(kind: type[M], arrival: Arrival) -> M:
     """The message; raises `BadMessage` for another schema, a payload too large, or one that does not decode."""
     if arrival.schema != schema_of(kind):
         raise BadMessage(f'schema "{arrival.schema}" where {schema_of(kind)} is spoken')
-    _check_size(kind, len(arrival.payload))
+    _check_size(arrival.schema, len(arrival.payload))
     return decode(kind, arrival.payload)
 
 
-def _check_size(kind: type[Message], size: int) -> None:
-    limit = MAX_PAYLOAD_OF.get(schema_of(kind), MAX_PAYLOAD)
+def limit_of(schema: str) -> int:
+    """[bytes] that a message of this schema may have."""
+    return MAX_PAYLOAD_OF.get(schema, MAX_PAYLOAD)
+
+
+def _check_size(schema: str, size: int) -> None:
+    limit = limit_of(schema)
     if size > limit:
-        raise BadMessage(f"{size} bytes: a {schema_of(kind)} has at most {limit}")
+        remedy = REMEDY_OF.get(schema, ANY_REMEDY)
+        raise TooLarge(f"{size} bytes: a {schema} has at most {limit}; {remedy}")

@@ -7,13 +7,14 @@ import json
 import zenoh
 
 from schemas.deployment import RouterSection
+from services.runtime.bus.wire import LARGEST
 
 LEASE_MS = 1000  # a frozen or unplugged peer is seen after this
 OPEN_TIMEOUT_MS = 1000  # a router that takes a connection but does not answer (frozen) is tried anew after this
 # A put of EVERY waits this long for a stalled reader, then the link is dropped. Not as long as the lease: where both
 # end a link in the same instant, the session sometimes never comes back (seen with Zenoh 1.10.2).
 LONGEST_BLOCK_US = 500_000
-MAX_MESSAGE_BYTES = 16 * 1024 * 1024
+MAX_MESSAGE_BYTES = LARGEST + 1024 * 1024  # with key, encoding and attachment
 
 
 def client_config(router: RouterSection, robot: str = "") -> zenoh.Config:

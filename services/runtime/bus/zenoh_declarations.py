@@ -54,6 +54,7 @@ class ZenohQuery:
         """`key` is what is served, `principal` who asks."""
         self._query, self._key, self.principal = query, key, principal
         self.client, self.number = asker(bytes(query.attachment or b""), principal)
+        self.size = 0 if query.payload is None else len(query.payload)
 
     @cached_property
     def arrival(self) -> Arrival:

@@ -71,8 +71,13 @@ class PeriodicTask:
 class Loop:
     """Runs in one thread at a time: by `spin` and `wait`, or turn by turn by a clock of virtual time."""
 
-    def __init__(self, stop: ShutdownRequest, clock: Clock = SYSTEM) -> None:
+    def __init__(
+        self, stop: ShutdownRequest, clock: Clock = SYSTEM, on_failure: Callable[[Exception], object] | None = None
+    ) -> None:
+        """`on_failure` takes what a handler or task raises, which ends the loop otherwise; what the step raises does in
+        any case."""
         self.clock = clock
+        self._on_failure = on_failure
         self.tasks = TaskQueue()
         self._periodic_tasks: list[PeriodicTask] = []
         self._thread: int | None = None
@@ -89,6 +94,15 @@ class Loop:
         self._periodic_tasks = [*self._periodic_tasks, PeriodicTask(period, task)]
         if self._is_driven:
             self.tasks.wake()
+
+    def carry_out(self, work: Callable[..., object], *arguments: object) -> None:
+        """Calls `work(*arguments)`: a handler or a task."""
+        try:
+            work(*arguments)
+        except Exception as error:
+            if self._on_failure is None:
+                raise
+            self._on_failure(error)
 
     def forget(self, task: Task) -> None:
         """Ends an `every`."""
@@ -224,11 +238,11 @@ class Loop:
         for periodic in self._periodic_tasks:
             if now >= periodic.due:
                 periodic.due = now + periodic.period
-                periodic.task()
+                self.carry_out(periodic.task)
             due = min(due, periodic.due)
         task = self.tasks.take(min(until, due) - now)
         if task is not None:
-            task()
+            self.carry_out(task)
 
     @contextmanager
     def _in_this_thread(self) -> Iterator[None]:

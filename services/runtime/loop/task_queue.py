@@ -17,7 +17,7 @@ from services.runtime.bus.interface import Arrival
 from services.runtime.clock import SYSTEM, Clock
 
 EVERY_CAPACITY = 4096  # messages
-EVERY_BYTES = 64 * 1024 * 1024
+EVERY_BYTES = 96 * 1024 * 1024  # chosen: two of the largest messages (bus/wire.py) fit
 
 Task = Callable[[], None]
 

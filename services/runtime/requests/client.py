@@ -9,8 +9,8 @@ from schemas.message import BadMessage, Message
 from schemas.system import Failure
 from schemas.topics import Request
 from services.runtime.bus.interface import UNREAD, Arrival, Bus, BusReply
-from services.runtime.bus.wire import from_arrival, schema_of, to_payload
-from services.runtime.errors import NoAnswer, RequestRefused
+from services.runtime.bus.wire import TooLarge, from_arrival, schema_of, to_payload
+from services.runtime.errors import TOO_LARGE, NoAnswer, RequestRefused
 from services.runtime.loop.task_queue import Task
 from services.runtime.requests.limits import DEBT, OF_A_CLIENT
 
@@ -40,12 +40,13 @@ class PendingCall(Generic[Q, R]):
     ) -> None:
         """Sends the request, with `timeout` [s] for its reply; `wake` is then called from another thread.
 
-        Raises `NoAnswer` where no node serves the request within `appearance` [s]; with 0 it is sent in any case.
+        Raises `RequestRefused` where the question is too large to be sent, and `NoAnswer` where no node serves the
+        request within `appearance` [s]; with 0 it is sent in any case.
         """
         self._bus, self._request, self._wake = bus, request, wake
         self._timeout, self._tries = timeout, 0
         self._answers: SimpleQueue[BusReply | None] = SimpleQueue()
-        self._payload, self._number = to_payload(question), number or bus.take_number()
+        self._payload, self._number = _payload_of(question), number or bus.take_number()
         if appearance and not bus.wait_served(request.key, min(timeout, appearance)):
             raise NoAnswer(_nobody(bus, request))
         self._end = bus.clock.monotonic() + timeout
@@ -95,6 +96,14 @@ class PendingCall(Generic[Q, R]):
 def call(bus: Bus, request: Request[Q, R], question: Q, timeout: float, number: int = 0) -> R:
     """The answer; blocks up to `timeout` [s]. Raises `RequestRefused` or `NoAnswer`; `number` as that of `Bus.ask`."""
     return PendingCall(bus, request, question, timeout, lambda: None, number).response()
+
+
+def _payload_of(question: Message) -> bytes:
+    """What is too large to be sent is refused here as by its server: whoever asks handles one exception."""
+    try:
+        return to_payload(question)
+    except TooLarge as error:
+        raise RequestRefused(str(error), TOO_LARGE) from error
 
 
 def response_in(request: Request[Q, R], answer: BusReply) -> R:

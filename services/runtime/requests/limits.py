@@ -33,6 +33,8 @@ MAX_PRINCIPALS = 64  # chosen: more than certificates of a site; those that come
 MAX_WAITING_OF_A_CLIENT = 64  # requests of one client that wait in one server; more are refused
 MAX_WAITING_OF_A_PRINCIPAL = 512  # as well, of all clients of one principal
 MAX_WAITING = 1024  # requests of all clients that wait in one server; more are refused
+# [bytes] of all requests that wait in one server, and of one client's: chosen, so that the largest one may wait.
+MAX_WAITING_BYTES, MAX_WAITING_BYTES_OF_A_CLIENT = 96 * 1024 * 1024, 40 * 1024 * 1024
 
 
 class Newcomer(NamedTuple):
@@ -115,15 +117,16 @@ class RequestRates:
 
 @dataclass
 class WaitingRequests:
-    """Counts the waiting requests per client and principal and limits them, so that none can block the others."""
+    """Counts the waiting requests and their bytes per client and principal, so that none can block the others."""
 
     key: str
     _of: Counter[tuple[str, str]] = field(default_factory=Counter, init=False)  # by principal and client
     _of_principal: Counter[str] = field(default_factory=Counter, init=False)
+    _bytes_of: Counter[tuple[str, str]] = field(default_factory=Counter, init=False)  # by principal and client
     _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
 
-    def refusal(self, principal: str, client: str) -> str:
-        """Counts one more request of `client`; returns the reason if its limit is reached, else an empty text."""
+    def refusal(self, principal: str, client: str, size: int = 0) -> str:
+        """Counts one more request of `client`, of `size` [bytes]; the reason if its limit is reached, else empty."""
         with self._lock:
             if self._of[principal, client] >= MAX_WAITING_OF_A_CLIENT:
                 return f"{self.key}: {MAX_WAITING_OF_A_CLIENT} requests are waiting already, all of this client"
@@ -132,15 +135,31 @@ class WaitingRequests:
                 return f'{self.key}: {most}, all of clients with the certificate "{principal}"'
             if self._of_principal.total() >= MAX_WAITING:
                 return f"{self.key}: {MAX_WAITING} requests are waiting already"
+            if refusal := self._size_refusal(principal, client, size):
+                return refusal
             self._of[principal, client] += 1
             self._of_principal[principal] += 1
+            self._bytes_of[principal, client] += size
             return ""
 
-    def leave(self, principal: str, client: str) -> None:
+    def _size_refusal(self, principal: str, client: str, size: int) -> str:
+        waiting, all_waiting = self._bytes_of[principal, client], self._bytes_of.total()
+        if waiting + size > MAX_WAITING_BYTES_OF_A_CLIENT:
+            whose, most = f"{waiting} bytes of this client's requests", MAX_WAITING_BYTES_OF_A_CLIENT
+        elif all_waiting + size > MAX_WAITING_BYTES:
+            whose, most = f"{all_waiting} bytes of requests", MAX_WAITING_BYTES
+        else:
+            return ""
+        return (
+            f"{self.key}: {size} bytes, and {whose} are waiting already: at most {most}; ask again after their answers"
+        )
+
+    def leave(self, principal: str, client: str, size: int = 0) -> None:
         with self._lock:
+            self._bytes_of[principal, client] -= size
             self._of[principal, client] -= 1
             self._of_principal[principal] -= 1
             if self._of[principal, client] <= 0:
-                del self._of[principal, client]
+                del self._of[principal, client], self._bytes_of[principal, client]
             if self._of_principal[principal] <= 0:
                 del self._of_principal[principal]

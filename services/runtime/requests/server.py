@@ -15,9 +15,9 @@ from schemas.message import BadMessage, Message, encode
 from schemas.system import Exchange, Failure, TopicStatistics
 from schemas.topics import Request
 from services.runtime.bus.interface import Arrival, Bus, Query
-from services.runtime.bus.wire import from_arrival, schema_of, to_payload
+from services.runtime.bus.wire import Encoded, TooLarge, encoded, from_arrival, schema_of, to_payload
 from services.runtime.clock import SYSTEM, Clock
-from services.runtime.errors import RequestRefused
+from services.runtime.errors import TOO_LARGE, RequestRefused
 from services.runtime.loop.task_queue import Task
 from services.runtime.requests.limits import OF_A_CLIENT, RequestRates, WaitingRequests
 from services.runtime.requests.overtaken import OvertakenRequests
@@ -32,8 +32,15 @@ REPEAT = 0.01  # [s] chosen: in a flood of stops the gateway is free for other w
 MAX_TAKEN = 64  # questions whose last time is kept
 MAX_TOLD = 64  # callers that are named with an answer
 MAX_ASKERS = 256  # callers of one urgent request whose numbers are kept
+MAX_REASON = 4000  # characters of a refusal; chosen: a person reads no more, and what is echoed in it has no end
 
 Tell = Callable[[Exchange], None]
+
+
+def shortened(reason: str) -> str:
+    """The reason, without its middle where it is longer than anybody reads."""
+    half = MAX_REASON // 2
+    return reason if len(reason) <= MAX_REASON else f"{reason[:half]} ... {reason[-half:]}"
 
 
 class AnswerReport:
@@ -76,7 +83,7 @@ class Pending(Protocol[R_contra]):
         ...
 
     def reply(self, response: R_contra) -> None:
-        """Only the first answer counts; from any thread."""
+        """Only the first answer counts; from any thread. One that is too large to be sent becomes a refusal."""
 
     def refuse(self, kind: str, message: str) -> None:
         """As `reply`, with why not."""
@@ -92,17 +99,23 @@ class PendingQuery(Generic[R]):
         self._is_answered = False
 
     def reply(self, response: R) -> None:
-        payload = to_payload(response)
+        try:
+            self.send(encoded(response))
+        except TooLarge as error:
+            self.refuse(TOO_LARGE, str(error))
+
+    def send(self, response: Encoded[R]) -> None:
+        """As `reply`, with what is encoded already."""
         if not self._is_answered:
             self._is_answered = True
-            self._query.reply(schema_of(type(response)), payload)
+            self._query.reply(schema_of(type(response.message)), response.payload)
             if self._report is not None:
-                self._report.answered((self.client,), payload)
+                self._report.answered((self.client,), response.payload)
 
     def refuse(self, kind: str, message: str) -> None:
         if not self._is_answered:
             self._is_answered = True
-            failure = Failure(kind=kind, message=message)
+            failure = Failure(kind=kind, message=shortened(message))
             self._query.fail(schema_of(Failure), to_payload(failure))
             if self._report is not None:
                 self._report.refused((self.client,), failure)
@@ -111,10 +124,8 @@ class PendingQuery(Generic[R]):
 class PendingGroup(Generic[R]):
     """Equal requests of any number of callers, answered together."""
 
-    def __init__(
-        self, client: str, principal: str, on_answered: Callable[[int], None], report: AnswerReport | None
-    ) -> None:
-        self.client, self.principal = client, principal  # of the first
+    def __init__(self, first: Query, on_answered: Callable[[int], None], report: AnswerReport | None) -> None:
+        self.client, self.principal, self.size = first.client, first.principal, first.size
         self._report = report
         self.is_queued = False  # for the event loop
         self.is_new = True  # no timer will queue it
@@ -133,16 +144,20 @@ class PendingGroup(Generic[R]):
         self._queries.append(PendingQuery(query))
 
     def reply(self, response: R) -> None:
+        try:
+            answer = encoded(response)
+        except TooLarge as error:
+            return self.refuse(TOO_LARGE, str(error))
         for query in self._take():
-            query.reply(response)
+            query.send(answer)
         if report := self._take_report():
-            report.answered(self._clients(), to_payload(response))
+            report.answered(self._clients(), answer.payload)
 
     def refuse(self, kind: str, message: str) -> None:
         for query in self._take():
             query.refuse(kind, message)
         if report := self._take_report():
-            report.refused(self._clients(), Failure(kind=kind, message=message))
+            report.refused(self._clients(), Failure(kind=kind, message=shortened(message)))
 
     def _take(self) -> list[PendingQuery[R]]:
         queries, self._queries = self._queries, []
@@ -201,7 +216,7 @@ class RequestServer(Generic[Q, R]):
         """Nothing of a request is read before its client may ask at all."""
         if not self._rates.permit_request(query.principal, query.client):
             self._drop(query)
-        elif refusal := self._waiting.refusal(query.principal, query.client):
+        elif refusal := self._waiting.refusal(query.principal, query.client, query.size):
             self._refuse(query, refusal)
         else:
             arrived = self._clock.monotonic()
@@ -224,7 +239,7 @@ class RequestServer(Generic[Q, R]):
             query.drop()
 
     def _take(self, query: Query, arrived: float) -> None:
-        self._waiting.leave(query.principal, query.client)
+        self._waiting.leave(query.principal, query.client, query.size)
         question = self._question(query)
         if question is None:
             return
@@ -301,10 +316,10 @@ class UrgentServer(RequestServer[Q, R]):
         with self._lock:
             group = self._groups.get(question)
             if group is None:
-                if refusal := self._waiting.refusal(query.principal, query.client):
+                if refusal := self._waiting.refusal(query.principal, query.client, query.size):
                     return refusal
                 report = self._report(encode(question), self._clock.monotonic())
-                group = self._groups[question] = PendingGroup(query.client, query.principal, self._answered, report)
+                group = self._groups[question] = PendingGroup(query, self._answered, report)
             group.note(query, is_answered)
             self._queue(question, group, is_answered)
             self._received += 1
@@ -335,7 +350,7 @@ class UrgentServer(RequestServer[Q, R]):
     def _take_group(self, question: Q) -> None:
         with self._lock:
             group = self._groups.pop(question)
-            self._waiting.leave(group.principal, group.client)
+            self._waiting.leave(group.principal, group.client, group.size)
             if len(self._taken) >= MAX_TAKEN:
                 self._taken.clear()
             self._taken[question] = self._clock.monotonic()

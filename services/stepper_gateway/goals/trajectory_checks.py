@@ -7,13 +7,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from schemas.message import Vector
-from schemas.motion import FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
+from schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
 from services.arm.errors import suggestion
 from services.arm.model.description import Joint
 from services.stepper_gateway.goals.rejections import invalid, invalid_joints
 
 REST = 1e-6  # [rad/s] or [m/s] that a final velocity may be off zero; chosen: far below a step a second
-MAX_POINTS = 100_000  # chosen: half an hour at the gateway's own knots; more is no trajectory
 MAX_DURATION = 3600.0  # [s] chosen: an hour; longer work is several goals
 
 
@@ -118,8 +117,8 @@ def _require_points(trajectory: JointTrajectory) -> None:
     points, width = trajectory.points, len(trajectory.joint_names)
     if not points:
         raise invalid("the trajectory has no points")
-    if len(points) > MAX_POINTS:
-        raise invalid(f"the trajectory has {len(points)} points, more than {MAX_POINTS}; send it in parts")
+    if len(points) > MOST_POINTS:
+        raise invalid(f"the trajectory has {len(points)} points, more than {MOST_POINTS}; send it in parts")
     fields = (bool(points[0].velocities), bool(points[0].accelerations))
     for index, point in enumerate(points):
         _require_size(index, "positions", point.positions, width, True)
