@@ -27,6 +27,7 @@ from schemas.device import (
     StopKind,
 )
 from schemas.device_faults import fault_text
+from schemas.device_link import offline_text
 from schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURATION,
@@ -76,7 +77,7 @@ class Device:
             return self._session.newest(DEVICE_STATE)
         except Lost:
             if status.message is not None and not status.message.online:
-                raise Lost(f"the device is offline: {status.message.reason or 'no reason is known'}") from None
+                raise Lost(f"the device is {offline_text(status.message, self._session.node.now())}") from None
             raise
 
     @property

@@ -11,6 +11,7 @@ from gemelo.homing_report import HOME, OFF, TO, WAITS, HomingProgress, HomingRep
 from gemelo.session import Session
 from schemas.device import DeviceCommand, DeviceEvent, DeviceMode, DeviceState, HomeCommand, StopKind
 from schemas.device_faults import fault_text
+from schemas.device_link import offline_text
 from schemas.robot import HomingDirection
 from schemas.topics import DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
 from services.arm.errors import suggestion
@@ -147,7 +148,7 @@ def _require_ready(session: Session) -> None:
     """Raises `Refused` with the remedy where homing cannot begin."""
     status = session.newest(DEVICE_STATUS)
     if not status.online:
-        reason = f"the device is offline: {status.reason or 'no reason is known'}"
+        reason = f"the device is {offline_text(status, session.node.now())}"
         raise Refused(f"homing refused: {reason}", check="device", reason=reason)
     state = session.newest(DEVICE_STATE)
     if state.fault or state.mode in (DeviceMode.FAULT, DeviceMode.ESTOP):

@@ -50,6 +50,9 @@ class DeviceStatus(Message, frozen=True, kw_only=True):
     wanted_crc32: int = 0  # of the one that robot.toml asks for
     virtual: bool = False  # inputs and failures can be injected
     open_loop: bool = False  # it does not say what it has executed: its positions are what was sent
+    speaks: bool = False  # its states arrive, also where it cannot be used
+    deaf_since: int = 0  # [ns] UNIX time since when it speaks and does not hear; 0: it hears
+    warning: str = ""  # what a person has to mend though it is online: two planners, another program on its topics
 
 
 class DeviceState(Message, frozen=True, kw_only=True):

@@ -115,7 +115,8 @@ def status_changes(before: DeviceStatus | None, after: DeviceStatus) -> list[str
     if before is None or (before.online, before.boot_id, before.reason) != (after.online, after.boot_id, after.reason):
         reason = f": {after.reason}" if after.reason else ""
         boot = f", boot {after.boot_id:08x} ({after.reset_cause})" if after.online else ""
-        return [f"{after.device or 'the device'} is {'online' if after.online else 'OFFLINE'}{boot}{reason}"]
+        how = "online" if after.online else "NOT USABLE" if after.speaks else "OFFLINE"
+        return [f"{after.device or 'the device'} is {how}{boot}{reason}"]
     return []
 
 

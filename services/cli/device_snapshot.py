@@ -10,6 +10,7 @@ import msgspec
 from gemelo.homing import joint_name
 from schemas.device import DeviceConfiguration, DeviceState, DeviceStatus, SensorReadings
 from schemas.device_faults import FaultDescription, explain
+from schemas.device_link import offline_text
 from schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATE, DEVICE_STATUS, SENSORS
 from services.cli.errors import CommandError, ExitCode
 from services.cli.session import CommandSession, other_robots
@@ -56,7 +57,7 @@ class DeviceView:
         self.require_heard()
         status = self.status.message
         if status is not None and not status.online:
-            raise CommandError(f"the device is offline: {status.reason or 'no reason is known'}")
+            raise CommandError(f"the device is {offline_text(status, self.session.node.now())}")
         if self.state.message is None or self.state.is_stale:
             raise CommandError("the device says nothing of its state: `gemelo device status`", ExitCode.NO_STACK)
         return self.state.message
@@ -108,6 +109,8 @@ class DeviceSnapshot(msgspec.Struct, frozen=True, kw_only=True):
     inputs: dict[str, bool] = {}  # of the e-stop and other inputs without a joint
     outputs: dict[str, bool] = {}
     sensors: tuple[Reading, ...] = ()
+    now: int = 0  # [ns] UNIX time of this snapshot
+    state_age: float = 0.0  # [s]
 
 
 def snapshot_of(view: DeviceView) -> DeviceSnapshot:
@@ -118,6 +121,8 @@ def snapshot_of(view: DeviceView) -> DeviceSnapshot:
         view.state.message,
         view.configuration.message,
         None if view.sensors.is_stale else view.sensors.message,
+        view.session.node.now(),
+        0.0 if view.state.message is None else view.state.age(),
     )
 
 
@@ -127,8 +132,13 @@ def device_snapshot(
     state: DeviceState | None,
     configuration: DeviceConfiguration | None,
     sensors: SensorReadings | None,
+    now: int = 0,
+    age: float = 0.0,
 ) -> DeviceSnapshot:
-    """The snapshot of the messages received so far; None for one that was not."""
+    """The snapshot at `now` [ns UNIX] of the messages received so far, None for one that was not.
+
+    `age` [s] is that of the device's state.
+    """
     status = status or DeviceStatus(reason="nobody has said who the device is")
     about = explain(state.fault) if state is not None else None
     about = about or FaultDescription("", "", "")
@@ -148,6 +158,8 @@ def device_snapshot(
         inputs={each.name: each.name in active for each in arm.inputs if not each.joint},
         outputs={each.name: each.name in on for each in arm.outputs},
         sensors=readings(arm, sensors),
+        now=now,
+        state_age=age,
     )
 
 

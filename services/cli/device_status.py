@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from schemas.device import DeviceMode, DeviceState, DeviceStatus
+from schemas.device_link import offline_word, reason_text, round_trip_text
 from services.cli.device_snapshot import (
     OPEN_LOOP,
     DeviceJoint,
@@ -20,7 +21,6 @@ from services.cli.session import CommandSession, connect
 from services.cli.text_table import table
 
 FOR_SENSORS = 0.5  # [s] that `gemelo device status` waits for readings
-OLD = 2.0  # [s] of the age of a round trip, beyond which it says nothing of the link as it is; it is measured 2 Hz
 HINTS = {
     DeviceMode.BOOT: "it has no configuration yet: `gemelo device config --push`",
     DeviceMode.UNREFERENCED: "it does not know where its joints are: `gemelo home` or `gemelo reference`",
@@ -70,14 +70,15 @@ def sensors(session: CommandSession, as_json: bool) -> ExitCode:
 
 def text_of(view: DeviceSnapshot) -> str:
     """The snapshot as one screen of text."""
-    lines = [f"device   {who_it_is(view.status)}", f"config   {view.configuration}"]
+    lines = [f"device   {who_it_is(view.status, view.now)}", f"config   {view.configuration}"]
+    lines += [f"mend     {view.status.warning}"] if view.status.warning else []
     if view.state is None:
         return "\n".join(lines)
     lines += [f"mode     {_mode(view)}", *_fault(view), f"drivers  {_drivers(view.state)}"]
     lines += [f"speed    {_speed(view.state)}"]
     lines += _named("inputs", view.inputs, "PRESSED", "released") + _named("outputs", view.outputs, "on", "off")
     lines += [f"sensors  {', '.join(map(reading_text, view.sensors))}"] if view.sensors else []
-    return "\n".join([*lines, f"link     {_link(view.state)}", "", _joints(view)])
+    return "\n".join([*lines, f"link     {_link(view.state, view.state_age)}", "", _joints(view)])
 
 
 def reading_text(reading: Reading) -> str:
@@ -86,11 +87,11 @@ def reading_text(reading: Reading) -> str:
     return f"{reading.name} {value} {reading.unit}".rstrip()
 
 
-def who_it_is(status: DeviceStatus) -> str:
-    """The device, how it is connected, and its firmware."""
+def who_it_is(status: DeviceStatus, now: int) -> str:
+    """The device, how it is connected at `now` [ns UNIX], and its firmware."""
     name = status.device or "unknown"
     if not status.online:
-        return f"{name}: OFFLINE: {status.reason or 'no reason is known'}"
+        return f"{name}: {offline_word(status.speaks).upper()}: {reason_text(status, now)}"
     if status.open_loop:
         return f"{name}: online, {status.firmware}; {OPEN_LOOP}"
     kind = "virtual, " if status.virtual else ""
@@ -128,10 +129,8 @@ def _named(heading: str, parts: dict[str, bool], yes: str, no: str) -> list[str]
     return [f"{heading:<8} {said}"] if said else []
 
 
-def _link(state: DeviceState) -> str:
-    trip = f"round trip {state.round_trip * 1e3:.1f} ms"
-    if state.round_trip_age > OLD:
-        trip = f"no answer for {state.round_trip_age:.0f} s, before that a {trip}"
+def _link(state: DeviceState, age: float) -> str:
+    trip = round_trip_text(state.round_trip, state.round_trip_age + age)
     return (
         f"{trip}, {state.buffered:.2f} s of path queued; since boot "
         f"{state.underruns} under-runs, {state.refused} refused, {state.bad_frames} bad frames"

@@ -18,6 +18,7 @@ import msgspec
 from schemas.deployment import Deployment, MqttSection, Wire
 from schemas.device import DeviceState, DeviceStatus
 from schemas.device_faults import fault_text
+from schemas.device_link import offline_text, round_trip_text
 from schemas.errors import ConfigurationError
 from schemas.system import NodeInfo
 from schemas.topics import DEVICE_STATE, DEVICE_STATUS
@@ -217,7 +218,8 @@ def twin(session: CommandSession) -> Iterator[Diagnosis]:
     node.wait(LISTENING)
     nodes, up = living(session), when_silent(session.deployment.router.host)
     yield Diagnosis(Verdict.OK if nodes else Verdict.ERROR, "nodes", ", ".join(nodes) or "none", "" if nodes else up)
-    yield device(statuses[-1] if statuses else None, states[-1] if states else None, up)
+    yield device(statuses[-1] if statuses else None, states[-1] if states else None, up, node.now())
+    yield from warning(statuses[-1] if statuses else None)
     told = _told(session, nodes)
     yield versions({name: info for name, (info, _) in told.items()})
     yield from unwritten(info for info, _ in told.values())
@@ -268,18 +270,27 @@ def descriptors(infos: Iterable[NodeInfo]) -> Iterator[Diagnosis]:
                 yield Diagnosis(Verdict.WARNING, f"descriptors of {info.node}", found, remedy)
 
 
-def device(status: DeviceStatus | None, state: DeviceState | None, up: str) -> Diagnosis:
-    """Whether it is online, and in no fault; `up` is the remedy where no gateway speaks of it."""
+def device(status: DeviceStatus | None, state: DeviceState | None, up: str, now: int = 0) -> Diagnosis:
+    """Whether it is online, and in no fault, at `now` [ns UNIX]; `up` is the remedy where no gateway speaks of it."""
     if status is None:
         return Diagnosis(Verdict.ERROR, "device", "stepper_gateway says nothing of it", up)
     if not status.online:
         remedy = "see that it has power and reaches its broker; `gemelo device status` says more"
-        return Diagnosis(Verdict.ERROR, "device", f"offline: {status.reason or 'nothing heard of it'}", remedy)
+        if status.speaks:  # the sentence has the causes, and what to do
+            remedy = "docs/my_broker.md has the broker's ACL" if status.deaf_since else ""
+        return Diagnosis(Verdict.ERROR, "device", offline_text(status, now), remedy)
     if state is not None and state.fault:
         return Diagnosis(
             Verdict.WARNING, "device", fault_text(state.fault), "`gemelo reset`, when a person has seen why"
         )
-    return Diagnosis(Verdict.OK, "device", f"{status.device} is online")
+    trip = "" if state is None else f", {round_trip_text(state.round_trip, state.round_trip_age)}"
+    return Diagnosis(Verdict.OK, "device", f"{status.device} is online{trip}")
+
+
+def warning(status: DeviceStatus | None) -> Iterator[Diagnosis]:
+    """What a person has to mend beside an online device: two planners, another program on the device's topics."""
+    if status is not None and status.warning:
+        yield Diagnosis(Verdict.WARNING, "who speaks", status.warning)
 
 
 def clocks(offsets: Mapping[str, ClockOffset]) -> Diagnosis:

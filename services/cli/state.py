@@ -9,6 +9,7 @@ import msgspec
 
 from schemas.control import ControlState
 from schemas.device import DeviceState, DeviceStatus
+from schemas.device_link import offline_word, reason_text, round_trip_text
 from schemas.joints import JointState, StepErrors
 from schemas.ledger import StepLedger, StoppingDistance
 from schemas.topics import (
@@ -80,6 +81,9 @@ class StateSnapshot(msgspec.Struct, frozen=True):
     time_scale: float | None
     buffered: float | None  # [s]
     round_trip: float | None  # [s]
+    round_trip_age: float | None = None  # [s] since that was measured
+    speaks: bool = False  # the device's states arrive
+    warning: str = ""  # what a person has to mend though the device is online
     open_loop: bool = False  # the positions are what was sent: what was executed is not known
     ledger: StepLedger | None = None
     stopping: StoppingDistance | None = None
@@ -96,9 +100,14 @@ def snapshot(
     ledger: StepLedger | None = None,
     stopping: StoppingDistance | None = None,
     control: ControlState | None = None,
+    *,
+    now: int = 0,
+    age: float = 0.0,
 ) -> StateSnapshot:
-    """The `StateSnapshot` of the messages received so far, None for one that was not; `tool` is (3,) [m] in the base
-    frame."""
+    """The `StateSnapshot` at `now` [ns UNIX] of the messages received so far, None for one that was not.
+
+    `tool` is (3,) [m] in the base frame, `age` [s] that of the device's state.
+    """
     states, errors = states or JointState(), errors or StepErrors()
     position = dict(zip(states.name, states.position, strict=False))
     velocity = dict(zip(states.name, states.velocity, strict=False))
@@ -129,15 +138,24 @@ def snapshot(
         device=status.device if status else "",
         mode=device.mode.name if device else "unknown",
         online=bool(status and status.online),
-        reason=status.reason if status else "nothing heard from stepper_gateway",
+        reason=_reason(status, now),
         time_scale=device.time_scale if device else None,
         buffered=device.buffered if device else None,
         round_trip=device.round_trip if device else None,
+        round_trip_age=device.round_trip_age + age if device else None,
+        speaks=bool(status and status.speaks),
+        warning=status.warning if status else "",
         open_loop=is_open_loop,
         ledger=ledger,
         control=control,
         stopping=stopping,
     )
+
+
+def _reason(status: DeviceStatus | None, now: int) -> str:
+    if status is None:
+        return "nothing heard from stepper_gateway"
+    return status.reason if status.online else reason_text(status, now)
 
 
 def text_of(view: StateSnapshot) -> str:
@@ -148,9 +166,9 @@ def text_of(view: StateSnapshot) -> str:
     tool = (
         "unknown" if view.tool is None else "x {:z.2f}  y {:z.2f}  z {:z.2f} mm".format(*(v * 1e3 for v in view.tool))
     )
-    link = "online" if view.online else f"offline: {view.reason}"
-    if view.online and view.round_trip is not None:
-        link += f", round trip {1e3 * view.round_trip:.1f} ms"
+    link = "online" if view.online else f"{offline_word(view.speaks)}: {view.reason}"
+    if view.round_trip is not None:
+        link += f"{',' if view.online else ';'} {round_trip_text(view.round_trip, view.round_trip_age or 0.0)}"
     device = f"{view.device or 'unknown'}: {view.mode}"
     if view.time_scale is not None and view.buffered is not None:
         device += f", time scale {view.time_scale:.2f}, {view.buffered:.2f} s of path buffered"
@@ -159,7 +177,9 @@ def text_of(view: StateSnapshot) -> str:
     sent = f"\n\n{OPEN_LOOP}" if view.open_loop else ""
     notes = (ledger_text(view.ledger), stopping_text(view.stopping), control_text(view.control))
     known = "".join(f"\n{line}" for line in notes if line)
-    return f"{table(headings, rows)}{sent}\n\ntool {view.tool_frame}: {tool}{known}\ndevice {device}\nlink   {link}"
+    warning = f"\nmend   {view.warning}" if view.warning else ""
+    shown = f"{table(headings, rows)}{sent}\n\ntool {view.tool_frame}: {tool}{known}\ndevice {device}\nlink   {link}"
+    return shown + warning
 
 
 def ledger_text(ledger: StepLedger | None) -> str:
@@ -217,7 +237,7 @@ class StateView:
 
     def __init__(self, session: CommandSession) -> None:
         self._arm = session.arm
-        node = session.node
+        node = self._node = session.node
         self.frames = FrameBuffer()
         self._states = node.latest(JOINT_STATES)
         self._errors = node.latest(STEP_ERRORS)
@@ -267,6 +287,8 @@ class StateView:
             self._ledger.message,
             self._stopping.message,
             self._control.message,
+            now=self._node.now(),
+            age=self._device.age(),
         )
 
 

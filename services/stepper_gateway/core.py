@@ -31,9 +31,10 @@ from services.stepper_gateway.control.control_handler import NOBODY
 from services.stepper_gateway.device.command_arguments import STOPS, kind_of
 from services.stepper_gateway.device.frame_handler import FrameHandler
 from services.stepper_gateway.device.gateway_device import status_of
+from services.stepper_gateway.device.other_writers import Strangers
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
 from services.stepper_gateway.ledger.record import LedgerRecord
-from services.stepper_gateway.links.frames import BadFrame, CommandFrame, Heartbeat, Sync, encode
+from services.stepper_gateway.links.frames import BadFrame, CommandFrame, Heartbeat, NoFrame, Sync, encode
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Answer, Output
@@ -66,6 +67,7 @@ class GatewayCore:
         self.device, self.controller = self._components.device, self._components.controller
         self.bad_frames = 0
         self._bad_reported = -1.0e9  # [s] monotonic
+        self._strangers = Strangers(arm.device.name)
         self._told: DeviceStatus | None = None
         self._stepped: float | None = None  # [s] monotonic
 
@@ -93,6 +95,8 @@ class GatewayCore:
             self._frame_handler.take(received, moment)
         except BadFrame as error:
             self.bad_frames += 1
+            if isinstance(error, NoFrame):
+                self._strangers.on_message(received.kind, str(error), moment.monotonic)
             if moment.monotonic - self._bad_reported >= BAD_FRAME_REPORT:
                 self._bad_reported = moment.monotonic
                 self.device.event("bad_frame", f"{received.kind}: {error} ({self.bad_frames} so far)", moment)
@@ -259,7 +263,8 @@ class GatewayCore:
         """Tell of the device's status where it has changed, and hand the outputs out."""
         self._components.command_handler.tell_listeners(moment)
         self._components.control.tell(moment)
-        status = status_of(self.device, moment)
+        warning = self._components.goals.scenes.rivals or self._strangers.text(moment.monotonic)
+        status = status_of(self.device, moment, warning)
         if status != self._told:
             self._told = status
             self._components.out.publish(DEVICE_STATUS, replace(status, stamp=moment.unix))

@@ -37,7 +37,7 @@ def stack(gateway):
 def test_the_doctor_finds_a_twin_that_is_well(session, stack):
     found = {each.subject: each for each in doctor.twin(session)}
     assert found["nodes"].verdict is doctor.Verdict.OK
-    assert found["device"].found == "rm1 is online"
+    assert found["device"].found == "rm1 is online, round trip 2.0 ms"
     assert found["clocks"].verdict is doctor.Verdict.OK
     assert found["versions of the nodes"].verdict is doctor.Verdict.OK
 

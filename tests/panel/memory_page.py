@@ -43,6 +43,7 @@ class Gateway:
 
     def __init__(self, node: Node, planner: Node, arm: ArmDescription) -> None:
         self.stops: list[DeviceStopRequest] = []
+        self.round_trip_age = 0.0  # [s]
         self.joints = {joint.name: joint.clamp(0.1) for joint in arm.joints}
         self.node, self._arm = node, arm
         self._states, self._errors = node.publisher(JOINT_STATES), node.publisher(STEP_ERRORS)
@@ -72,6 +73,7 @@ class Gateway:
                 steps=(0,) * len(names),
                 velocity=still,
                 round_trip=0.002 + 0.0003 * (now // 1_000_000 % 5),  # as measured: never twice the same
+                round_trip_age=self.round_trip_age,
                 speed=1.0,
             )
         )

@@ -33,6 +33,7 @@ from services.panel.model.problems import problem_of
 from services.panel.words.step_text import step_text
 from services.panel.words.words import SENTENCES, Words
 from services.stepper_gateway.device.command_handler import NOT_NOW, REMEDIES, complaint
+from services.stepper_gateway.device.session import DEAF, ONE_NAME
 from services.stepper_gateway.links.frames import Code
 from tests.table import table
 
@@ -113,6 +114,8 @@ WITHIN_OTHERS = {  # parts of sentences, which are tested as a whole below
     "e-stop": 'the emergency stop "{}" of device "{}" is pressed: release it, {}',
     "e-stop before": 'the emergency stop of device "{}" was pressed: {}',
     "clock": 'the clock of device "{}" is not known yet: {}',
+    "devices": '{} devices call themselves "{}": {}: {}',
+    "not usable": "the device is {}",
     "heard": 'device "{}" has not been heard: {}',
     "goals": "a motion goes to one of {}: {}",
     "gone": "{} for {} s: take control anew with `gemelo control take --force`",
@@ -126,7 +129,7 @@ WITHIN_OTHERS = {  # parts of sentences, which are tested as a whole below
 }
 NOT_ON_THE_PAGE = {  # of files, logs and clients that a page does not have, and arguments that only a script gives
     "services/stepper_gateway/goals/active_goal.py": ("{}; {}; {} steps from the goal", "{}; nothing moved for it"),
-    "services/stepper_gateway/goals/scene_versions.py": ("version {} is ",),
+    "services/stepper_gateway/goals/scene_versions.py": ("version {} is ", "it comes from {}", "a process that "),
     "services/stepper_gateway/device/state_checks.py": ("a state that ",),
     "services/stepper_gateway/device/echoes.py": ("too many measurements", "no link to the device"),
     "services/planner/jog/jog_command.py": ("a jog command ", "a twist is given in"),
@@ -251,6 +254,9 @@ BEYOND = 'joint "a": 3.2000 rad is beyond the upper limit 2.9497 rad; stay withi
         "desk: "
          "ask for it, or run `gemelo control take --force`", "ana tiene el mando de rm1 desde las 09:10:11 UTC (hace "
          "12"),
+        ('the device is not usable: two devices call themselves "rm1": boot 00000001 (virtual); boot 00000002 (board): '
+         f"{ONE_NAME}", "se llama «rm1» (boot 00000001 (virtual); boot 00000002 (board))"),
+        (f'device "rm1" {DEAF} (for 12 s)', "Sin latidos se detiene solo. (desde hace 12 s)"),
         ("cup is not seen by overhead, and nothing else: is it in the image, lit, and not behind the arm? `gemelo "
          "camera view`", "overhead no ve cup, ni nada más"),
         ("cup is not seen by overhead; it sees red_block: is it in the image, lit, and not behind the arm? `gemelo "

@@ -44,7 +44,7 @@ def test_gemelo_state_shows_what_was_sent_and_no_executed_step(moved: SketchArm)
 
 
 def test_gemelo_device_status_says_it_beside_the_device(moved: SketchArm) -> None:
-    who = device_status.who_it_is(newest(moved, "device/status"))
+    who = device_status.who_it_is(newest(moved, "device/status"), 0)
     assert "SENT, NOT VERIFIED" in who
     assert "sketch" in who
 

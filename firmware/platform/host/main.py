@@ -7,6 +7,7 @@ import logging
 import os
 import queue
 import signal
+import socket
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -71,7 +72,7 @@ def run(deployment: Deployment, has_line: bool = False) -> None:
     access = device_access(deployment.mqtt, arm.device.name)
     if arm.device.dialect is Dialect.RA:
         return VirtualSketch(arm, access, inbox, Readiness(folder, NAME, unwritten)).run()
-    network = Network(access, inbox)
+    network = Network(access, inbox, f"process {os.getpid()} on {socket.gethostname()}, {folder}")
     is_wired = deployment.wire is Wire.SERIAL or arm.device.dialect is Dialect.TEXT
     line = _serial_line(folder, inbox, unwritten) if has_line or is_wired else None
     board, wires = Board(arm, folder, NAME, unwritten), Wires(network, line)

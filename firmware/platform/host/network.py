@@ -29,8 +29,9 @@ class AddressError(ValueError):
 class Network:
     """One device's MQTT; `default` is the broker where none was provisioned."""
 
-    def __init__(self, default: BrokerAccess, inbox: queue.SimpleQueue[Item]) -> None:
-        self._default = default
+    def __init__(self, default: BrokerAccess, inbox: queue.SimpleQueue[Item], place: str = "") -> None:
+        """`place` is where this device runs, for who has two of one name."""
+        self._default, self._place = default, place
         self._inbox = inbox
         self._link: DeviceLink | None = None
         self._offline_status = b""
@@ -68,7 +69,12 @@ class Network:
     def publish(self, frame: OutFrame) -> None:
         """Publishes a frame; without a broker it is dropped, because state and status are repeated."""
         if self._link is not None and self.is_connected and frame.kind in REPORTS:
-            self._link.publish(frame.kind, frame.payload)
+            self._link.publish(frame.kind, self._placed(frame.payload) if frame.kind == "status" else frame.payload)
+
+    def _placed(self, status: bytes) -> bytes:
+        """The status, whose JSON names the place too; another firmware's may be no JSON."""
+        is_object = self._place and status.endswith(b"}")
+        return status[:-1] + b', "place": ' + json.dumps(self._place).encode() + b"}" if is_object else status
 
     def subscribe_anew(self) -> None:
         """The device is connected and receives nothing: the broker may have lost its subscriptions."""

@@ -11,6 +11,7 @@ from typing import Literal
 import viser
 
 from schemas.device import DeviceMode
+from schemas.device_link import reason_text
 from services.panel.model.availability import reasons
 from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
@@ -232,16 +233,23 @@ class Page:
         words, state = self._words, readings.state
         if state is None or not readings.is_live:
             age = f"{readings.age:.1f} s" if isfinite(readings.age) else "-"
-            reason = readings.status.reason if readings.status is not None and not readings.status.online else ""
-            return f"<b>{esc(words('not_live', age=age))}</b> {esc(words.said(reason))}", BAD
+            return f"<b>{esc(words('not_live', age=age))}</b> {esc(words.said(self._trouble(readings)))}", BAD
         worst = max((abs(error) for error in readings.step_errors.values()), default=0.0)
         error = words("step_error", steps=f"{worst:.2f}")
         if readings.status is not None and readings.status.open_loop:
             error = words("sent_not_verified")
         text = f"<b>{esc(words(f'mode_{state.mode.name.lower()}'))}</b> · {esc(error)} · {esc(words('live_data'))}{lag}"
-        if readings.fault:
-            return f"{text}<br>{esc(words.said(readings.fault))}", BAD
+        if said := readings.fault or self._trouble(readings):
+            return f"{text}<br>{esc(words.said(said))}", BAD
         return text, GOOD if state.armed and all(state.referenced) else NEUTRAL
+
+    @staticmethod
+    def _trouble(readings: Readings) -> str:
+        """Why the device is not usable, or what else a person has to mend; empty where all is well."""
+        status = readings.status
+        if status is None:
+            return ""
+        return status.warning if status.online else reason_text(status, time.time_ns())
 
     def _show_problem(self) -> None:
         told = self._operator.newest_problem

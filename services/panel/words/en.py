@@ -89,6 +89,7 @@ ENGLISH: dict[str, str] = {
     "mode": "Mode",
     "inputs": "Switches",
     "link": "Link, there and back",
+    "measured_ago": "{trip}, measured {age} s ago",
     "arm": "Switch the drivers on",
     "disarm": "Switch the drivers off",
     "home": "Home",

@@ -89,6 +89,7 @@ SPANISH: dict[str, str] = {
     "mode": "Modo",
     "inputs": "Interruptores",
     "link": "Enlace, ida y vuelta",
+    "measured_ago": "{trip}, medido hace {age} s",
     "arm": "Encender los motores",
     "disarm": "Apagar los motores",
     "home": "Buscar el origen",

@@ -78,6 +78,20 @@ _DEVICE: dict[str, str] = {
     "the device has restarted: its position and boot id are read anew": "El equipo se reinició: se lee de nuevo dónde "
     "está.",
     "the device is offline: {reason}": "El equipo no está conectado: {reason}",
+    "the device is not usable: {reason}": "El equipo no se puede usar: {reason}",
+    "{reason} (for {time} s)": "{reason} (desde hace {time} s)",
+    '{count} devices call themselves "{name}": {known}: nothing moves until there is one. Switch one off, or give one '
+    "another name: a forgotten `make up` in another folder, a virtual device beside a board, or two boards that were "
+    "provisioned alike": "Hay más de un equipo que se llama «{name}» ({known}): nada se mueve hasta que quede uno. "
+    "Apague uno, o dele otro nombre: un `make up` olvidado en otra carpeta, un equipo virtual junto a una placa, o dos "
+    "placas configuradas igual.",
+    "two planners live, {older} and {newer}: which scene stands around the arm is not known. The older one ends by "
+    "itself within seconds; if not, end it": "Hay dos planificadores, {older} y {newer}: no se sabe qué escena rodea "
+    "al brazo. El más viejo termina solo en segundos; si no, termínelo.",
+    'something else than gemelo\'s firmware writes under the topics of device "{name}" ({kind}: {why}): an old '
+    "sketch, or another program: end it, or give the device another name": "Algo que no es el firmware de gemelo "
+    "escribe en los temas del equipo «{name}» ({kind}: {why}): un sketch viejo u otro programa: termínelo, o dé otro "
+    "nombre al equipo.",
     "no reason is known": "no se sabe por qué.",
     "no reason was given": "no se dijo por qué.",
 }

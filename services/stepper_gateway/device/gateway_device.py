@@ -76,8 +76,8 @@ class GatewayDevice:
         self.out.log(level, log_text or (f"{event}: {detail}" if detail else event))
 
 
-def status_of(device: GatewayDevice, moment: Moment) -> DeviceStatus:
-    """Without a stamp; only the boot that says its states is described.
+def status_of(device: GatewayDevice, moment: Moment, warning: str = "") -> DeviceStatus:
+    """Without a stamp; only the boot that says its states is described. `warning` is what else a person has to mend.
 
     A silent device is offline, whatever a broker has retained.
     """
@@ -97,4 +97,7 @@ def status_of(device: GatewayDevice, moment: Moment) -> DeviceStatus:
         wanted_crc32=device.configuration.crc32,
         virtual=report.virtual,
         open_loop=report.open_loop,
+        speaks=session.is_fresh(moment, device.parameters.state_timeout),
+        deaf_since=session.deaf_since(moment, device.parameters.state_timeout),
+        warning=warning,
     )

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
-
 from msgspec.structs import replace
 
 from schemas.device import DeviceCommandKind, DeviceMode
 from services.stepper_gateway.device.clock import ClockSync
+from services.stepper_gateway.device.other_writers import OtherBoots, boot_text
+from services.stepper_gateway.device.questions import Questions
 from services.stepper_gateway.device.state_checks import StateChecks
 from services.stepper_gateway.links.frames import (
     NEVER_EXPIRES,
@@ -28,11 +28,7 @@ from services.stepper_gateway.moment import Moment, next_beat
 HEARTBEAT = 0.1  # [s] chosen: a cut of 0.4 s does not stop the arm yet
 SYNC = 0.5  # [s] chosen: a crystal's drift in that time is 50 us at most
 SYNC_AT_FIRST = 0.03  # [s] until the clock is known; chosen: the three that are needed take 0.1 s
-# While answers are missing: so that a wire that loses most frames is told from a device that receives none.
 SYNC_UNANSWERED = 0.1  # [s] chosen: twelve questions are lost before the device counts as deaf
-LATE_ANSWER = 0.25  # [s] after which an answer is missing; chosen: longer than a slow network's round trip
-DEAF_AFTER = 1.4  # [s] of questions without an answer; chosen: with the pause between two of them, below 2 s
-LEAST_UNANSWERED = 4  # questions; chosen: more than one, as a pause of this loop is no deafness of the device
 STEADY_BEATS = 0.7  # [s] of heartbeats without a pause, after which a device has heard one; chosen: above its 0.5 s
 ASK_STATUS = 1.0  # [s] between two requests for a status that is missing; chosen: a slow network answers by then
 # Chosen: true states are not taken until they are newer than one from so far ahead, which must not look like silence.
@@ -41,11 +37,6 @@ TWIN = (
     "is asked by another gateway too: nothing moves until there is one. End the other: a forgotten `make up`, a second "
     "host, or a process that was stopped and goes on"
 )
-TWIN_SEEN = 1.5  # [s] that an answer to a stranger's question counts; chosen: three of its questions
-MOST_STRANGE = 8  # such answers that are compared; chosen: some garbled ones between two true ones do not hide these
-SAME_PACE = 0.1  # [s] by which the times in two questions and between their answers differ; chosen: a network's jitter
-KEPT_QUESTIONS = 512  # of ours, which are no stranger's however late the answer; chosen: 15 s of the most frequent
-QUESTIONS = 32  # that may be under way; chosen: 1 s of them at first, beyond which answers are late
 NOT_HEARD = "is it switched on, does it use the same broker, and does the broker's ACL let it write?"
 NO_CLOCK = "try again in a second"
 DEAF = (
@@ -53,6 +44,11 @@ DEAF = (
     "wire, a broker's ACL that denies the device its subscription, or two boards or programs with one client id. "
     "Without heartbeats it holds by itself"
 )
+ONE_NAME = (
+    "nothing moves until there is one. Switch one off, or give one another name: a forgotten `make up` in another "
+    "folder, a virtual device beside a board, or two boards that were provisioned alike"
+)
+NUMBERS = {2: "two", 3: "three"}
 OLD_BOOTS = 16  # remembered, so that a late frame of one is no reboot; chosen: more than a broker keeps frames of
 
 
@@ -75,15 +71,9 @@ class DeviceSession:
         self._old_boots: list[int] = []
         self._reports: dict[int, StatusReport] = {}  # by boot id
         self._doubted: StatusReport | None = None  # contradicts what the present boot has said; it is asked again
-        self._checks = StateChecks()
+        self._checks, self._others = StateChecks(), OtherBoots()
         self._offline_boot = 0  # whose last will has come
-        self._questions: deque[int] = deque(maxlen=QUESTIONS)  # [us] SYNCs that may be answered
-        self._asked: deque[int] = deque(maxlen=KEPT_QUESTIONS)  # [us] all of ours
-        self._strange: deque[tuple[float, float]] = deque(maxlen=MOST_STRANGE)  # [s] t0 and arrival, to others
-        self._twin_seen = -1.0e9  # [s] monotonic
-        self._unanswered = 0  # SYNCs since the last answer
-        self._unanswered_since = 0.0  # [s] monotonic, of the first of them
-        self.answered = -1.0e9  # [s] monotonic, when the device has answered a question last
+        self._questions = Questions()
         self.link_up = False
         self.link_reason = "no connection yet"
         self.latest: StateFrame | None = None  # of any number of joints
@@ -119,7 +109,7 @@ class DeviceSession:
         self.link_up, self.link_reason = connected, reason
         if connected:
             self._heartbeat_due = self._sync_due = 0.0
-            self._unanswered = 0
+            self._questions.begin_anew()
         else:
             self.state_arrival = -1.0e9
 
@@ -161,7 +151,8 @@ class DeviceSession:
             self.require_present(state, state.t_us, arrival)
             self._checks.require_steady(self.latest, state)
         elif is_fresh and self.latest is not None:
-            if state.boot_id in self._old_boots:
+            self._others.on_state(state, arrival, self.state_arrival)
+            if state.boot_id in self._old_boots or state.boot_id in self._others.living(arrival):
                 return False, False
             self._checks.require_in_a_row(self.latest, state)
         is_new_boot = self._meet(state.boot_id)
@@ -172,26 +163,16 @@ class DeviceSession:
 
     def question(self, moment: Moment) -> Sync:
         """One more question for the clock, now."""
-        self._questions.append(moment.micros)
-        self._asked.append(moment.micros)
-        if self._unanswered == 0:
-            self._unanswered_since = moment.monotonic
-        self._unanswered += 1
-        return Sync(boot_id=self.boot_id, t0=moment.micros)
+        return self._questions.ask(self.boot_id, moment)
 
     def on_sync_reply(self, reply: SyncReply, arrival_us: int) -> None:
         """Take an answer to a question of ours; raises `BadFrame` for one that is not believed."""
         self.require_known(reply)
-        if reply.boot_id != self.boot_id:
-            return
-        if reply.t0 not in self._questions:
-            if reply.t0 not in self._asked:
-                self._on_strange_answer(reply.t0 * 1e-6, arrival_us * 1e-6)
+        if reply.boot_id != self.boot_id or not self._questions.is_open(reply.t0, arrival_us):
             return
         if not self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us):  # the question stays open for the true answer
             raise BadFrame(f"an answer of {reply.t1} us, which is not the device's clock as it is known")
-        self._questions.remove(reply.t0)
-        self._unanswered, self.answered = 0, arrival_us * 1e-6
+        self._questions.on_answer(reply.t0, arrival_us)
 
     def require_known(self, frame: Frame) -> None:
         """Raises `BadFrame` for a frame of a boot that has never been heard."""
@@ -250,36 +231,26 @@ class DeviceSession:
         """[s] until the next question for the clock."""
         if not self.clock.is_synchronised or self.clock.is_contradicted:
             return SYNC_AT_FIRST
-        is_missing = self._unanswered > 0 and moment.monotonic - self._unanswered_since > LATE_ANSWER
-        return SYNC_UNANSWERED if is_missing else SYNC
+        return SYNC_UNANSWERED if self._questions.is_late(moment.monotonic) else SYNC
 
-    def has_twin(self, moment: Moment) -> bool:
-        """True if the device answers another gateway: what each sends would move the arm of the other."""
-        return moment.monotonic - self._twin_seen <= TWIN_SEEN
+    def second_device(self, moment: Moment) -> str:
+        """The sentence for another device under this one's name; empty while there is none."""
+        others = self._others.living(moment.monotonic)
+        if not others:
+            return ""
+        known = "; ".join(boot_text(boot, self._reports.get(boot)) for boot in (self.boot_id, *others))
+        number = NUMBERS.get(len(others) + 1, "several")
+        return f'{number} devices call themselves "{self._device}": {known}: {ONE_NAME}'
 
-    def _on_strange_answer(self, asked: float, arrival: float) -> None:
-        """An answer to what somebody has asked by his clock at `asked` [s]: a gateway's clock goes on with ours.
-
-        One answer may be forged or garbled, or be to the gateway before this one.
-        """
-        for before, came in self._strange:
-            if (
-                0.0 < arrival - came <= TWIN_SEEN
-                and asked > before
-                and abs(asked - before - (arrival - came)) < SAME_PACE
-            ):
-                self._twin_seen = arrival
-        self._strange.append((asked, arrival))
-
-    def is_deaf(self, moment: Moment) -> bool:
-        """True if nothing that is asked has been answered for DEAF_AFTER: what is sent does not arrive."""
-        is_long = moment.monotonic - self._unanswered_since > DEAF_AFTER
-        return self.link_up and self._unanswered >= LEAST_UNANSWERED and is_long
+    def deaf_since(self, moment: Moment, timeout: float) -> int:
+        """[ns] UNIX time since when the device does not hear; 0 while it hears, is silent, or is one of two."""
+        is_known = self.is_fresh(moment, timeout) and not self.second_device(moment)
+        return self._questions.deaf_since(moment) if is_known else 0
 
     @property
     def unanswered_for(self) -> float:
         """[s] since the device has answered a question, when its newest state came; 0 before its first answer."""
-        return max(0.0, self.state_arrival - self.answered) if self.clock.exchanges else 0.0
+        return max(0.0, self.state_arrival - self._questions.answered) if self.clock.exchanges else 0.0
 
     def _lacks_status(self, moment: Moment) -> bool:
         is_wanted = self.status is None or self._doubted is not None
@@ -299,8 +270,8 @@ class DeviceSession:
         return DeviceMode(self.latest.mode) if self.latest is not None else DeviceMode.BOOT
 
     def unreachable_reason(self, moment: Moment, timeout: float) -> str:
-        """Why the device cannot be reached: no link, no state for `timeout` [s], no answer, or another
-        gateway; empty if it can."""
+        """Why the device cannot be reached: no link, no state for `timeout` [s], a second device, no answer, or
+        another gateway; empty if it can."""
         name = self._device
         if not self.link_up:
             return f'no link to device "{name}": {self.link_reason}'
@@ -310,9 +281,11 @@ class DeviceSession:
             if self.latest is None and not self._reports:
                 return f'device "{name}" has not been heard: {NOT_HEARD}'
             return f'device "{name}" is silent for more than {timeout:g} s: check its power and network'
-        if self.is_deaf(moment):
+        if second := self.second_device(moment):
+            return second
+        if self._questions.is_deaf(moment.monotonic):
             return f'device "{name}" {DEAF}'
-        if self.has_twin(moment):
+        if self._questions.has_twin(moment.monotonic):
             return f'device "{name}" {TWIN}'
         if self.status is None:
             return f'device "{name}" has not said yet who it is: wait a second, or restart it'
@@ -328,11 +301,13 @@ class DeviceSession:
         if is_reboot:
             self._old_boots = [*self._old_boots[1 - OLD_BOOTS :], self.boot_id]
         self._old_boots = [boot for boot in self._old_boots if boot != boot_id]
+        self._others.forget(boot_id)
         self.boot_id = boot_id
         self.latest = None
         self._doubted, self._checks = None, StateChecks()
         self.clock.reset()
-        self._sync_due, self._unanswered = 0.0, 0
+        self._sync_due = 0.0
+        self._questions.begin_anew()
         self._status_due, self._tells_status = 0.0, True
         return is_reboot
 

@@ -40,6 +40,10 @@ class BadFrame(ValueError):
     """Bytes that are no frame; the text says what is wrong."""
 
 
+class NoFrame(BadFrame):
+    """Nothing of the protocol at all: text, or what another program sends."""
+
+
 class FrameType(IntEnum):
     """The third byte of every frame."""
 
@@ -246,12 +250,12 @@ def encode(frame: AnyFrame) -> bytes:
 
 
 def decode(payload: bytes) -> AnyFrame:
-    """The frame in `payload`; raises `BadFrame`."""
+    """The frame in `payload`; raises `BadFrame`, and `NoFrame` where it is none of the protocol's."""
     if len(payload) < _HEADER.size + _CRC.size:
-        raise BadFrame(f"{len(payload)} bytes are too few for a frame")
+        raise NoFrame(f"{len(payload)} bytes are too few for a frame")
     magic, version, kind, joints, boot_id = _HEADER.unpack_from(payload)
     if magic != MAGIC:
-        raise BadFrame(f"magic 0x{magic:02x} is not 0x{MAGIC:02x}")
+        raise NoFrame(f"magic 0x{magic:02x} is not 0x{MAGIC:02x}")
     if version != VERSION:
         raise BadFrame(f"protocol version {version} is not {VERSION}")
     reader = _READERS.get(kind)

@@ -7,7 +7,7 @@ from typing import Annotated, TypeVar
 import msgspec
 from msgspec import Meta
 
-from services.stepper_gateway.links.frames import BadFrame
+from services.stepper_gateway.links.frames import NoFrame
 
 Word = Annotated[int, Meta(ge=0, lt=2**32)]
 Micros = Annotated[int, Meta(ge=0, le=2**63 - 1)]  # [us] of the device's clock
@@ -38,6 +38,7 @@ class StatusReport(Report, frozen=True, kw_only=True):
     config_crc32: Word = 0  # of the configuration it works with; 0: none yet
     virtual: bool = False
     open_loop: bool = False  # it does not say what it has executed
+    place: str = ""  # where a virtual device runs
 
 
 class EventReport(Report, frozen=True, kw_only=True):
@@ -78,24 +79,24 @@ _readings = msgspec.json.Decoder(dict[str, float])
 
 
 def decode_report(kind: type[R], payload: bytes) -> R:
-    """The report in `payload`; raises `BadFrame`."""
+    """The report in `payload`; raises `NoFrame`."""
     decoder = _decoders.get(kind)
     if decoder is None:
         decoder = _decoders[kind] = msgspec.json.Decoder(kind)
     try:
         return decoder.decode(payload)  # type: ignore[return-value]
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadFrame(f"not a {kind.__name__} ({len(payload)} bytes): {error}") from error
+        raise NoFrame(f"not a {kind.__name__} ({len(payload)} bytes): {error}") from error
 
 
 def decode_sensors(payload: bytes) -> SensorReport:
-    """The readings in `payload`, whose object holds them beside the device's time; raises `BadFrame`."""
+    """The readings in `payload`, whose object holds them beside the device's time; raises `NoFrame`."""
     try:
         values = _readings.decode(payload)
         t_us = int(values.pop("t_us", 0))
         if not 0 <= t_us < 2**63:
             raise ValueError(f"the device's time cannot be {t_us} us")
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError, ValueError) as error:
-        raise BadFrame(f"no sensor readings ({len(payload)} bytes): {error}") from error
+        raise NoFrame(f"no sensor readings ({len(payload)} bytes): {error}") from error
     values.pop("boot_id", None)
     return SensorReport(t_us=t_us, values=values)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from schemas.control import ControlState
 from schemas.device import DeviceMode, DeviceState, DeviceStatus, SensorReadings, ShaftPositions
 from schemas.device_faults import explain
+from schemas.device_link import offline_word, reason_text, round_trip_text
 from schemas.joints import JointState, StepErrors
 from schemas.ledger import StepLedger, StoppingDistance
 
@@ -63,13 +64,15 @@ def is_lost(error: int) -> bool:
 def _heading(inputs: PanelInputs, now: int) -> str:
     state, status = inputs.state, inputs.status
     if status is not None and not status.online:
-        return f"## {inputs.robot} · OFFLINE\n\n{status.reason or 'the device is not connected'}"
+        why = reason_text(status, now) if status.reason else "the device is not connected"
+        return f"## {inputs.robot} · {offline_word(status.speaks).upper()}\n\n{why}"
     if state is None:
         return f"## {inputs.robot} · waiting for the device"
     age = now - state.stamp
     if age > STALE:
         return f"## {inputs.robot} · SILENT for {age / 1e9:.0f} s\n\nlast mode {state.mode.name}"
-    return _fault(inputs.robot, state) or f"## {inputs.robot} · {state.mode.name}"
+    warning = f"\n\n**{status.warning}**" if status is not None and status.warning else ""
+    return (_fault(inputs.robot, state) or f"## {inputs.robot} · {state.mode.name}") + warning
 
 
 def _fault(robot: str, state: DeviceState) -> str:
@@ -192,6 +195,6 @@ def _numbers(inputs: PanelInputs) -> str:
     boot = f"firmware {inputs.status.firmware} · " if inputs.status is not None and inputs.status.firmware else ""
     return (
         f"path {state.time_scale:.0%} of its speed · {state.buffered * 1e3:.0f} ms queued · "
-        f"round trip {state.round_trip * 1e3:.1f} ms\n\n"
+        f"{round_trip_text(state.round_trip, state.round_trip_age)}\n\n"
         f"{boot}under-runs {state.underruns} · refused {state.refused} · bad frames {state.bad_frames}"
     )

@@ -6,6 +6,7 @@ from functools import partial
 
 import viser
 
+from schemas.device_link import is_old
 from services.panel.model.readings import Readings
 from services.panel.model.units import text_of
 from services.panel.view.gripper_box import GripperBox
@@ -50,7 +51,9 @@ class DeviceTab:
         if state is not None:
             rows.append((esc(words("mode")), esc(words(f"mode_{state.mode.name.lower()}"))))
             rows.append((esc(words("inputs")), esc(", ".join(state.inputs) or "-")))
-            rows.append((esc(words("link")), f"{1000 * self._round_trip.of(state.round_trip):.0f} ms"))
+            trip, age = f"{1000 * self._round_trip.of(state.round_trip):.0f} ms", state.round_trip_age + readings.age
+            trip = words("measured_ago", trip=trip, age=f"{age:.0f}") if is_old(age) else trip
+            rows.append((esc(words("link")), esc(trip)))
             for name, handle in self.outputs.items():
                 handle.show(name in state.outputs)
         set_if_new(self.facts, "content", table(rows) if rows else "")

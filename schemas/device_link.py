@@ -1,0 +1,40 @@
+"""The link to the device in words: how old its figures are, and why the device cannot be used, and since when."""
+
+from __future__ import annotations
+
+from schemas.device import DeviceStatus
+
+OLD = 2.0  # [s] of a round trip, beyond which it says nothing of the link as it is; it is measured twice a second
+UNKNOWN = "no reason is known"
+
+
+def is_old(age: float) -> bool:
+    """True if a round trip that was measured `age` [s] ago is shown with its age."""
+    return age > OLD
+
+
+def round_trip_text(round_trip: float, age: float) -> str:
+    """`round trip 2.3 ms`, and `measured 40 s ago` where it is old; both in [s]."""
+    trip = f"round trip {1e3 * round_trip:.1f} ms"
+    return f"{trip}, measured {age:.0f} s ago" if is_old(age) else trip
+
+
+def deaf_for(status: DeviceStatus, now: int) -> float:
+    """[s] for which the device has not heard at `now` [ns UNIX]; 0 while it hears."""
+    return max(1.0, (now - status.deaf_since) * 1e-9) if status.deaf_since else 0.0
+
+
+def reason_text(status: DeviceStatus, now: int) -> str:
+    """Why the device is not usable at `now` [ns UNIX], with how long it has not heard."""
+    reason, deaf = status.reason or UNKNOWN, deaf_for(status, now)
+    return f"{reason} (for {deaf:.0f} s)" if deaf else reason
+
+
+def offline_text(status: DeviceStatus, now: int) -> str:
+    """As `reason_text`, after `offline` or, where the device's states arrive, `not usable`."""
+    return f"{offline_word(status.speaks)}: {reason_text(status, now)}"
+
+
+def offline_word(speaks: bool) -> str:
+    """What a device is that is not online."""
+    return "not usable" if speaks else "offline"
