@@ -95,7 +95,7 @@ class Control:
         True
         """
         state = self.state
-        return not state.held or self._session.node.name in state.members
+        return not state.held or self._session.node.address in state.members
 
     def take(self, name: str = "", *, force: bool = False) -> str:
         """Takes control as `name` (this node's, if left out) and returns its secret; see `Arm.take_control`.

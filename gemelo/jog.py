@@ -97,7 +97,7 @@ class JogCommands:
         return self._heard
 
     def _on_status(self, status: JogStatus) -> None:
-        if status.client in ("", self._session.node.name):
+        if status.client in ("", self._session.node.address):
             self._heard, self._heard_at = status, self._session.clock.monotonic()
 
     def _heard_since(self, began: float) -> JogStatus | None:
@@ -138,7 +138,7 @@ class Streaming:
 
     def _on_event(self, event: DeviceEvent) -> None:
         """Only of the stream that runs, and not of another's: events of before may come late."""
-        if event.client not in ("", self._session.node.name):
+        if event.client not in ("", self._session.node.address):
             return
         if event.event == "target_refused" and self._session.clock.monotonic() - self._said < PAUSE:
             self._refused = event.detail

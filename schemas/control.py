@@ -20,7 +20,7 @@ class ControlState(Message, frozen=True, kw_only=True):
     node: str = ""  # that has taken control
     host: str = ""  # on which that node runs
     since: int = 0  # [ns] UNIX time of the gateway
-    members: tuple[str, ...] = ()  # nodes that may move the arm: the holder's own, and those that know its secret
+    members: tuple[str, ...] = ()  # addresses of the nodes that may move the arm: the holder's, and who has its secret
     given: bool = False  # nobody holds it because the last holder has given it back, and not lost it
     pending: str = ""  # why nobody may move the arm at this moment, as a sentence; empty if somebody may
 

@@ -189,7 +189,7 @@ def _flood(options: argparse.Namespace) -> None:
 def _bus(what: str, options: argparse.Namespace) -> Callable[[], None]:
     bus = ZenohBus(RouterSection(port=options.port), options.robot, None if what == OURS else Pace(NO_PACE))
     if what == "targets":
-        publication = bus.publish(JOINT_TARGETS.key, JointTargets.__name__, JOINT_TARGETS.delivery)
+        publication = bus.publish(JOINT_TARGETS.key, JointTargets.__name__, JOINT_TARGETS.delivery, "flood")
         payload = encode(JointTargets())
         return lambda: publication.put(payload)
     asked = itertools.cycle(

@@ -99,7 +99,7 @@ def describe(state: ControlState, robot: str, now: float) -> str:
     if not state.held:
         return f"nobody holds control of {robot}: everybody may move it"
     clock = time.strftime("%H:%M:%S", time.localtime(state.since * 1e-9))
-    shared = [member for member in state.members if member != state.node]
+    shared = state.members[1:]  # the first is the holder itself
     more = (f"; shared by {', '.join(shared)}" if shared else "") + (f"; {state.pending}" if state.pending else "")
     age = max(0.0, now - state.since * 1e-9)
     where = f"from node {state.node} on {state.host}"

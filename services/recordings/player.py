@@ -16,7 +16,7 @@ from schemas.topics import ANY, Delivery
 from services.recordings.reader import RecordingReader, Row
 from services.recordings.table import NODES, recorded_topics
 from services.runtime.bus import identity
-from services.runtime.bus.branches import NAME, is_by_every_node
+from services.runtime.bus.branches import NAME, is_of_many
 from services.runtime.bus.interface import Bus, Publication
 
 NODE = "player"
@@ -66,7 +66,7 @@ class Roles:
 
 def writer_of(row: Row) -> str:
     """The node that has written it: of a key of every node as the message says, of one of many the player."""
-    if is_by_every_node(row.channel.topic):
+    if is_of_many(row.channel.topic):
         said = msgspec.json.decode(row.message.data, type=OfNode).node
         return said if NAME.fullmatch(said) else NODE
     writer = row.channel.metadata.get("writer", "")

@@ -153,7 +153,8 @@ class Node:
         return subscription
 
     def subscribe_signed(self, topic: Topic[M], on_message: Callable[[M, str], object]) -> Subscription[M]:
-        """As `subscribe`; `on_message(message, writer)` is told the name of the node that wrote it, as that says.
+        """As `subscribe`; `on_message(message, writer)` gets the node that wrote it: of a key that many write by its
+        address there, else by the name that it says.
 
         Of a LATCHED topic, whose node the table names, it is told the instance of that node: see `watch_service`.
         """
@@ -253,6 +254,11 @@ class Node:
                 self.post(lambda: on_change(key.rpartition("/")[2], is_there))
 
         self._bus.watch_tokens(identity.bearers_of(principal_of(name, ""), name), on_token)
+
+    @property
+    def address(self) -> str:
+        """By which others know this node (bus/branches.py): its name, behind a person's certificate's."""
+        return self._identity.address
 
     @property
     def token(self) -> str:

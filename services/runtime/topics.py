@@ -9,7 +9,7 @@ from typing import Generic, Protocol, TypeVar
 from schemas.message import BadMessage, Message
 from schemas.system import TopicStatistics
 from schemas.topics import ANY, Delivery, Topic
-from services.runtime.bus.branches import is_by_every_node, name_in
+from services.runtime.bus.branches import is_of_many, name_in
 from services.runtime.bus.interface import Arrival, Bus
 from services.runtime.bus.wire import Encoded, encoded, from_arrival, schema_of
 from services.runtime.clock import SYSTEM, Clock
@@ -146,8 +146,8 @@ class Subscription(Generic[M]):
 
 
 def _require_own_name(key: str, message: Message, writer: str) -> None:
-    """Raises `BadMessage` for a message of a key of every node that speaks of another node than its writer."""
-    if not is_by_every_node(key):
+    """Raises `BadMessage` for a message of a key of many nodes that speaks of another node than its writer."""
+    if not is_of_many(key):
         return
     said = getattr(message, "node", "")
     if not writer:

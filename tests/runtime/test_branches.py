@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zenoh
@@ -19,7 +20,7 @@ from schemas.deployment import Deployment, PathsSection, RouterSection
 from schemas.message import encode
 from schemas.roles import ROLE_OF_NODE, ROLES, SERVICES
 from schemas.system import Empty, NodeInfo, NodeStatistics
-from schemas.topics import STATISTICS
+from schemas.topics import JOG, JOINT_TARGETS, STATISTICS, Topic
 from services.runtime.bus import branches, identity
 from services.runtime.bus.branches import address_of, branch_of, name_in, read_under, served_under, writer_at
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
@@ -261,6 +262,36 @@ def test_forged_statistics_and_logs_are_nobodys_behind_the_lock(
     assert believed(unlocked) == {"stepper_gateway", "cli-2", "cli-4"}
     assert believed(locked) == {"cli-4"}
     assert read_under("statistics") == "statistics/by/*/*"
+
+
+@pytest.mark.parametrize("topic", [JOG, JOINT_TARGETS])
+def test_nobody_jogs_or_streams_targets_as_another_persons_node_behind_the_lock(
+    locked: Sections, unlocked: Sections, tmp_path: Path, topic: Topic[Any]
+) -> None:
+    reader = "planner" if topic is JOG else "stepper_gateway"
+
+    def believed(sections: Sections) -> set[str]:
+        """The nodes that the reader believes to have written, where operator.lab writes in every branch."""
+        heard: list[str] = []
+        with (
+            node_of(sections[ROLE_OF_NODE[reader]], reader, tmp_path) as node,
+            sessions({"operator.lab": sections["operator.lab"]}) as opened,
+        ):
+            node.subscribe_signed(topic, lambda message, writer: heard.append(writer))
+            tried = ("operator.desk/cli-1", "panel/panel", "planner/planner", "operator.lab/*", "operator.lab/cli-1")
+            keys = [topic.key, *(f"{topic.key}/by/{branch}" for branch in tried)]
+
+            def send() -> None:
+                for key in keys:
+                    payload, schema = encode(topic.message(stamp=1)), topic.message.__name__
+                    opened["operator.lab"].put(key, payload, encoding=encoding_of(schema))
+                    node.wait(0.02)  # of a LATEST topic the newest message alone is handed over
+
+            assert hear(node, lambda: send() or heard.count("operator.lab/cli-1") > 3)
+        return set(heard)
+
+    assert believed(unlocked) == {"operator.desk/cli-1", "panel", "planner", "operator.lab/cli-1"}
+    assert believed(locked) == {"operator.lab/cli-1"}
 
 
 def test_people_of_one_role_find_one_another_by_their_certificates(locked: Sections, tmp_path: Path) -> None:

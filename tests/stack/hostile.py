@@ -35,7 +35,8 @@ NOTHING = zenoh.handlers.Callback(lambda reply: None, lambda: None, indirect=Fal
 def flood(session: zenoh.Session) -> None:
     payload = b"x" * SIZE + str(GOAL.goal_id).encode()
     own = written_under(OWN, "viewer", "hostile")
-    puts: list[Callable[[], object]] = [partial(session.put, key, payload) for key in (own, *FOREIGN, own)]
+    foreign = (written_under(key, "operator", "hostile") for key in FOREIGN)
+    puts: list[Callable[[], object]] = [partial(session.put, key, payload) for key in (own, *foreign, own)]
     asks: list[Callable[[], object]] = [
         partial(session.get, asked_under(key, "viewer"), NOTHING, payload=payload, timeout=0.5) for key in ASKED
     ]

@@ -20,7 +20,7 @@ IDLE = DeviceState(mode=DeviceMode.IDLE, armed=True, referenced=(True, True, Tru
 
 
 def page(node: str) -> SimpleNamespace:
-    return SimpleNamespace(node=SimpleNamespace(name=node), description=rm1())
+    return SimpleNamespace(node=SimpleNamespace(address=node), description=rm1())
 
 
 def readings(control: ControlState | None) -> Readings:

@@ -338,6 +338,28 @@ def test_a_frozen_holder_that_wakes_too_late_finds_another_holder_and_cannot_giv
     assert state(rig).members == ("cli-2",)
 
 
+@pytest.mark.parametrize(
+    ("principal", "address"), [("operator.desk", "operator.desk/cli-1"), ("local", "cli-1"), ("panel", "panel")]
+)
+def test_a_stream_is_the_holders_by_the_address_in_its_key(principal: str, address: str) -> None:
+    """Behind the lock two people may have nodes of one name."""
+    rig = VirtualArm().ready()
+    node = address.rpartition("/")[2]
+    token = f"@id/{principal}/{node}/{1:020d}.1.desk"
+    rig.control(ControlTake(name="ana", client=token, secret=SECRETS[ANA]), ANA.session)
+    rig.run(0.1)
+    assert state(rig).members == (address,)
+    targets = JointTargets(name=rig.arm.joint_names, position=(0.1, 0.0, 0.0))
+    for stranger in {node, "operator.lab/cli-1", "operator.lab/panel", "local/cli-1"} - {address}:
+        for _ in range(10):
+            rig.stream(targets, stranger)
+            rig.run(0.02)
+        assert rig.position == ZERO, stranger
+    rig.stream(targets, address)
+    rig.run(0.3)
+    assert rig.position != ZERO
+
+
 def test_given_back_everybody_may_move() -> None:
     rig = held_by_ana()
     rig.control(ControlGive(secret=SECRETS[ANA]), "any", 2)

@@ -32,7 +32,7 @@ def reasons(arm: gemelo.Arm, readings: Readings) -> dict[str, Reason]:
 def other_holder(arm: gemelo.Arm, readings: Readings) -> str | None:
     """The name of who holds control of the arm, if that is neither nobody nor this page."""
     control = readings.control
-    if control is None or not control.held or arm.node.name in control.members:
+    if control is None or not control.held or arm.node.address in control.members:
         return None
     return control.name
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 
-from schemas.roles import BY_EVERY_NODE, ROLE_OF_NODE, ROLES
+from schemas.roles import BY_EVERY_NODE, BY_HAND, ROLE_OF_NODE, ROLES
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")  # of a node
 PRINCIPAL = re.compile(r"[a-z0-9][a-z0-9_-]*(?:\.[a-z0-9][a-z0-9_-]*)?")
@@ -19,7 +19,7 @@ LOCAL = "local"  # the principal of a session without a certificate
 BY, FROM = "by", "@from"
 
 _OF_SERVICES = frozenset(role.name for role in ROLES if role.node)
-_BY_EVERY_NODE = frozenset(topic.key for topic in BY_EVERY_NODE)
+_OF_MANY = frozenset(topic.key for topic in (*BY_EVERY_NODE, *BY_HAND))
 
 
 def address_of(principal: str, node: str) -> str | None:
@@ -49,19 +49,19 @@ def principal_of(node: str, shown: str) -> str:
     return shown or ROLE_OF_NODE.get(node, LOCAL)
 
 
-def is_by_every_node(key: str) -> bool:
-    """True if every node writes under this key, each in its own branch."""
-    return key in _BY_EVERY_NODE
+def is_of_many(key: str) -> bool:
+    """True if many nodes write under this key, each in its own branch."""
+    return key in _OF_MANY
 
 
 def written_under(key: str, principal: str, node: str) -> str:
     """The key under which a node writes what is read under `key`."""
-    return f"{key}/{BY}/{principal}/{node}" if is_by_every_node(key) else key.removeprefix("@")
+    return f"{key}/{BY}/{principal}/{node}" if is_of_many(key) else key.removeprefix("@")
 
 
 def read_under(key: str) -> str:
     """The key expression of all that is written under `key`."""
-    return f"{key}/{BY}/*/*" if is_by_every_node(key) else key.removeprefix("@")
+    return f"{key}/{BY}/*/*" if is_of_many(key) else key.removeprefix("@")
 
 
 def writer_at(wire_key: str) -> str | None:

@@ -20,7 +20,7 @@ ENCODING = "application/msgpack"  # the schema's name follows after a semicolon
 class Arrival:
     """One message as it came: `schema` and `writer` (a node's name) are empty where the sender named none.
 
-    Of a key that every node writes, `writer` is the node's address as the key has it (branches.py), else as it says.
+    Of a key that many nodes write, `writer` is the node's address as the key has it (branches.py), else as it says.
     `instance` is which of the processes with that name, of a LATCHED key: the end of its token (identity.py).
     """
 

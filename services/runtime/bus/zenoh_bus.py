@@ -29,7 +29,7 @@ from services.credentials.common_name import common_name
 from services.runtime.bus.branches import (
     LOCAL,
     asked_under,
-    is_by_every_node,
+    is_of_many,
     principal_of,
     read_under,
     writer_at,
@@ -164,7 +164,7 @@ class ZenohBus:
         on_miss: Callable[[int], None],
         own: bool = False,
     ) -> ZenohDeclaration:
-        is_branched, read = is_by_every_node(key), read_under(key)
+        is_branched, read = is_of_many(key), read_under(key)
 
         def on_sample(sample: zenoh.Sample) -> None:
             signature = ((writer_at(str(sample.key_expr)) or ""), "") if is_branched else signature_in(sample)

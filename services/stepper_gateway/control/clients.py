@@ -6,17 +6,21 @@ import re
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from schemas.roles import ROLE_OF_NODE
 from services.stepper_gateway.goals.rejections import invalid
+
+LOCAL = "local"  # the principal of a node without a certificate
 
 # `@id/<principal>/<node>/<start [ns]>.<pid>.<host>` (services/runtime/bus/identity.py); nothing that a key
 # gives a meaning. Recordings of before have no principal.
 TOKEN = re.compile(
-    r"@id/(?:[a-z0-9][a-z0-9_.-]{0,95}/)?([a-z0-9][a-z0-9_-]{0,63})/[0-9]{20}\.[0-9]{1,10}\.([A-Za-z0-9_-]{1,64})"
+    r"@id/(?:([a-z0-9][a-z0-9_.-]{0,95})/)?([a-z0-9][a-z0-9_-]{0,63})/[0-9]{20}\.[0-9]{1,10}\.([A-Za-z0-9_-]{1,64})"
 )
 
 
 class MotionCaller(NamedTuple):
-    """Who asks for a motion: a request names the session, a streamed target the node; empty where it is not known."""
+    """Who asks for a motion: a request names the session, a streamed target the node by its address in the key of the
+    target; empty where it is not known."""
 
     session: str = ""
     node: str = ""
@@ -30,12 +34,13 @@ class ControlClient:
     node: str
     host: str
     session: str
+    address: str  # of the node (services/runtime/bus/branches.py)
 
     def is_caller(self, caller: MotionCaller) -> bool:
         """True if `caller` names this node."""
         if caller.session:
             return caller.session == self.session
-        return bool(caller.node) and caller.node == self.node
+        return bool(caller.node) and caller.node == self.address
 
 
 def client_of(key: str, session: str) -> ControlClient:
@@ -45,4 +50,6 @@ def client_of(key: str, session: str) -> ControlClient:
         raise invalid(f'client "{key[:80]}" is not the key of a liveliness token: `gemelo control take` sends its own')
     if not session:
         raise invalid("the request does not say which session it comes from: use `gemelo control`, or its Python API")
-    return ControlClient(key, found[1], found[2], session)
+    principal, node, host = found[1] or LOCAL, found[2], found[3]
+    is_plain = principal == LOCAL or ROLE_OF_NODE.get(node) == principal
+    return ControlClient(key, node, host, session, node if is_plain else f"{principal}/{node}")

@@ -92,7 +92,7 @@ class ControlHolder:
         return ControlState(
             stamp=stamp, epoch=self._epoch, number=self._number, held=True, name=holder.name,
             node=holder.client.node, host=holder.client.host, since=self._since.unix,
-            members=tuple(member.node for member in self._members.values()), pending=about.pending,
+            members=tuple(member.address for member in self._members.values()), pending=about.pending,
         )  # fmt: skip
 
     def objection(self, caller: MotionCaller, moment: Moment) -> str:
