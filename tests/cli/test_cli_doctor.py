@@ -135,7 +135,10 @@ def test_the_doctor_says_why_a_broker_does_not_let_the_gateway_in(tmp_path: Path
 
 
 def test_the_doctor_says_which_process_gets_no_descriptor_any_more():
-    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
+    program = "print(flush=True); input()"
+    with subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()  # it has loaded what it needs
         info = NodeInfo(node="planner", pid=process.pid)
         assert list(doctor.descriptors([info])) == []
         take_descriptors(process.pid)

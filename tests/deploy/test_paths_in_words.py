@@ -41,12 +41,17 @@ def names() -> frozenset[str]:
 
 
 def is_there(named: str, page: PurePosixPath) -> bool:
-    """Whether a name is no path of this repository, or is one beside `page`, or from the root, or a known last part."""
+    """Whether a name is no path of this repository, or is one beside `page`, or from the root, or a known last part.
+
+    A file of tests may be named as below tests/.
+    """
     if named in MADE or "<" in named or named.startswith("/"):
         return True
     if "/" not in named.rstrip("/"):
         return not (SOURCE.match(named) or named.endswith("/")) or named.rstrip("/") in names()
     first = named.split("/")[0]
+    if PurePosixPath(named).name.startswith("test_") and (ROOT / "tests" / named).is_file():
+        return True
     bases = (ROOT, ROOT / page.parent) if first in names() or first in (".", "..") else ()
     folders = [folder for folder in bases if (folder / first).is_dir()]
     return not folders or any(any(folder.glob(named)) or (folder / named).exists() for folder in folders)

@@ -17,7 +17,7 @@ from services.stepper_gateway.links.serial import SerialLink
 from services.virtual_arm.virtual_arm import rm1
 from tests.descriptors import few_descriptors
 from tests.runtime.support import until
-from tests.stepper_gateway.processes import BROKER, Processes
+from tests.stepper_gateway.processes import Processes
 
 NONE_LEFT = "no descriptor"
 
@@ -26,7 +26,7 @@ NONE_LEFT = "no descriptor"
 def access(tmp_path):
     processes = Processes("mosquitto", tmp_path)
     try:
-        processes.start(BROKER)
+        processes.start_broker()
         yield gateway_access(MqttSection(port=processes.port))
     finally:
         processes.close()

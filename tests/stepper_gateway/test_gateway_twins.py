@@ -96,7 +96,7 @@ def accepted(driver: GatewayDriver, goal_id: str, arm: VirtualArm) -> bool:
 
 
 @given(st.floats(0.0, 2.5), st.lists(st.tuples(st.booleans(), st.floats(0.0, 1.0)), max_size=6), st.booleans())
-@examples(quick=4, full=8, phases=(Phase.explicit, Phase.generate))
+@examples(quick=6, full=60, phases=(Phase.explicit, Phase.generate))
 def test_of_two_gateways_never_are_chunks_of_both_played_and_a_stop_of_either_works(
     joins: float, goals: list[tuple[bool, float]], first_stops: bool
 ) -> None:
@@ -132,7 +132,7 @@ def test_each_says_so_and_the_one_that_stays_goes_on() -> None:
 
 
 @given(st.floats(1.0, 6.0), st.floats(0.0, 2.0))
-@examples(quick=4, full=5, phases=(Phase.explicit, Phase.generate))
+@examples(quick=15, full=100, phases=(Phase.explicit, Phase.generate))
 def test_a_gateway_that_thaws_beside_another_moves_nothing(frozen: float, later: float) -> None:
     arm = Twins()
     arm.ready()

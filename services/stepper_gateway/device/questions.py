@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from services.stepper_gateway.links.frames import Sync
+from services.stepper_gateway.links.frames import Sync, SyncReply
 from services.stepper_gateway.moment import Moment
 
 # While answers are missing they are frequent: so a wire that loses most frames is told from a device that gets none.
@@ -13,7 +13,7 @@ DEAF_AFTER = 1.4  # [s] of questions without an answer; chosen: with the pause b
 LEAST_UNANSWERED = 4  # questions; chosen: more than one, as a pause of this loop is no deafness of the device
 TWIN_SEEN = 1.5  # [s] that an answer to a stranger's question counts; chosen: three of its questions
 MOST_STRANGE = 8  # such answers that are compared; chosen: some garbled ones between two true ones do not hide these
-SAME_PACE = 0.1  # [s] by which the times in two questions and between their answers differ; chosen: a network's jitter
+SAME_PACE = 0.1  # [s] by which the times of two questions differ by both clocks; chosen: a network's jitter
 KEPT_QUESTIONS = 512  # of ours, which are no stranger's however late the answer; chosen: 15 s of the most frequent
 QUESTIONS = 32  # that may be under way; chosen: 1 s of them at first, beyond which answers are late
 
@@ -24,7 +24,7 @@ class Questions:
     def __init__(self) -> None:
         self._open: deque[int] = deque(maxlen=QUESTIONS)  # [us] SYNCs that may be answered
         self._asked: deque[int] = deque(maxlen=KEPT_QUESTIONS)  # [us] all of ours
-        self._strange: deque[tuple[float, float]] = deque(maxlen=MOST_STRANGE)  # [s] t0 and arrival, to others
+        self._strange: deque[SyncReply] = deque(maxlen=MOST_STRANGE)  # to others
         self._twin_seen = -1.0e9  # [s] monotonic
         self._unanswered = 0  # SYNCs since the last answer
         self._unanswered_since = 0.0  # [s] monotonic, of the first of them
@@ -44,12 +44,12 @@ class Questions:
         self._unanswered += 1
         return Sync(boot_id=boot_id, t0=moment.micros)
 
-    def is_open(self, t0: int, arrival_us: int) -> bool:
-        """True if this may be the answer to one that was asked at `t0` [us]; another gateway's answers are noted."""
-        if t0 in self._open:
+    def is_open(self, reply: SyncReply, arrival_us: int) -> bool:
+        """True if this may be the answer to an open question; another gateway's answers are noted."""
+        if reply.t0 in self._open:
             return True
-        if t0 not in self._asked:
-            self._on_strange_answer(t0 * 1e-6, arrival_us * 1e-6)
+        if reply.t0 not in self._asked:
+            self._on_strange_answer(reply, arrival_us * 1e-6)
         return False
 
     def on_answer(self, t0: int, arrival_us: int) -> None:
@@ -77,16 +77,13 @@ class Questions:
         """True if the device answers another gateway: what each sends would move the arm of the other."""
         return now - self._twin_seen <= TWIN_SEEN
 
-    def _on_strange_answer(self, asked: float, arrival: float) -> None:
-        """An answer to what somebody has asked by his clock at `asked` [s]: a gateway's clock goes on with ours.
+    def _on_strange_answer(self, reply: SyncReply, arrival: float) -> None:
+        """An answer to somebody's question: the clock of a gateway goes on as the device's does, late as it may come.
 
         One answer may be forged or garbled, or be to the gateway before this one.
         """
-        for before, came in self._strange:
-            if (
-                0.0 < arrival - came <= TWIN_SEEN
-                and asked > before
-                and abs(asked - before - (arrival - came)) < SAME_PACE
-            ):
+        for before in self._strange:
+            asked, taken = (reply.t0 - before.t0) * 1e-6, (reply.t1 - before.t1) * 1e-6
+            if asked > 0.0 and 0.0 < taken <= TWIN_SEEN and abs(asked - taken) < SAME_PACE:
                 self._twin_seen = arrival
-        self._strange.append((asked, arrival))
+        self._strange.append(reply)

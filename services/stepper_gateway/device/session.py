@@ -168,7 +168,7 @@ class DeviceSession:
     def on_sync_reply(self, reply: SyncReply, arrival_us: int) -> None:
         """Take an answer to a question of ours; raises `BadFrame` for one that is not believed."""
         self.require_known(reply)
-        if reply.boot_id != self.boot_id or not self._questions.is_open(reply.t0, arrival_us):
+        if reply.boot_id != self.boot_id or not self._questions.is_open(reply, arrival_us):
             return
         if not self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us):  # the question stays open for the true answer
             raise BadFrame(f"an answer of {reply.t1} us, which is not the device's clock as it is known")
