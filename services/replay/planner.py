@@ -54,7 +54,7 @@ class PlansAgain:
 
     def __init__(self, recorded: Recorded, comparison: Comparison, arm: ArmDescription, scenes: Scenes) -> None:
         self.comparison = comparison
-        self._recorded, self._scenes = recorded, scenes
+        self._recorded, self._scenes, self._arm = recorded, scenes, arm
         self._planner = Planner(arm)
         self._shown: SceneVersion | None = None
         recorded.require(SCENE)
@@ -62,23 +62,31 @@ class PlansAgain:
         self._put = [path.message.stamp for path in self._paths]
 
     def pairs(self) -> Iterator[tuple[Heard[Any], PlanInputs]]:
-        """Each answer with what it was made from, which the planner publishes just before it."""
-        waiting = iter(self._recorded.require(PLAN_INPUTS))
+        """Each answer with what it was made from, which the planner publishes just before it.
+
+        The numbers of a planner that was started again begin with 1.
+        """
+        waiting = (each.message for each in self._recorded.require(PLAN_INPUTS))
         number: int | None = None
         for exchange in self._recorded.require(PLANS):
             if exchange.message.failure is not None:
                 self.comparison.aside[UNANSWERED] += 1
                 continue
             inputs = next(waiting, None)
-            lost = inputs is None or inputs.message.stamp > exchange.message.stamp
-            if inputs is None or lost or (number is not None and inputs.message.number != number + 1):
+            asked = exchange.message.stamp - round(exchange.message.duration * 1e9)
+            while inputs is not None and inputs.stamp < asked:  # of an answer that was lost with its planner or client
+                number, inputs = inputs.number, next(waiting, None)
+            is_lost = inputs is None or inputs.stamp > exchange.message.stamp
+            if inputs is None or is_lost or (number is not None and inputs.number not in (1, number + 1)):
                 raise NotReplayable(
                     f"{self._recorded.path}: {PLAN_INPUTS.key} of the plan at {exchange.at:.3f} s is missing (number "
                     f"{1 if number is None else number + 1}): an input was lost, or record_inputs was off; take "
                     "another recording"
                 )
-            number = inputs.message.number
-            yield exchange, inputs.message
+            if number is not None and inputs.number == 1:
+                self._planner, self._shown = Planner(self._arm), None
+            number = inputs.number
+            yield exchange, inputs
 
     def hold(self, exchange: Heard[Any], inputs: PlanInputs) -> bool:
         """True if the plan is the same again, or is set aside."""

@@ -66,3 +66,30 @@ def test_the_two_jog_buttons_of_an_axis_share_a_row_and_each_key_holds_and_press
         assert set(jogged.held) <= {"x +  ▲", "z -  PgDn"}
     finally:
         context.close()
+
+
+TOPS = """() => {
+  window.tops = [];
+  const look = () => {
+    const pair = ['late -', 'late +'].map((t) => [...document.querySelectorAll('button')].find((b) => b.textContent === t));
+    if (pair[0] && pair[1]) window.tops.push(pair.map((b) => b.getBoundingClientRect().top));
+    requestAnimationFrame(look);
+  };
+  look();
+}"""
+
+
+def test_buttons_that_come_later_share_a_row_in_every_frame(jogged: Jogged, chromium: Browser) -> None:
+    """So that none moves away below a pointer that is already there."""
+    context = chromium.new_context(viewport={"width": 900, "height": 700}, device_scale_factor=0.5)
+    page = context.new_page()
+    page.goto(f"http://127.0.0.1:{jogged.server.get_port()}")
+    try:
+        page.get_by_role("button", name="Home").wait_for(timeout=OPENING)
+        page.evaluate(TOPS)
+        for label in ("late -", "late +"):
+            jogged.server.gui.add_button(label)
+        tops = until(lambda: page.evaluate("window.tops"), lambda seen: len(seen) > 5)
+        assert [pair for pair in tops if pair[0] != pair[1]] == []
+    finally:
+        context.close()

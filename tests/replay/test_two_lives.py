@@ -1,4 +1,4 @@
-"""A gateway that is killed and starts again while it is recorded: both of its lives are replayed."""
+"""A gateway or planner that is killed and starts again while it is recorded: both of its lives are replayed."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Publish
 from services.stepper_gateway.parameters import GatewayParameters
 from services.virtual_arm.virtual_arm import UNIX, rm1
+from tests.replay.conftest import Messages
 
 PERIOD = 0.02  # [s]
 
@@ -120,3 +121,22 @@ def test_a_second_life_whose_beginning_is_missing_is_refused(tmp_path):
     entries = [each for each in entries if place_of(each) != (12, 0)]
     with pytest.raises(NotReplayable, match=r"number 0 is missing at .* \(those of a new process begin with 1\)"):
         replay(recorded(tmp_path / "hole.mcap", entries), "stepper_gateway")
+
+
+def test_the_plans_of_both_lives_of_a_planner_are_made_again(changed):
+    def alter(inputs, number):
+        inputs["number"] -= 3 * (number > 2)
+
+    comparison = replay(changed("planner", Messages("plan/inputs", alter)), "planner")
+    assert comparison.difference is None
+    assert comparison.alike["@request/plan"] > 3
+
+
+def test_a_plan_whose_answer_was_lost_with_its_planner_is_left_out(changed):
+    def alter(exchange, number):
+        if number == 2:
+            exchange["answer"], exchange["failure"] = None, {"message": "planner has ended"}
+
+    comparison = replay(changed("planner", Messages("@request/plan", alter)), "planner")
+    assert comparison.difference is None
+    assert comparison.alike["@request/plan"] > 3

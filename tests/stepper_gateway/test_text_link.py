@@ -76,10 +76,11 @@ def test_a_move_arrives_at_the_board_and_every_line_is_acknowledged(baud: int) -
 
 def test_the_board_is_told_the_commanded_steps_to_less_than_a_step() -> None:
     board = PtyBoard()
-    with wired(board) as (gateway, _):
+    with wired(board) as (gateway, link):
         reference(gateway)
         assert gateway.move_to(END).accepted
         gateway.finish()
+        assert gateway.run(10.0, lambda: not link.device.exchange.is_waiting), "its last line has no answer"
         for joint, said, counted in zip(gateway.arm.joints, board.position, gateway.state.steps, strict=True):
             assert abs(joint.steps.to_steps(said) - counted) < 0.1
 

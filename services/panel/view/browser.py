@@ -11,8 +11,8 @@ the image may have been replaced by the next one between the two.
 Where the Stop button is scrolled out of sight or covered, a second one stands at the bottom, beside the controls where
 there is room, else upon them. While the controls are built anew there is no such button, or one that the page no longer
 knows: every Stop is counted, and told through the hidden field as well.
-The tabs stand closer, so that all of them have room in one row, and the two jog buttons of an axis share a row. A file
-that is too large is not sent at all.
+The tabs stand closer, so that all of them have room in one row, and the two jog buttons of an axis share a row from
+their first frame on: none moves away below a pointer. A file that is too large is not sent at all.
 """
 
 from __future__ import annotations
@@ -117,14 +117,15 @@ SCRIPT = """
   const arrange = () => buttons().forEach((b) => {
     const place = b.parentElement.style;
     const isOfPair = / [+-](  \\S+)?$/.test(b.textContent);
-    if (isOfPair) Object.assign(place, {display: 'inline-block', width: 'calc(50% - 1.25em)'});
+    if (isOfPair && !place.width) Object.assign(place, {display: 'inline-block', width: 'calc(50% - 1.25em)'});
   });
+  new MutationObserver(arrange).observe(document.body, {childList: true, subtree: true});
   const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;
   let frames = 0, began = performance.now(), rate = 0, told = '', toldClicks = 0, toldRate = 0;
   const tell = () => {
     frames += 1;
     const now = performance.now();
-    if (now - began > 1000) { rate = frames * 1000 / (now - began); frames = 0; began = now; arrange(); keepStop(); }
+    if (now - began > 1000) { rate = frames * 1000 / (now - began); frames = 0; began = now; keepStop(); }
     const field = [...document.querySelectorAll('input')].find((i) => i.value.startsWith('CHANNEL'));
     const sent = (document.querySelector('[data-gemelo-sent]') || {dataset: {}}).dataset.gemeloSent || '';
     if (field) {
