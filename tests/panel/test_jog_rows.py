@@ -71,7 +71,8 @@ def test_the_two_jog_buttons_of_an_axis_share_a_row_and_each_key_holds_and_press
 TOPS = """() => {
   window.tops = [];
   const look = () => {
-    const pair = ['late -', 'late +'].map((t) => [...document.querySelectorAll('button')].find((b) => b.textContent === t));
+    const find = (text) => [...document.querySelectorAll('button')].find((b) => b.textContent === text);
+    const pair = ['late -', 'late +'].map(find);
     if (pair[0] && pair[1]) window.tops.push(pair.map((b) => b.getBoundingClientRect().top));
     requestAnimationFrame(look);
   };
