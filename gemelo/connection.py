@@ -7,11 +7,12 @@ from pathlib import Path
 
 from gemelo.arm import Arm
 from gemelo.errors import Error, Lost
-from gemelo.robot_files import Robot, load_robot, require_router
+from gemelo.robot_files import Robot, find_robot, require_router
 from gemelo.session import Session, open_node
 from schemas.deployment import Deployment
 from services.runtime.deployment import is_loopback, load_deployment
 from services.runtime.robots import robots_on
+from services.runtime.started import load_started
 
 GATEWAY = "stepper_gateway"
 LOOK_EVERY = 0.1  # [s] while the twin is awaited
@@ -25,10 +26,11 @@ def connect(
     timeout: float = 0.0,
     needs_gateway: bool = True,
 ) -> Arm:
-    """The arm of the deployment (the file `deployment`, $GEMELO_CONFIG, or deploy/local.toml), or another `robot`.
+    """The arm that runs: the only one on the router, the one that `gemelo use` has chosen, or `robot`.
 
-    `robot`: a folder of urdf/, a path to one, or what `load_robot` has read. `name`: of this script's node; its file's
-    name and process if left out. `timeout` [s]: that the twin may take to be there. `needs_gateway=False` also takes
+    `robot`: a folder of urdf/, a path to one, or what `load_robot` has read. `deployment`: a file that says where the
+    router is, else $GEMELO_CONFIG, or what this folder has started. `name`: of this script's node; its file's name and
+    process if left out. `timeout` [s]: that the twin may take to be there. `needs_gateway=False` also takes
     a twin that cannot move, for what the planner alone answers. Raises `Lost` where the twin does not run, `Error`
     where its files are wrong.
 
@@ -37,8 +39,7 @@ def connect(
     True
     """
     end = time.monotonic() + timeout
-    found = robot if isinstance(robot, Robot) else load_robot(robot, deployment=deployment)
-    _await_router(found.deployment, end)
+    found = _find(robot, deployment, end)
     node = open_node(found.deployment, found.description.name, name)
     session = Session(found.deployment, found.description, node)
     try:
@@ -58,18 +59,23 @@ def robots(deployment: str | Path | Deployment | None = None) -> tuple[str, ...]
     """
     if not isinstance(deployment, Deployment):
         try:
-            deployment = load_deployment(None if deployment is None else Path(deployment))
+            deployment = load_started() if deployment is None else load_deployment(Path(deployment))
         except (ValueError, OSError) as error:
             raise Error(str(error)) from error
     return robots_on(deployment.router, GATEWAY)
 
 
-def _await_router(deployment: Deployment, end: float) -> None:
+def _find(robot: str | Robot, deployment: str | Path | None, end: float) -> Robot:
+    """Looks until a router listens and the arm runs; at `end` [s] monotonic it is whatever the files say."""
     while True:
+        found = robot if isinstance(robot, Robot) else find_robot(robot, deployment=deployment)
+        is_late = time.monotonic() >= end
         try:
-            return require_router(deployment)
+            require_router(found.deployment)
+            if is_late or found is robot or found.description.name in robots(found.deployment):
+                return found
         except Lost:
-            if time.monotonic() > end:
+            if is_late:
                 raise
         time.sleep(LOOK_EVERY)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +14,9 @@ from schemas.deployment import Deployment
 from services.arm.errors import suggestion
 from services.arm.model import description as descriptions
 from services.arm.model.description import ArmDescription
-from services.runtime.deployment import deployment_of_arm, load_deployment, project_root, when_silent
+from services.runtime.deployment import CONFIG, load_deployment, project_root, when_silent
+from services.runtime.running import find_deployment, folder_of
+from services.runtime.started import deployment_of_arm
 
 LOOK_TIMEOUT = 1.0  # [s] of one look for the router
 
@@ -30,7 +33,7 @@ class Robot(NamedTuple):
 
 
 def load_robot(robot: str = "", *, deployment: str | Path | None = None) -> Robot:
-    """Reads the files of the arm that `connect` with the same arguments is for; asks nobody.
+    """Reads the files of an arm and of its deployment; asks nobody what runs.
 
     One of several arms that `make up ARMS=...` has started has folders of its own.
 
@@ -52,6 +55,24 @@ def load_robot(robot: str = "", *, deployment: str | Path | None = None) -> Robo
         raise error if isinstance(error, Error) else Error(str(error)) from error
 
 
+def find_robot(robot: str = "", *, deployment: str | Path | None = None, ask: bool = True) -> Robot:
+    """The arm that runs, with the files that its twin was started with; that of this folder where none runs.
+
+    `robot`, else $GEMELO_ROBOT or $GEMELO_CONFIG, is the one that is meant; else the only one on the router, else the
+    one that `gemelo use` has chosen. Raises `Error` where a file is wrong or several run, `BadArgument` where there is
+    no such arm. Without `ask` nobody is asked, and it is what this folder has started last.
+    """
+    environ = dict(os.environ) if deployment is None else {**os.environ, CONFIG: str(deployment)}
+    try:
+        found = find_deployment(robot, environ, ask=ask)
+        description = descriptions.load_arm(project_root() / found.robot)
+    except (ValueError, OSError) as error:
+        raise Error(str(error)) from error
+    if robot and description.name != robot:
+        _folder(robot)
+    return Robot(found, description)
+
+
 def require_router(deployment: Deployment) -> None:
     """Raises `Lost` at once where no router listens, instead of waiting for a twin that does not run."""
     address = (deployment.router.host, deployment.router.port)
@@ -63,8 +84,7 @@ def require_router(deployment: Deployment) -> None:
 
 def _folder(robot: str) -> Path:
     """urdf/<robot>, or the path itself."""
-    for folder in (project_root() / "urdf" / robot, Path(robot)):
-        if (folder / "robot.toml").is_file():
-            return folder.resolve()
+    if (folder := folder_of(robot)) is not None:
+        return folder
     known = sorted(path.parent.name for path in (project_root() / "urdf").glob("*/robot.toml"))
     raise BadArgument(f'there is no arm "{robot}"{suggestion(robot, known)}')

@@ -12,16 +12,18 @@ from gemelo.scene import Scene
 from gemelo.session import Session
 from gemelo.units import Point, Pose
 from schemas.camera import CameraCondition, CameraStatus
-from schemas.cell import TagThing, Thing
+from schemas.cell import CellTexts, TagThing, Thing
 from schemas.detections import Detection, Detections
 from schemas.system import Empty
-from schemas.topics import CAMERA, JOINT_STATES, camera_detections, camera_status
-from services.arm.cell.cell_file import Cell, load_cell
+from schemas.topics import CAMERA, CELL, JOINT_STATES, camera_detections, camera_status
+from services.arm.cell.cell_file import Cell, cell_of, load_cell
 from services.arm.errors import DescriptionError
 from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message
 from services.runtime.endpoints import info_request
 from services.runtime.topics import Subscription
 
+NO_CELL = "(urdf/rm1/cell.toml is a sample: GEMELO_CELL=urdf/rm1/cell.toml make up)"
+TO_READ = 2.0  # [s] for the cell to come over the bus
 IMAGES = 5  # of which the median is taken
 ENOUGH = 3  # of them that must show a thing
 ANSWER = 2.0  # [s] for the camera's process to tell its time
@@ -66,18 +68,27 @@ class Eyes:
         self._session, self._scene = session, scene
 
     def cell(self) -> Cell:
-        """What stands around the arm, by the deployment's cell.toml; raises `Refused` without one, `Error` if wrong."""
-        path = self._session.deployment.cell
-        if not path:
-            raise Refused(
-                "the twin has no cell file: urdf/rm1/cell.toml is a sample; start it with "
-                "GEMELO_CELL=urdf/rm1/cell.toml make up",
-                check="cell",
-            )
+        """What stands around the arm, by the twin's cell.toml; raises `Refused` without one, `Error` if wrong."""
+        path, arm = self._session.deployment.cell, self._session.description
         try:
-            return load_cell(Path(path), self._session.description)
+            if path and Path(path).is_file():
+                return load_cell(Path(path), arm)
+            return cell_of(self._read_cell(), arm, is_here=False)
         except DescriptionError as error:
             raise Error(str(error)) from error
+
+    def _read_cell(self) -> CellTexts:
+        """What the twin's process `camera` has published of its cell; raises `Refused` where it has none."""
+        latest, robot = self._session.latest(CELL), self._session.description.name
+        if CAMERA not in self._session.node.alive():
+            why = f"the twin of {robot} has no cell file, and no process camera"
+        elif not self._session.wait_for(lambda: latest.message is not None, TO_READ) or latest.message is None:
+            why = f"the process camera of {robot} says nothing of its cell: is it running? `gemelo node list`"
+        elif not latest.message.path:
+            why = f"the twin of {robot} was started without a cell file"
+        else:
+            return latest.message
+        raise Refused(f"{why} {NO_CELL}", check="cell")
 
     def detect(self, name: str, camera: str, in_scene: bool) -> tuple[Seen, ...]:
         """What is seen of `name`, or of all things and places; raises `Refused`, `BadArgument`, `Error` or `Lost`."""

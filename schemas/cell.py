@@ -12,6 +12,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from schemas.message import Message
 from schemas.robot import Edges, NotNegative, Positive
 
 CellName = Annotated[str, Meta(pattern="^[a-z][a-z0-9_]*$")]  # a camera's is part of a key on the bus
@@ -222,3 +223,11 @@ class CameraFile(CellRecord, frozen=True, kw_only=True):
     """All of camera.toml."""
 
     camera: tuple[MeasuredCamera, ...] = ()
+
+
+class CellTexts(Message, frozen=True, kw_only=True):
+    """A cell as it travels over the bus: the texts of its files, for whoever does not have them."""
+
+    path: str = ""  # of cell.toml on the host of the process `camera`; empty: the twin was started without a cell
+    cell: str = ""  # cell.toml
+    cameras: str = ""  # camera.toml beside it; empty: nothing is measured

@@ -50,6 +50,16 @@ class NodeStatistics(Message, frozen=True, kw_only=True):
     started: int = 0  # [ns] UNIX time of the node's start; 0: from a node that does not say it
 
 
+class NodeFiles(Message, frozen=True, kw_only=True):
+    """The files that a node was started with, as paths of its host; empty where it runs in virtual time."""
+
+    robot: str = ""  # folder of robot.toml
+    cell: str = ""  # cell.toml; empty: none
+    run: str = ""
+    out: str = ""
+    programs: str = ""
+
+
 class NodeInfo(Message, frozen=True, kw_only=True):
     """The identity and endpoints of a node."""
 
@@ -68,6 +78,7 @@ class NodeInfo(Message, frozen=True, kw_only=True):
     problem: str = ""  # why it is not, where it says so
     certificate_ends: float | None = None  # [s] UNIX time, of the one that it shows to the router; None: it shows none
     unwritten: str = ""  # what it cannot write to its disk, and the remedies; it works on without
+    files: NodeFiles = NodeFiles()
 
 
 class TopicInterface(Message, frozen=True, kw_only=True):

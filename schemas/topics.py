@@ -11,6 +11,7 @@ from enum import Enum
 from typing import Generic, TypeVar
 
 from schemas.camera import CameraImage, CameraInfo, CameraStatus
+from schemas.cell import CellTexts
 from schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlState, ControlTake
 from schemas.detections import Detections
 from schemas.device import (
@@ -182,6 +183,7 @@ COMMAND_ACKS = Topic("command_acks", CommandAck, EVERY, None, True, GATEWAY, "th
 GATEWAY_INPUTS = Topic(
     "device/inputs", GatewayInputs, EVERY, None, True, GATEWAY, "all that the gateway's core was given, for a replay"
 )
+CELL = Topic("cell", CellTexts, LATCHED, None, True, CAMERA, "cell.toml and camera.toml: cameras, things and places")
 LOG = Topic("log", LogRecord, EVERY, None, True, ANY, "the log of every node")
 STATISTICS = Topic(
     "statistics", NodeStatistics, EVERY, None, True, ANY, "loop rate, losses and CPU of every node, 1 Hz"
@@ -195,7 +197,7 @@ TOPICS: tuple[Topic[Message], ...] = (
     PLAN_PROGRESS, PLAN_INPUTS, ANSWER_INPUTS, JOG_INPUTS,
     SCENE, CONTACTS, JOG, JOG_STATUS, DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, DEVICE_CONFIGURATION,
     SENSORS, DEVICE_SHAFT, GRIPPER_STATE, STEP_LEDGER, STOPPING_DISTANCE, CONTROL,
-    COMMANDS, COMMAND_ACKS, GATEWAY_INPUTS, LOG, STATISTICS, PARAMETER_CHANGES,
+    COMMANDS, COMMAND_ACKS, GATEWAY_INPUTS, CELL, LOG, STATISTICS, PARAMETER_CHANGES,
 )  # fmt: skip
 
 # One of each for every camera of the cell file, by the camera's name.

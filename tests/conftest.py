@@ -7,6 +7,7 @@ HYPOTHESIS_PROFILE=full. HYPOTHESIS_PROFILE=explore looks for new examples.
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
 from pathlib import Path
@@ -33,6 +34,9 @@ pytest_plugins = [
 
 # A run in the background begins with Ctrl-C ignored, and every process that a test starts would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# What the user's own twin of this folder was started with is none of the tests' business.
+os.environ["GEMELO_STARTED"] = "/dev/null/started.toml"  # no file can be there
 
 profiles.load()
 sys.addaudithook(optional.on_audit_event)

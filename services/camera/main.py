@@ -6,9 +6,11 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from schemas.cell import CellTexts
 from schemas.deployment import Deployment
+from schemas.topics import CELL
 from services.arm.cell.camera_file import CAMERA_FILE
-from services.arm.cell.cell_file import Cell, load_cell
+from services.arm.cell.cell_file import Cell, load_cell, read_cell_texts
 from services.arm.errors import DescriptionError
 from services.arm.model.description import ArmDescription, load_arm
 from services.runtime.application import service
@@ -24,6 +26,8 @@ def run(node: Node, deployment: Deployment) -> None:
     """Publish until the node is stopped; ready as soon as every camera is watched, whether it gives images or not."""
     arm = load_arm(project_root() / deployment.robot)
     cell = load_cell(Path(deployment.cell), arm) if deployment.cell else Cell(Path())
+    shown = node.publisher(CELL)
+    shown.put(read_cell_texts(cell.path) if deployment.cell else CellTexts())
     if not cell.cameras:
         why = f"{deployment.cell} has no [[camera]]" if deployment.cell else "the deployment names no cell file"
         node.log.info("%s: this process stands aside", why)
@@ -34,7 +38,12 @@ def run(node: Node, deployment: Deployment) -> None:
     from services.camera.cameras import Cameras  # OpenCV: 60 MB that only a cell with cameras is worth
 
     cameras = Cameras(node, arm, cell)
-    node.every(CAMERA_FILE_PERIOD, _watch(node, arm, cell, cameras.tell_about))
+
+    def tell(known: Cell) -> None:
+        cameras.tell_about(known)
+        shown.put(read_cell_texts(known.path))
+
+    node.every(CAMERA_FILE_PERIOD, _watch(node, arm, cell, tell))
     node.at_end(cameras.close)
     node.spin(cameras.step, rate=RATE)
 

@@ -14,7 +14,8 @@ from services.cli.provision import BAUD, PASSWORDS, provision
 from services.credentials.private_files import AccessError
 from services.mqtt import secure_folder
 from services.mqtt.access import AUTHORITY
-from services.runtime.deployment import load_deployment, project_root
+from services.runtime.deployment import project_root
+from services.runtime.started import load_started
 
 FOLDER = ".gemelo/broker"
 PLAIN_PORT, TLS_PORT = 1883, 8883
@@ -41,7 +42,7 @@ def add_options(parser: Parser) -> None:
 
 def run(options: Options) -> ExitCode:
     """Writes the folder, says what to do with it, and provisions the board if there is one."""
-    deployment = load_deployment()
+    deployment = load_started()
     devices = options.device or [load_arm(project_root() / deployment.robot).device.name]
     if options.serial and len(devices) != 1:
         raise usage(f"--serial tells one board: give one --device, not {len(devices)}")

@@ -17,6 +17,7 @@ from schemas.detections import Detections
 from schemas.topics import camera_detections, camera_image, camera_info, camera_status
 from services.arm.cell.cell_file import Cell, deployed_cell
 from services.arm.errors import DescriptionError
+from services.cli.cells import cell_of
 from services.cli.errors import CommandError, ExitCode, unknown, usage
 from services.cli.output import print_coloured
 from services.cli.parser import Choices, Options, Parser, json_option
@@ -25,11 +26,10 @@ from services.cli.text_table import table
 
 if TYPE_CHECKING:
     from gemelo import Robot
-    from schemas.deployment import Deployment
 
 PATIENCE = 2.0  # [s] for the first messages
 DEVICES, BY_ID, NAMES = Path("/dev"), Path("/dev/v4l/by-id"), Path("/sys/class/video4linux")
-NO_CELL = "the deployment has no cell file: write one (urdf/rm1/cell.toml is a sample) and name it as cell = in {}"
+NO_CELL = "the twin has no cell file: write one (urdf/rm1/cell.toml is a sample) and name it as cell = in {}"
 OUTLINE = (120, 255, 120)  # blue, green, red
 
 
@@ -76,21 +76,21 @@ def choices(robot: Robot | None) -> Choices:
 def run_list(options: Options) -> ExitCode:
     """Prints both tables; without a stack it is not known whether images come."""
     robot = load_robot()
-    cell, devices = _cell(robot.deployment), plugged()
+    cell, devices = cell_of(robot), plugged()
     seen = _seen_of(robot, cell) if cell.cameras else {}
     if options.json:
         print(msgspec.json.encode(_listed(cell, devices, seen)).decode())
         return ExitCode.OK
-    print(listing(cell, devices, seen, robot.deployment))
+    print(listing(cell, devices, seen))
     return ExitCode.OK
 
 
 def run_view(options: Options) -> ExitCode:
     """Shows the newest image on the terminal, or saves it; raises `CommandError` where there is none."""
     robot = load_robot()
-    cell = _cell(robot.deployment)
+    cell = cell_of(robot)
     if not cell.cameras:
-        raise usage(NO_CELL.format("deploy/local.toml") if not robot.deployment.cell else f"{cell.path}: no [[camera]]")
+        raise usage(NO_CELL.format("deploy/local.toml") if cell.path == Path() else f"{cell.path}: no [[camera]]")
     name = options.camera or cell.cameras[0].name
     if name not in cell.camera_names:
         raise unknown("camera", name, cell.camera_names)
@@ -114,11 +114,11 @@ def plugged() -> list[Plugged]:
     ]
 
 
-def listing(cell: Cell, devices: list[Plugged], seen: dict[str, CameraReport], deployment: Deployment) -> str:
+def listing(cell: Cell, devices: list[Plugged], seen: dict[str, CameraReport]) -> str:
     """What is plugged in, then what the cell file asks for."""
     here = table(("plugged in", "name"), [(each.device, each.name) for each in devices])
     parts = [here if devices else "no camera is plugged in (/dev/video*)"]
-    if not deployment.cell:
+    if cell.path == Path():
         return "\n\n".join([*parts, NO_CELL.format("deploy/local.toml")])
     headings = ("camera", "source", "size [px]", "asked [Hz]", "gets [Hz]", "lens", "place", "condition")
     rows = [_row(camera, seen.get(camera.name, CameraReport())) for camera in cell.cameras]
@@ -249,13 +249,6 @@ def _listed(cell: Cell, devices: list[Plugged], seen: dict[str, CameraReport]) -
         for camera in cell.cameras
     ]
     return {"devices": devices, "cameras": cameras}
-
-
-def _cell(deployment: Deployment) -> Cell:
-    try:
-        return deployed_cell(deployment)
-    except DescriptionError as error:
-        raise usage(str(error)) from error
 
 
 def _require_folder(path: Path) -> None:

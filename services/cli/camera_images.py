@@ -17,11 +17,10 @@ from schemas.camera import CameraImage, CameraInfo
 from schemas.cell import CameraRecord, MeasuredCamera, Mount
 from schemas.topics import JOINT_STATES, camera_image, camera_info
 from services.arm.cell.camera_file import CAMERA_FILE, write_measured
-from services.arm.cell.cell_file import Cell, deployed_cell
-from services.arm.errors import DescriptionError
+from services.arm.cell.cell_file import Cell
+from services.cli.cells import cell_of
 from services.cli.errors import CommandError, unknown, usage
-from services.cli.session import CommandSession
-from services.runtime.deployment import load_deployment
+from services.cli.session import CommandSession, load_robot
 from services.vision.rigid import Array, to_transform
 from services.vision.tags import GreyImage
 
@@ -73,13 +72,12 @@ class Subject:
 
 def subject(name: str) -> Subject:
     """The camera of the deployment's cell; its first one without a name. Raises `CommandError`."""
-    deployment = load_deployment()
-    try:
-        cell = deployed_cell(deployment)
-    except DescriptionError as error:
-        raise usage(str(error)) from error
+    robot = load_robot()
+    cell = cell_of(robot)
     if not cell.cameras:
         raise usage("there is no camera: the deployment's cell file (urdf/rm1/cell.toml is a sample) has no [[camera]]")
+    if not robot.deployment.cell:
+        raise usage(f"{cell.path} is not on this machine: measure its cameras there, where camera.toml is written")
     chosen = name or cell.cameras[0].name
     if chosen not in cell.camera_names:
         raise unknown("camera", chosen, cell.camera_names)

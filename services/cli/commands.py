@@ -54,6 +54,8 @@ COMMANDS = (
             "kinematics:run_ik", "kinematics:ik_options", choices="kinematics:ik_choices"),
     Command(("fk",), "poses of links for joint values; nothing moves", "kinematics:run_fk", "kinematics:fk_options",
             "gemelo fk brazo_joint=30deg --links antebrazo_link efector_link", "kinematics:fk_choices"),
+    Command(("use",), "which of several robots the commands of this folder are for",
+            "use:run", "use:add_options", "gemelo use parol6"),
     Command(("device", "status"), "who the device is, its mode, faults, switches, outputs and sensors",
             "device_status:run", JSON, "gemelo device status"),
     Command(("device", "monitor"), "a line for everything that changes, until Ctrl-C",

@@ -24,10 +24,10 @@ from services.hosts.certificates import Certificate, days_by_host, endings, in_d
 from services.hosts.layout import BROKER, ROUTER
 from services.hosts.status import SeenNode, SeenRobot, ServiceState, ServiceStatus, is_well, site_status
 from services.runtime.clock_offset import ClockOffset
-from services.runtime.deployment import load_deployment
 from services.runtime.errors import BusError, NoAnswer, RequestRefused
 from services.runtime.node import Node
 from services.runtime.node_clock import ask_about
+from services.runtime.started import load_started
 
 HEADINGS = ("host", "robot", "service", "is", "machine", "version", "clock", "certificate", "why")
 TO_ANSWER = 2.0  # [s] of one node
@@ -132,7 +132,7 @@ def seen_nodes(node: Node) -> dict[str, SeenNode]:
 def _deployment(site: Site) -> Deployment:
     """The person's own, which must be for the site's router."""
     try:
-        deployment = load_deployment()
+        deployment = load_started()
     except ConfigurationError as error:
         raise usage(str(error)) from error
     own, wanted = deployment.router, site.hosts[site.router.host]

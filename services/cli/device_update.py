@@ -14,9 +14,10 @@ from services.cli.terminal import LiveBlock
 from services.cli.update_transfer import SerialWire, Transfer, UpdateStatus, UpdateWire, await_status, mqtt_wire
 from services.credentials.private_files import AccessError, require_private
 from services.mqtt.access import gateway_access
-from services.runtime.deployment import load_deployment, project_root
+from services.runtime.deployment import project_root
 from services.runtime.firmware_update import ImageHeader, NoImage, read_header
 from services.runtime.signatures import SignatureError, make_key, sign
+from services.runtime.started import load_started
 
 KEY = ".gemelo/update.key"
 TO_ANSWER = 6.0  # [s] until a device that is there has said status
@@ -90,7 +91,7 @@ def wire_of(options: Options) -> Iterator[UpdateWire]:
         with open_line(options.serial, options.baud) as line:
             yield SerialWire(line)
         return
-    deployment = load_deployment()
+    deployment = load_started()
     device = options.device or load_arm(project_root() / deployment.robot).device.name
     try:
         access = gateway_access(deployment.mqtt)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import msgspec
 
-from schemas.deployment import Deployment, MqttSection, Wire
+from schemas.deployment import Deployment, MqttSection, RouterSection, Wire
 from schemas.device import DeviceState, DeviceStatus
 from schemas.device_faults import fault_text
 from schemas.device_link import offline_text, round_trip_text
@@ -31,9 +31,10 @@ from services.cli.version import gemelo_version, version_text
 from services.credentials.private_files import AccessError
 from services.mqtt.access import gateway_access
 from services.runtime.clock_offset import ClockOffset
-from services.runtime.deployment import load_deployment, project_root, when_silent
+from services.runtime.deployment import project_root, when_silent
 from services.runtime.process.priority import may_step_ahead
 from services.runtime.process.unwritten import remedy_of
+from services.runtime.started import load_started
 
 BROKER_PAGE = "docs/my_broker.md has every such sentence with what to do"
 # Tuning constants: chosen.
@@ -83,7 +84,7 @@ def diagnoses() -> Iterator[Diagnosis]:
     yield Diagnosis(Verdict.OK, "versions", f"{version_text()}, {platform.system()} {platform.machine()}")
     yield from _machine()
     try:
-        deployment = load_deployment()
+        deployment = _deployment()
     except ConfigurationError as error:
         yield Diagnosis(Verdict.ERROR, "deployment", str(error), "correct the file that $GEMELO_CONFIG names")
         return
@@ -98,7 +99,32 @@ def diagnoses() -> Iterator[Diagnosis]:
     router = _listener("router", deployment.router.host, deployment.router.port)
     yield router
     if router.verdict is Verdict.OK:
+        yield from runs(deployment.router)
         yield from _twin()
+
+
+def _deployment() -> Deployment:
+    """That of the robot that runs; where several do and none is chosen, that of this folder."""
+    from services.runtime.running import SeveralRobots, find_deployment  # slow to load: the bus
+
+    try:
+        return find_deployment()
+    except SeveralRobots:
+        return load_started()
+
+
+def runs(router: RouterSection) -> Iterator[Diagnosis]:
+    """Every robot on the router, and the files that its twin was started with."""
+    from services.runtime.running import ask_files, running_robots  # slow to load: the bus
+
+    for robot, nodes in sorted(running_robots(router).items()):
+        info = ask_files(router, robot, nodes)
+        if info is None:
+            found = f"{len(nodes)} nodes are alive, and none says what it was started with"
+            yield Diagnosis(Verdict.WARNING, f"runs {robot}", found, "`gemelo node list` says which do not answer")
+        else:
+            cell = f"with {info.files.cell}" if info.files.cell else "without a cell"
+            yield Diagnosis(Verdict.OK, f"runs {robot}", f"{info.files.robot} on {info.host}, {cell}")
 
 
 def _has_gateway(deployment: Deployment) -> bool:

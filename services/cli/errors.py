@@ -83,6 +83,7 @@ COMMAND_OF = (  # methods of `gemelo` that its sentences name, and the commands 
     (r"arm\.stop\(\)", "`gemelo stop`"),
     (r'arm\.reference\(\{"(\w+)": \.\.\.\}\)', r"`gemelo reference --joints \1=...`"),
     (r"arm\.reference\(\)", "`gemelo reference`"),
+    (r'gemelo\.connect\("([\w-]+)"\)', r"`gemelo --robot \1 ...`"),
 )
 
 

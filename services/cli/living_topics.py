@@ -14,8 +14,8 @@ from services.cli.errors import unknown
 from services.cli.node import TIMEOUT, living
 from services.cli.session import CommandSession, connect
 from services.recordings.living_topic import living_topic
-from services.runtime.deployment import load_deployment
 from services.runtime.errors import NoAnswer, RequestRefused
+from services.runtime.started import load_started
 
 KNOWN = {topic.key: topic for topic in TOPICS}
 
@@ -45,7 +45,7 @@ def all_topics() -> list[Topic[Any]]:
 def router_listens() -> bool:
     """Loads nothing else, so that a table comes at once."""
     try:
-        router = load_deployment().router
+        router = load_started().router
         socket.create_connection((router.host, router.port), timeout=1.0).close()
     except (OSError, ConfigurationError):
         return False

@@ -16,9 +16,10 @@ from services.runtime.process.leaving import end_process
 
 ABOUT = "The twin's command line: move the arm, and see everything that is said about it."
 EPILOG = (
-    "The deployment is deploy/local.toml, or the file that $GEMELO_CONFIG names. `gemelo --robot NAME COMMAND` is for\n"
-    "another arm of urdf/, or for a recording that is played. `gemelo --simulate COMMAND` is for a twin of its own in\n"
-    "virtual time, for which nothing needs to run; `--simulate=START` has it stand in a named state, or unreferenced."
+    "A command is for the robot that runs. `gemelo --robot NAME COMMAND` is for one of several, for another arm of\n"
+    "urdf/, or for a recording that is played; `gemelo use NAME` chooses one of several for this folder.\n"
+    "`gemelo --simulate COMMAND` is for a twin of its own in virtual time, for which nothing needs to run;\n"
+    "`--simulate=START` has it stand in a named state, or unreferenced."
 )
 
 
@@ -52,7 +53,8 @@ def choose_robot(name: str) -> None:
 
     Raises `CommandError` where there is no such robot.
     """
-    from services.runtime.deployment import deployment_of_arm, overriding  # slow to load, for --robot alone
+    from services.runtime.deployment import overriding  # slow to load, for --robot alone
+    from services.runtime.started import deployment_of_arm
 
     file = deployment_of_arm(name)
     if file is None:
@@ -64,15 +66,22 @@ def choose_robot(name: str) -> None:
 
 
 def robot_folder(name: str) -> str:
-    """The folder of an arm, or of a shadow that `gemelo bag play` has made; raises `CommandError` for neither."""
-    from services.runtime.deployment import load_deployment, project_root  # slow to load, for --robot alone
+    """The folder of an arm, of a shadow that `gemelo bag play` has made, or of a robot that runs with files elsewhere;
+    raises `CommandError` for none of them."""
+    from services.runtime.deployment import project_root  # slow to load, for --robot alone
+    from services.runtime.running import files_of, running_robots
+    from services.runtime.started import load_started
 
-    root, out = project_root(), Path(load_deployment().paths.out)
+    root, deployment = project_root(), load_started()
+    out = Path(deployment.paths.out)
     for folder in (root / "urdf" / name, out / "shadows" / name, Path(name)):
         if (folder / "robot.toml").is_file():
             return str(folder.resolve())
+    running = running_robots(deployment.router)
+    if name in running and (elsewhere := files_of(deployment.router, name, running[name])):
+        return elsewhere
     known = [path.parent.name for where in (root / "urdf", out / "shadows") for path in where.glob("*/robot.toml")]
-    raise unknown("robot", name, sorted(known))
+    raise unknown("robot", name, sorted({*known, *running}))
 
 
 def run(arguments: Sequence[str] | None = None) -> ExitCode:

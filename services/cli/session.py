@@ -27,11 +27,13 @@ class CommandSession(NamedTuple):
 
 
 def load_robot() -> Robot:
-    """Reads the deployment and the arm's files; raises `CommandError` with one sentence if they are wrong."""
+    """The arm that runs, or that of this folder; raises `CommandError` where files are wrong, or several run."""
+    from gemelo.robot_files import find_robot  # slow to load
+
     try:
-        return gemelo.load_robot()
+        return find_robot(ask=simulated.chosen() is None)
     except gemelo.Error as error:
-        raise usage(str(error)) from error
+        raise usage(in_commands(str(error))) from error
 
 
 @contextmanager

@@ -31,6 +31,7 @@ MQTT_FILES = (
 )
 ROUTER_FILES = ("configuration", "ca", "certificate", "key")
 PREFIX = "GEMELO_"
+CONFIG = "GEMELO_CONFIG"  # names another file than DEFAULT_FILE
 ARMS = "arms"  # folder in `paths.run` with a deployment for each of several arms that `make up ARMS=...` started last
 REMEDIES = {
     "router": "`gemelo deploy` gives router and nodes certificates (deploy/README.md)",
@@ -75,7 +76,7 @@ def load_deployment(path: Path | None = None, environ: Mapping[str, str] | None 
 def deployment_file(path: Path | None, environ: Mapping[str, str]) -> Path:
     """The file that `load_deployment` reads, whether or not it is there."""
     root = project_root()
-    chosen = path or Path(environ.get("GEMELO_CONFIG") or root / DEFAULT_FILE)
+    chosen = path or Path(environ.get(CONFIG) or root / DEFAULT_FILE)
     return chosen if chosen.is_absolute() or chosen.exists() else root / chosen
 
 
@@ -86,12 +87,6 @@ def robot_name(deployment: Deployment) -> str:
     if not isinstance(name, str) or not name or "/" in name:
         raise DeploymentError(f'{file}: key "name" must be a text without "/"')
     return name
-
-
-def deployment_of_arm(name: str, environ: Mapping[str, str] | None = None) -> Path | None:
-    """The deployment file of an arm that was started last among several; None where it was not."""
-    file = Path(load_deployment(None, environ).paths.run) / ARMS / f"{name}.toml"
-    return file if "/" not in name and file.is_file() else None
 
 
 def deployments_beside(deployment: Deployment) -> tuple[Deployment, ...]:

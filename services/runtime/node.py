@@ -14,6 +14,7 @@ import msgspec
 from schemas.deployment import Deployment
 from schemas.message import Message
 from schemas.system import (
+    NodeFiles,
     NodeInfo,
     Parameter,
     ParameterChange,
@@ -26,7 +27,7 @@ from services.runtime.actions.client import ActionClient
 from services.runtime.actions.server import ActionServer, OnCancel, OnGoal
 from services.runtime.bus import identity
 from services.runtime.bus.branches import principal_of
-from services.runtime.bus.connection import connect
+from services.runtime.bus.connection import await_router, connect
 from services.runtime.bus.interface import Bus, Declaration
 from services.runtime.bus.name_holder import NameHolder, StopWatch
 from services.runtime.certificate_watch import CertificateWatch
@@ -54,7 +55,9 @@ from services.runtime.requests import client as requests
 from services.runtime.requests.exchanges import exchange_topic
 from services.runtime.requests.limits import RequestRates
 from services.runtime.requests.server import Pending, RequestServer, UrgentServer
+from services.runtime.running import find_deployment
 from services.runtime.saved_parameters import SavedParameters
+from services.runtime.started import load_started
 from services.runtime.topics import Latest, LatestOnDemand, Publisher, Subscription
 
 M = TypeVar("M", bound=Message)
@@ -86,15 +89,16 @@ class Node:
         rates: RequestRates | None = None,
     ) -> None:
         """Waits for the router; raises `NodeNameTaken` where `name` lives already. `overrides` are parameters, `rates`
-        how much of what is asked is taken, if not as much as usual."""
+        how much of what is asked is taken, if not as much as usual. Without `deployment` it is on the bus of the robot
+        that runs: raises `SeveralRobots` where several do and none is chosen."""
         self.clock: Clock = SYSTEM if bus is None else bus.clock
         self._identity = identity.identify(name, clock=self.clock)
         self.name = name
-        self.deployment = deployment if deployment is not None else load_deployment()
-        self.robot = robot or robot_name(self.deployment)
         self.log = line_logger(name, log_level)
         self._signals = stop is None
         self._stop = stop or ShutdownRequest()
+        self.deployment = deployment if deployment is not None else self._find_deployment(robot or "", bus)
+        self.robot = robot or robot_name(self.deployment)
         # A script's own error ends it where it happens; a service goes on, as others depend on it.
         self._loop = Loop(self._stop, self.clock, None if self._signals else Failures(self.log).take)
         self._worker = Worker(self.clock)
@@ -126,6 +130,14 @@ class Node:
         self.log.addHandler(self._log_to_bus)
         self._statistics = LoopStatistics(self._identity, self.clock)
         self._at_end: list[Callable[[], object]] = []
+
+    def _find_deployment(self, robot: str, bus: Bus | None) -> Deployment:
+        """That of the twin which runs: asked of it, as soon as its router is there."""
+        if bus is not None:
+            return load_deployment()
+        with stop_on_signals(self._stop) if self._signals else nullcontext():
+            await_router(load_started().router, self.log, self._stop)
+        return find_deployment(robot)
 
     def __enter__(self) -> Self:
         return self
@@ -283,6 +295,17 @@ class Node:
             problem=self._problem,
             certificate_ends=self._certificate.ends,
             unwritten=self.unwritten.sentence,
+            files=NodeFiles() if self.clock.is_virtual else self._files(),
+        )
+
+    def _files(self) -> NodeFiles:
+        root, paths, cell = project_root(), self.deployment.paths, self.deployment.cell
+        return NodeFiles(
+            robot=str(root / self.deployment.robot),
+            cell=str(root / cell) if cell else "",
+            run=str(root / paths.run),
+            out=str(root / paths.out),
+            programs=str(root / paths.programs),
         )
 
     def statistics(self) -> tuple[TopicStatistics, ...]:

@@ -20,6 +20,7 @@ import yaml
 from schemas.deployment import Deployment
 from schemas.errors import ConfigurationError
 from services.runtime.deployment import forget_arms, load_deployment, overriding, project_root
+from services.runtime.started import keep_started
 from services.stack.arms import SHARED, StackedArm, deployment_file, file_of, left_out, stacked_arms
 from services.stack.start_check import say_virtual, start_problems
 
@@ -89,6 +90,7 @@ def _literal(text: str) -> str:
 def write(arms: Sequence[StackedArm], common: Deployment, root: Path, environ: Mapping[str, str]) -> Path:
     """Writes the deployments and the process-compose file; returns the latter's path."""
     forget_arms(common)
+    keep_started(environ)
     for each in arms:
         file = file_of(common, each.name)
         file.parent.mkdir(parents=True, exist_ok=True)

@@ -97,6 +97,7 @@ class Stack:
             "GEMELO_PANEL_PORT": str(page),
             "GEMELO_PATHS_RUN": str(self.run),
             "GEMELO_PATHS_OUT": str(self.out),
+            "GEMELO_STARTED": str(self.folder / "started.toml"),  # that of the folder is the user's own twin's
             **(environment or {}),
         }
         self.lock = self.folder / "lock"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import TextIO
@@ -15,6 +16,7 @@ from services.mqtt.access import device_access, gateway_access
 from services.mqtt.secure_folder import require_made
 from services.runtime.deployment import exposure, forget_arms, load_deployment, project_root
 from services.runtime.process.ports import PortTaken, require_free
+from services.runtime.started import keep_started
 
 
 def start_problems(deployment: Deployment) -> list[str]:
@@ -93,6 +95,7 @@ def main() -> int:
         print(f"gemelo: {problem}", file=sys.stderr)
     if not found:
         forget_arms(deployment)
+        keep_started(os.environ)
         say_virtual(load_arm(project_root() / deployment.robot), sys.stdout)
     return 1 if found else 0
 

@@ -30,8 +30,9 @@ from services.recordings.incidents import Incident, incident_in
 from services.recordings.reader import BadRecording, RecordingReader, Row
 from services.recordings.shadow import recorded_robot, shadow_folder, write_shadow
 from services.recordings.view_layout import LAYOUT, ViewLayout
-from services.runtime.deployment import DeploymentError, load_deployment, project_root
+from services.runtime.deployment import DeploymentError, project_root
 from services.runtime.process.own_files import make_own
+from services.runtime.started import load_started
 from services.visualizer.core import Visualizer
 from services.visualizer.feeds import feeds
 from services.visualizer.model.mesh_files import scene_mesh
@@ -149,7 +150,7 @@ def _decoding_image(camera: str, take: Callable[[CameraImage], None]) -> Callabl
 
 def show(rrd: Path, stopping: threading.Event) -> int:
     """Runs a viewer of its own on `rrd` until it is closed, or asked to stop; returns its exit code."""
-    deployment = load_deployment(None)
+    deployment = load_started()
     mode = resolved(ViewerMode.AUTO, os.environ)
     viewer = msgspec.structs.replace(deployment.viewer, host=LOOPBACK, port=free_port(), web_port=free_port())
     command = [str(rerun_binary()), str(rrd), "--bind", viewer.host, "--port", str(viewer.port)]
@@ -176,7 +177,7 @@ def main() -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopping.set())
     try:
-        deployment = load_deployment(None)
+        deployment = load_started()
         out = project_root() / deployment.paths.out
         rrd = options.save or out / "views" / f"{options.file.stem}.rrd"
         incident = write_view(options.file, rrd, shadow_folder(out, options.file.stem))

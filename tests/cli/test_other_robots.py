@@ -41,6 +41,7 @@ def test_a_router_without_nodes_has_no_robots(router):
 @pytest.mark.parametrize("words", [["state"], ["request", "call", "fk"], ["hold"], ["device", "status"]])
 def test_a_command_for_a_robot_that_is_not_there_names_the_one_that_is(router, parol6, words, monkeypatch, capsys):
     monkeypatch.setattr(state, "PATIENCE", 0.2)
+    monkeypatch.setenv("GEMELO_ROBOT", "urdf/rm1")
     assert run(words) is ExitCode.NO_STACK
     error = capsys.readouterr().err
     assert f"the router at 127.0.0.1:{router.port} has no rm1, but parol6" in error

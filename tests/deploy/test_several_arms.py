@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 from schemas.deployment import Deployment, DeviceKind, MqttSection, PanelSection, PathsSection, ViewerMode, Wire
 from schemas.errors import ConfigurationError
 from services.runtime.deployment import (
-    deployment_of_arm,
     deployments_beside,
     load_deployment,
     project_root,
     robot_name,
 )
+from services.runtime.started import deployment_of_arm
 from services.stack.arms import deployment_file, file_of, stacked_arms
 from services.stack.several_arms import compose_of, main, write
 from services.stack.start_check import main as start_check

@@ -14,8 +14,8 @@ import gemelo as api
 from schemas.actions import GoalStatusCode
 from services.recordings.mcap_file import METADATA
 from services.recordings.reader import RecordingReader
-from services.runtime.deployment import deployment_of_arm
 from services.runtime.robots import robots_on
+from services.runtime.started import deployment_of_arm
 from services.stack.stack import Stack, free_ports
 from services.visualizer.program.rerun_program import rerun_binary
 from tests.stack.gemelo import gemelo

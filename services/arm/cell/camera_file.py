@@ -20,9 +20,11 @@ REMEDY = "measure it again: gemelo camera calibrate, gemelo camera mount"
 
 def load_measured(path: Path, cameras: Sequence[str]) -> dict[str, MeasuredCamera]:
     """By the camera's name; empty where there is no file. Raises `DescriptionError`, also for a camera of no cell."""
-    if not path.exists():
-        return {}
-    text = read_text(path)
+    return measured_of(path, read_text(path), cameras) if path.exists() else {}
+
+
+def measured_of(path: Path, text: str, cameras: Sequence[str]) -> dict[str, MeasuredCamera]:
+    """As `load_measured`, of the text that stands at `path`."""
     data = read_robot_data(path, text, CameraFile)
     try:
         file = msgspec.convert(data, CameraFile)

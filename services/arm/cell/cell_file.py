@@ -12,6 +12,7 @@ import msgspec
 from schemas.cell import (
     CameraRecord,
     CellFile,
+    CellTexts,
     FileSource,
     FolderSource,
     MeasuredCamera,
@@ -25,7 +26,7 @@ from schemas.cell import (
     Thing,
 )
 from schemas.deployment import Deployment
-from services.arm.cell.camera_file import CAMERA_FILE, load_measured
+from services.arm.cell.camera_file import CAMERA_FILE, measured_of
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.description import ArmDescription, load_arm
 from services.arm.model.robot_file import Keys, line_of, read_robot_data, read_text, where_of
@@ -103,20 +104,32 @@ def deployed_cell(deployment: Deployment) -> Cell:
 
 def load_cell(path: Path, arm: ArmDescription) -> Cell:
     """The cell around `arm`; raises `DescriptionError` for what is wrong in cell.toml or in camera.toml beside it."""
-    text = read_text(path)
+    return cell_of(read_cell_texts(path), arm)
+
+
+def read_cell_texts(path: Path) -> CellTexts:
+    """cell.toml at `path` and camera.toml beside it, as they travel over the bus; raises `DescriptionError`."""
+    measured = path.with_name(CAMERA_FILE)
+    return CellTexts(path=str(path), cell=read_text(path), cameras=read_text(measured) if measured.exists() else "")
+
+
+def cell_of(texts: CellTexts, arm: ArmDescription, *, is_here: bool = True) -> Cell:
+    """The cell in these texts; raises `DescriptionError`. The files that it names are looked for where it `is_here`."""
+    path, text = Path(texts.path), texts.cell
     data = read_robot_data(path, text, CellFile)
     try:
         file = msgspec.convert(data, CellFile)
     except msgspec.ValidationError as error:
         raise DescriptionError(f"{path}{where_of(error, text)}: {error}{_choices(str(error))}") from error
     cell = Cell(path, file.camera, file.tag, file.thing, file.place, file.table)
-    for keys, fault in _faults(cell, arm):
+    for keys, fault in _faults(cell, arm, is_here):
         raise DescriptionError(f"{path}, line {_nearest_line(keys, text)}: {fault}")
-    measured = load_measured(path.with_name(CAMERA_FILE), [each.name for each in cell.cameras])
+    names = [each.name for each in cell.cameras]
+    measured = measured_of(path.with_name(CAMERA_FILE), texts.cameras, names) if texts.cameras else {}
     return Cell(path, file.camera, file.tag, file.thing, file.place, file.table, measured)
 
 
-def _faults(cell: Cell, arm: ArmDescription) -> Iterator[tuple[Keys, str]]:
+def _faults(cell: Cell, arm: ArmDescription, is_here: bool) -> Iterator[tuple[Keys, str]]:
     """Where each fault stands, and its sentence."""
     for what, named in (("camera", cell.cameras), ("thing", cell.things), ("place", cell.places)):
         yield from _repeated(what, [each.name for each in named])
@@ -125,7 +138,9 @@ def _faults(cell: Cell, arm: ArmDescription) -> Iterator[tuple[Keys, str]]:
     for number, tag in enumerate(cell.tags):
         yield from _parent_faults(("tag", number), f"the tag {tag.id}", tag.parent, arm)
     for number, thing in enumerate(cell.things):
-        yield from _thing_faults(("thing", number), thing, cell, arm)
+        yield from _thing_faults(("thing", number), thing, arm)
+        if is_here:
+            yield from _model_faults(("thing", number), thing, cell)
     yield from _tag_faults(cell)
 
 
@@ -158,7 +173,7 @@ def _parent_faults(keys: Keys, what: str, parent: str, arm: ArmDescription) -> I
         yield (*keys, "parent"), f'{what}: {arm.name} has no link "{parent}"{known}'
 
 
-def _thing_faults(keys: Keys, thing: Thing, cell: Cell, arm: ArmDescription) -> Iterator[tuple[Keys, str]]:
+def _thing_faults(keys: Keys, thing: Thing, arm: ArmDescription) -> Iterator[tuple[Keys, str]]:
     if arm.gripper is not None:
         width, most = grasp_width(thing), arm.gripper.open
         if width >= most:
@@ -168,6 +183,9 @@ def _thing_faults(keys: Keys, thing: Thing, cell: Cell, arm: ArmDescription) -> 
                 (*keys, key),
                 f'thing "{thing.name}" is {width:g} m between the jaws, which open to {most:g} m: {remedy}',
             )
+
+
+def _model_faults(keys: Keys, thing: Thing, cell: Cell) -> Iterator[tuple[Keys, str]]:
     if isinstance(thing, OnnxThing) and not cell.path_of(thing.model).is_file():
         yield (*keys, "model"), f'thing "{thing.name}": there is no file {cell.path_of(thing.model)}'
 

@@ -49,6 +49,20 @@ def connect(router: RouterSection, robot: str, log: logging.Logger, stop: Shutdo
     raise SystemExit(0)
 
 
+def await_router(router: RouterSection, log: logging.Logger, stop: ShutdownRequest) -> None:
+    """Returns when something listens at the router's address; ends the process where it is asked to stop meanwhile."""
+    from services.runtime.bus.zenoh_bus import router_answers  # slow to load: zenoh
+
+    started, is_said = time.monotonic(), False
+    while not router_answers(router.host, router.port):
+        if stop.is_set:
+            raise SystemExit(0)
+        if not is_said and time.monotonic() - started > SILENT_WAIT:
+            is_said = True
+            log.warning("waiting for the router at %s:%d: %s", router.host, router.port, when_silent(router.host))
+        stop.wait(RETRY_PERIOD)
+
+
 def require_certificate(router: RouterSection) -> None:
     """Returns if the section has what TLS needs; else raises `BusError` with the key of the deployment or the file."""
     if not router.tls:
