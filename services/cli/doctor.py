@@ -84,7 +84,7 @@ def diagnoses() -> Iterator[Diagnosis]:
     yield Diagnosis(Verdict.OK, "versions", f"{version_text()}, {platform.system()} {platform.machine()}")
     yield from _machine()
     try:
-        deployment = _deployment()
+        deployment = deployment_here()
     except ConfigurationError as error:
         yield Diagnosis(Verdict.ERROR, "deployment", str(error), "correct the file that $GEMELO_CONFIG names")
         return
@@ -103,7 +103,7 @@ def diagnoses() -> Iterator[Diagnosis]:
         yield from _twin()
 
 
-def _deployment() -> Deployment:
+def deployment_here() -> Deployment:
     """That of the robot that runs; where several do and none is chosen, that of this folder."""
     from services.runtime.running import SeveralRobots, find_deployment  # slow to load: the bus
 

@@ -1,4 +1,4 @@
-"""What runs on a router, asked of it: the robot that a client is for, and the files that its twin was started with."""
+"""Asks a router what runs on it: the robot that a client is for, and the files that its twin was started with."""
 
 from __future__ import annotations
 

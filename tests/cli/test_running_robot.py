@@ -178,7 +178,7 @@ def test_a_twin_without_a_cell_is_said_to_have_none_and_not_this_terminal(router
 def test_doctor_says_what_runs_with_which_files(router):
     with twin(router, "parol6", deployed(router, ROOT / "urdf/parol6", str(CELL_FILE))):
         (found,) = doctor.runs(router.deployment.router)
-        assert doctor._deployment().robot == str(ROOT / "urdf/parol6")
+        assert doctor.deployment_here().robot == str(ROOT / "urdf/parol6")
     assert found.subject == "runs parol6"
     assert f"{ROOT}/urdf/parol6 on " in found.found
     assert f"with {CELL_FILE}" in found.found
