@@ -1,0 +1,168 @@
+"""A device that speaks and does not hear, and a second one of its name, as a person at the command line finds them."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+import gemelo
+from firmware.platform.host.flash import Flash, NetworkCredentials
+from services.runtime.process.unwritten import UnwrittenFiles
+from services.stack.stack import Stack
+from tests.stack.gemelo import COMMAND
+from tests.stack.person import Operator
+from tests.stacks.shared import NEEDED, found_by_scripts
+
+PUBLISH = 3  # of an MQTT packet's first four bits
+ENDS = 20.0  # [s] of a command on a loaded machine; by the gateway's clock it is 2 s
+NOTICED = 10.0  # [s] on a loaded machine
+SPEAKS, TWO = "speaks and does not hear", 'two devices call themselves "rm1"'
+
+
+class DevicesWay:
+    """A proxy between a device and its broker; while `is_deaf`, nothing that is published reaches the device."""
+
+    def __init__(self, broker: int) -> None:
+        """`broker` is its port."""
+        self.is_deaf = False
+        self._broker = broker
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.port: int = self._server.getsockname()[1]
+        self._open: list[socket.socket] = [self._server]
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def close(self) -> None:
+        for each in self._open:
+            with suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)
+            each.close()
+
+    def _accept(self) -> None:
+        with suppress(OSError):
+            while True:
+                device, _ = self._server.accept()
+                broker = socket.create_connection(("127.0.0.1", self._broker))
+                self._open += [device, broker]
+                threading.Thread(target=self._up, args=(device, broker), daemon=True).start()
+                threading.Thread(target=self._down, args=(broker, device), daemon=True).start()
+
+    def _up(self, device: socket.socket, broker: socket.socket) -> None:
+        with suppress(OSError), device, broker:
+            while piece := device.recv(65536):
+                broker.sendall(piece)
+
+    def _down(self, broker: socket.socket, device: socket.socket) -> None:
+        with suppress(OSError), device, broker, broker.makefile("rb") as packets:
+            while head := packets.read(1):
+                lengths = bytearray(packets.read(1))
+                while lengths[-1] & 0x80:
+                    lengths += packets.read(1)
+                size = sum((byte & 0x7F) << (7 * place) for place, byte in enumerate(lengths))
+                packet = head + bytes(lengths) + packets.read(size)
+                if not (self.is_deaf and head[0] >> 4 == PUBLISH):
+                    device.sendall(packet)
+
+
+class Site:
+    """A stack whose device has been provisioned with the way."""
+
+    def __init__(self, stack: Stack, way: DevicesWay) -> None:
+        self.stack, self.way = stack, way
+
+    def typed(self, *words: str, ends: float = ENDS) -> tuple[int, str]:
+        """The exit code of a command and all that it has printed; it ends within `ends` [s]."""
+        done = subprocess.run(
+            [*COMMAND, *words],
+            cwd=self.stack.root, env=self.stack.environment, capture_output=True, text=True, timeout=ends, check=False,
+        )  # fmt: skip
+        return done.returncode, done.stdout + done.stderr
+
+    def looks(self) -> dict[str, str]:
+        """What a person finds who looks."""
+        commands = (("state",), ("device", "status"), ("doctor",))
+        return {" ".join(words): self.typed(*words)[1] for words in commands}
+
+    def moves_again(self) -> None:
+        self.stack.wait_ready(30.0)
+        operator = Operator(self.stack)
+        try:
+            outcome, _ = operator.move_again()
+        finally:
+            operator.close()
+        assert outcome.result.executed_steps == outcome.result.commanded_steps
+
+
+@pytest.fixture(scope="module")
+def site() -> Iterator[Site]:
+    stack = Stack(processes=NEEDED)
+    way = DevicesWay(int(stack.deployment["GEMELO_MQTT_PORT"]))
+    stack.run.mkdir(parents=True)
+    flash = Flash(stack.run / "virtual_esp32_flash.json", "rm1", UnwrittenFiles(print))
+    flash.keep_credentials(NetworkCredentials(mqtt_uri=f"mqtt://127.0.0.1:{way.port}"))
+    try:
+        with stack:
+            yield Site(stack, way)
+    finally:
+        way.close()
+
+
+def test_what_is_sent_to_a_device_that_does_not_hear_ends_and_a_person_is_told_why_and_since_when(site: Site) -> None:
+    site.moves_again()
+    site.way.is_deaf = True
+    began = time.monotonic()
+    try:
+        for words in (("move", "--named", "ready"), ("move", "--named", "home"), ("stop",)):
+            code, said = site.typed(*words)
+            assert code != 0, said
+            assert SPEAKS in said, said
+            assert "Traceback" not in said
+        with found_by_scripts(site.stack), gemelo.connect(timeout=10.0) as arm:
+            asked = time.monotonic()
+            with pytest.raises((gemelo.Refused, gemelo.Aborted), match=SPEAKS):
+                arm.move(named="ready")
+            assert time.monotonic() - asked < ENDS
+        for command, shown in site.looks().items():
+            assert SPEAKS in shown, command
+            assert "a loose TX wire" in shown, command
+            assert "offline" not in shown.lower(), command
+            assert "(for " in shown, command
+        assert time.monotonic() - began > 3.0
+        assert "measured " in site.looks()["device status"]
+    finally:
+        site.way.is_deaf = False
+    site.moves_again()
+    assert "measured" not in site.typed("device", "status")[1]
+
+
+def test_a_forgotten_second_device_is_named_and_nothing_moves_until_it_is_gone(site: Site, tmp_path: Path) -> None:
+    site.moves_again()
+    environment = {**site.stack.environment, "GEMELO_PATHS_RUN": str(tmp_path / "run")}
+    second = subprocess.Popen(
+        [sys.executable, "-m", "firmware.platform.host.main"], cwd=site.stack.root, env=environment,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        operator = Operator(site.stack)
+        assert operator.wait_for(lambda: not site.stack.is_ready("stepper_gateway"), NOTICED)
+        operator.close()
+        for words in (("move", "--named", "ready"), ("home",)):
+            code, said = site.typed(*words)
+            assert code != 0, said
+            assert TWO in said, said
+        for command, shown in site.looks().items():
+            assert TWO in shown, command
+            assert f"process {second.pid} on " in shown, command
+            assert str(tmp_path / "run") in shown, command
+            assert shown.count("virtual") >= 2, command
+    finally:
+        second.terminate()
+        second.wait(20.0)
+    site.moves_again()
