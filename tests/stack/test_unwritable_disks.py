@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 
 import pytest
 
 from schemas.actions import GoalStatusCode
+from schemas.device import DeviceStopRequest
+from schemas.topics import DEVICE_STOP
 from services.chaos.descriptors import give_descriptors, take_descriptors
 from services.chaos.small_disk import SmallDisk
 from services.cli.errors import ExitCode
+from services.runtime.errors import NoAnswer, ServerLost
 from services.stack.stack import Stack
 from tests.optional import need_mounts
 from tests.stack.gemelo import gemelo
@@ -122,5 +125,54 @@ def test_a_gateway_without_a_descriptor_outlives_its_broker_and_comes_back_with_
         give_descriptors(gateway)
     stack.wait_ready(20.0)
     assert stack.pid("stepper_gateway") == gateway
+    outcome, _ = operator.move_again()
+    require_success(outcome)
+
+
+@contextmanager
+def without_descriptors(stack: Stack) -> Iterator[None]:
+    """No process of the stack gets a file or connection until the end of the block."""
+    pids = [stack.pid(name) for name in PROCESSES]
+    try:
+        for pid in pids:
+            take_descriptors(pid)
+        yield
+    finally:
+        for pid in pids:
+            give_descriptors(pid)
+
+
+def test_a_move_goes_on_to_the_step_and_a_stop_works_where_no_process_has_a_descriptor(stack, operator):
+    before = stack.pids()
+    handle, plan = begin(operator)
+    with without_descriptors(stack):
+        require_success(handle.wait(plan.duration + 10.0))
+        handle, plan = begin(operator)
+        assert operator.node.call(DEVICE_STOP, DeviceStopRequest(), timeout=5.0).accepted
+        assert handle.wait(10.0).status is not GoalStatusCode.SUCCEEDED
+    stack.wait_ready(20.0)
+    assert stack.pids() == before
+    assert not jumps(operator.arm, operator.seen)
+    outcome, _ = operator.move_again()
+    require_success(outcome)
+
+
+@pytest.mark.parametrize("name", ["broker", "router"])
+def test_a_link_that_breaks_in_a_move_of_a_stack_without_descriptors_comes_back_with_the_first_ones(
+    stack, operator, name
+):
+    others = {each: pid for each, pid in stack.pids().items() if each != name}
+    handle, _ = begin(operator)
+    with without_descriptors(stack):
+        stack.kill(name)
+        operator.wait_for(lambda: False, 3.0)  # some attempts
+        alive = {each: pid for each, pid in stack.pids().items() if each != name}
+        assert alive == others
+    stack.wait_ready(40.0)
+    with suppress(NoAnswer, ServerLost):
+        ended = handle.wait(30.0)
+        if ended.status is GoalStatusCode.SUCCEEDED:
+            require_success(ended)
+    assert not jumps(operator.arm, operator.seen)
     outcome, _ = operator.move_again()
     require_success(outcome)
