@@ -2,8 +2,8 @@
 
 Everything that happens is an event with a time: a turn of a node's loop, or a timer. Whoever waits runs one event after
 another, in the order of their times, until what he waits for is there. Several threads may wait at once; one runs at a
-time, so that the same seed gives the same bytes, and time stands still while one of them is at work. A thread that does
-not come back within `GRACE` of real time (it has ended, or waits for something else) is waited for no longer.
+time, so that the same seed gives the same bytes, and time stands still while one of them is at work, or would be if the
+machine let it. A thread that has slept for `GRACE` of real time (it waits for something else) is waited for no longer.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from typing import TypeVar
 
 from services.runtime.clock import DrivenLoop
 from services.simulation.baton import Baton, VirtualCondition
+from services.simulation.idleness import IdleTime
 
 T = TypeVar("T")
 
@@ -68,8 +69,7 @@ class Participant:
 
     thread: threading.Thread
     waits: list[Wait] = field(default_factory=list)  # one within the other, where a handler waits too
-    left_at: float = 0.0  # [s] of real time, when it went to work
-    is_at_work: bool = False
+    idle: IdleTime | None = None  # since somebody waits for it; None where it waits itself
 
 
 class VirtualClock:
@@ -143,7 +143,7 @@ class VirtualClock:
 
         thread = threading.Thread(target=run, name=name, daemon=True)
         with self.baton:
-            self._participants[thread] = Participant(thread, is_at_work=True, left_at=time.monotonic())
+            self._participants[thread] = Participant(thread, idle=IdleTime(thread))
         return thread
 
     def drive(self, loop: DrivenLoop) -> None:
@@ -176,7 +176,7 @@ class VirtualClock:
             me = self._me()
             wait = Wait(is_so, math.inf if timeout is None else self.now + _ns(timeout))
             me.waits.append(wait)
-            me.is_at_work = False
+            me.idle = None
             try:
                 self._run_alone(wait)
                 while (first := self._first_to_work(me)) is not me:
@@ -187,7 +187,7 @@ class VirtualClock:
                 return wait.is_so()
             finally:
                 me.waits.remove(wait)
-                me.is_at_work, me.left_at = not me.waits, time.monotonic()
+                me.idle = None if me.waits else IdleTime(me.thread)
                 self._turns.notify_all()
 
     def _run_alone(self, wait: Wait) -> None:
@@ -215,12 +215,12 @@ class VirtualClock:
         self._raise_interrupts()
 
     def _has_what_it_waits_for(self, each: Participant) -> bool:
-        wait = each.waits[-1] if each.waits and not each.is_at_work else None
+        wait = each.waits[-1] if each.waits and each.idle is None else None
         return wait is not None and (self.now >= wait.end or wait.is_so())
 
     def _is_waited_for(self, each: Participant) -> bool:
         has_ended = each.thread.ident is not None and not each.thread.is_alive()
-        return each.is_at_work and not has_ended and time.monotonic() - each.left_at < GRACE
+        return each.idle is not None and not has_ended and each.idle.seconds() < GRACE
 
     def _go_on(self) -> None:
         """Lets the next event happen, or time pass up to where somebody has waited long enough."""

@@ -12,6 +12,7 @@ import pytest
 import gemelo
 from gemelo.programs import Points, ProgramRun, Programs, RunStatus
 from schemas.ledger import VerifiedBy
+from services.runtime.bus.pace import OF_ALL_REQUESTS
 
 ROOT = Path(__file__).parents[2]
 
@@ -114,6 +115,14 @@ def test_a_program_takes_the_same_time_again() -> None:
             assert run.wait().status is RunStatus.DONE
             took.append(arm.sim.now)
     assert took[0] == took[1]
+
+
+def test_what_asks_in_a_loop_is_slowed_down_and_gets_all_its_answers(arm: gemelo.SimulatedArm) -> None:
+    """As on a real bus: of a client without a pace the server would drop what is above its limit."""
+    began = arm.sim.now
+    for _ in range(700):
+        arm.fk({"brazo_joint": 0.1})
+    assert arm.sim.now - began == pytest.approx((700 - OF_ALL_REQUESTS.burst) / OF_ALL_REQUESTS.per_second, abs=0.1)
 
 
 def test_threads_take_turns(arm: gemelo.SimulatedArm) -> None:

@@ -19,7 +19,7 @@ from services.planner.collision.native_scene import native_scene
 from services.planner.collision.world import Positions, World
 from services.planner.native import compiled
 from services.planner.native.compiled import where_built
-from services.planner.request.deadline import CancelFlag
+from services.planner.request.deadline import CancelFlag, CountedTime
 
 if TYPE_CHECKING:
     from services.planner.native.native_planner import NativePlanner
@@ -142,6 +142,25 @@ def sphere_check(arm: ArmDescription) -> SphereCheck:
 def cancel_flag() -> CancelFlag:
     """A flag that ends the native planner's search too, where that is built."""
     return compiled.CancelFlag()
+
+
+class CountedInPython(threading.Event):
+    """`CountedTime` where the native planner is not built."""
+
+    def __init__(self, seconds_per_question: float) -> None:
+        super().__init__()
+        self._per_question, self._questions = seconds_per_question, 0
+
+    def time(self, questions: int = 1) -> float:
+        """[s] after so many more questions."""
+        self._questions += questions
+        return self._questions * self._per_question
+
+
+@where_built(CountedInPython)
+def counted_time(seconds_per_question: float) -> CountedTime:
+    """From 0 on; the native planner's search counts its own questions too, where that is built."""
+    return compiled.CancelFlag(seconds_per_question)
 
 
 def show_scene(planner: NativePlanner, world: World) -> None:

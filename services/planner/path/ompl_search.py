@@ -18,7 +18,7 @@ from services.arm.model.description import ArmDescription
 from services.planner.path.path import PathNotFound
 from services.planner.path.roadmap import shortest_path
 from services.planner.path.validity import ValidityChecker
-from services.planner.request.deadline import Deadline
+from services.planner.request.deadline import Deadline, endless
 from services.planner.request.refusals import SearchFailure
 
 Array = NDArray[np.float64]
@@ -139,7 +139,9 @@ class _Problem:
         raise PathNotFound(SearchFailure.TIMED_OUT)
 
     def _late(self, deadline: Deadline) -> Callable[[], bool]:
-        """By the clock on the wall too, where the deadline's own stands."""
+        """By the clock on the wall, where the deadline's own stands."""
+        if deadline.clock is not endless:
+            return deadline.has_passed
         is_over = self._base.timedPlannerTerminationCondition(deadline.left).eval
         return lambda: bool(is_over()) or deadline.has_passed()
 

@@ -23,6 +23,15 @@ class CancelFlag(Protocol):
     def is_set(self) -> bool: ...
 
 
+class CountedTime(CancelFlag, Protocol):
+    """A flag that is a clock too: its time goes on by the same amount with every question, from whoever works for the
+    plan, so that the same plan takes the same time however busy the machine is."""
+
+    def time(self, questions: int = 1) -> float:
+        """[s] after so many more questions."""
+        ...
+
+
 class DeadlinePassed(PlanRefused):
     """The refusal (TIMED_OUT) of a plan whose deadline has passed, from wherever it is at."""
 

@@ -6,11 +6,11 @@ A plan is made when it is asked for, and answered when its time is over; a cance
 from __future__ import annotations
 
 import itertools
-import time
 from contextlib import suppress
+from functools import partial
 
 from schemas.planning import PlanCancelResult, PlanCode, PlanProgress, PlanRequest, PlanResponse, Timing
-from services.planner.collision.sphere_check import cancel_flag
+from services.planner.collision.sphere_check import counted_time
 from services.planner.collision.world import World
 from services.planner.core import Planner
 from services.planner.request.deadline import Stopwatch, endless
@@ -35,6 +35,9 @@ from services.planner.workers.workers import (
 )
 from services.runtime.clock import Clock
 
+# Measured: the time of a long native search between two questions whether its time is over, and how many times as long
+# it is in Python, where a question stands before whole checks.
+PER_QUESTION, OF_PYTHON = 2e-5, 5  # [s] of the allowed time, and questions
 COST = 0.01  # [s] of virtual time; chosen: about what a plan takes in a process of its own
 
 
@@ -100,14 +103,14 @@ class PlansInProcess:
         self._clock.later(took, answer)
 
     def _planned(self, job: Job) -> PlanResponse:
-        """By the processor time of this thread it is late on no machine that has other work too."""
+        """Its allowed time is counted in questions, so that it finds the same on every machine, whatever else runs."""
         self._prepare()
         if job.request.timing is Timing.TIME_OPTIMAL:
             with suppress(NoProfile):  # which the plan itself will say
                 load_toppra()  # seconds, the first time, which are not the plan's
-        return self._planner.plan(
-            job.request, job.present, job.age, time.thread_time, cancel_flag(), Stopwatch(endless)
-        )
+        counted = counted_time(PER_QUESTION)
+        clock = partial(counted.time, OF_PYTHON)
+        return self._planner.plan(job.request, job.present, job.age, clock, counted, Stopwatch(endless))
 
     def _prepare(self) -> None:
         """What a plan would otherwise do first."""

@@ -17,6 +17,7 @@ from services.runtime.bus.memory_network import (
     MemoryWatch,
     matches,
 )
+from services.runtime.bus.pace import Pace
 from services.runtime.clock import Clock
 
 __all__ = ["MemoryBus", "MemoryNetwork"]
@@ -25,8 +26,10 @@ __all__ = ["MemoryBus", "MemoryNetwork"]
 class MemoryBus:
     """One node's connection to a `MemoryNetwork`."""
 
-    def __init__(self, network: MemoryNetwork) -> None:
+    def __init__(self, network: MemoryNetwork, pace: Pace | None = None) -> None:
+        """`pace` is that of its requests."""
         self.network = network
+        self._pace = pace or Pace(monotonic=network.clock.monotonic, sleep=network.clock.sleep)
         self._declared: list[Declaration] = []
         self._numbers = itertools.count(1)
         self._name = network.next_name()
@@ -107,8 +110,10 @@ class MemoryBus:
         urgent: bool = False,
         number: int = 0,
     ) -> None:
-        """Sends one request with `timeout` [s] for its answer."""
+        """Sends one request with `timeout` [s] for its answer; it waits for its turn unless it is urgent."""
         number = number or self.take_number()
+        if not urgent:
+            self._pace.wait_for_turn()
         with self.network.lock:
             service = self.network.services.get(key) if self.is_connected else None
         if service is None:

@@ -221,6 +221,24 @@ def test_the_time_limit_ends_a_search():
     assert time.monotonic() - began < 2.0
 
 
+def test_a_search_whose_time_is_counted_ends_at_the_same_check_however_busy_the_machine_is():
+    core, start, goal = walled()
+    ended = [core.plan(start, goal, time_limit=0.1, cancel=CancelFlag(2e-5)) for _ in range(2)]
+    assert all(isinstance(each, NoPath) and each.reason is FailureReason.TIMED_OUT for each in ended)
+    assert ended[0].effort.search == pytest.approx(0.1, abs=1e-4)
+    assert ended[0].effort == ended[1].effort
+
+
+def test_a_counted_time_is_that_of_all_who_ask():
+    core, start, goal = walled()
+    counted = CancelFlag(2e-5)
+    assert counted.time(5) == pytest.approx(1e-4)
+    core.plan(start, goal, time_limit=0.1, cancel=counted)
+    assert 0.1 < counted.time() < 0.11
+    counted.set()
+    assert core.plan(start, goal, time_limit=0.1, cancel=counted).reason is FailureReason.CANCELLED
+
+
 def test_another_thread_can_end_a_search_and_do_other_things_meanwhile():
     core, start, goal = walled()
     cancel, ended = CancelFlag(), []

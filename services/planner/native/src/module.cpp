@@ -450,7 +450,8 @@ NB_MODULE(_motion, module) {
     nb::class_<World>(module, "World");
     nb::class_<Kernel>(module, "Kernel").def_ro("name", &Kernel::name);
     nb::class_<CancelFlag>(module, "CancelFlag")
-        .def(nb::init<>())
+        .def(nb::init<double>(), "seconds_per_question"_a = 0.0)
+        .def("time", &CancelFlag::ask, "questions"_a = 1)
         .def("set", [](CancelFlag& flag) { flag.is_set.store(true); })
         .def("is_set", [](const CancelFlag& flag) { return flag.is_set.load(); });
     nb::class_<Plan>(module, "Plan")
