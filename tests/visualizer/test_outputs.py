@@ -1,6 +1,7 @@
 """A viewer that goes and comes back is told everything again; the service never waits for it."""
 
 import os
+import resource
 import subprocess
 import time
 from contextlib import contextmanager
@@ -10,6 +11,7 @@ from rerun.experimental import ViewerClient
 
 from schemas.deployment import ViewerMode, ViewerSection
 from schemas.joints import JointState
+from services.runtime.process.unwritten import RETRY
 from services.visualizer.content import entities
 from services.visualizer.core import Visualizer
 from services.visualizer.program.rerun_program import environment, rerun_binary
@@ -17,6 +19,7 @@ from services.visualizer.program.screenshot import free_port
 from services.visualizer.render.arms_layout import SharedView
 from services.visualizer.render.layout import ArmLayout
 from services.visualizer.render.outputs import Outputs, VisualizerParameters
+from services.visualizer.render.recording_file import FLUSHED
 from tests.optional import need
 
 START = 1_795_000_000_000_000_000
@@ -35,6 +38,25 @@ def headless_viewer(port):
     finally:
         process.kill()
         process.wait()
+
+
+@contextmanager
+def files_no_larger_than(size):
+    """No file of this process grows beyond `size` [bytes], as on a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def printed(path):
+    """What Rerun's own program reads in a recording."""
+    return subprocess.run(
+        [rerun_binary(), "rrd", "print", str(path)], env=environment(os.environ), capture_output=True, text=True,
+        check=False,
+    ).stdout  # fmt: skip
 
 
 class Rig:
@@ -120,6 +142,25 @@ def test_without_a_viewer_only_the_recording_is_written(core, tmp_path):
         [rerun_binary(), "rrd", "print", tmp_path / "deep" / "view.rrd"], capture_output=True, text=True, check=True
     )
     assert f"/{entities.executed('brazo_joint')}" in printed.stdout
+
+
+def test_a_recording_begins_as_soon_as_its_disk_takes_it_and_goes_on_beside_it_after_a_full_one(core, tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    rig = Rig(core, tmp_path, ViewerSection(mode=ViewerMode.NONE), recording_path="file/view.rrd")
+    assert "cannot write the recording" in rig.step()
+    (tmp_path / "file").unlink()
+    rig.step_until(lambda: not rig.step(), 3.0 * RETRY)
+    first, second = tmp_path / "file/view.rrd", tmp_path / "file/view-2.rrd"
+    small = 8192
+    assert first.stat().st_size > small
+    with files_no_larger_than(small):
+        rig.step_until(lambda: "goes on in a file beside it" in rig.step(), 3.0 * FLUSHED)
+        rig.step_until(lambda: "cannot write the recording" in rig.step(), 3.0 * RETRY)
+    rig.step_until(lambda: not rig.step(), 3.0 * RETRY)
+    rig.outputs.close()
+    for path in (first, second):
+        assert "brazo_link" in printed(path)
+    assert sorted((tmp_path / "file").iterdir()) == [second, first]
 
 
 def test_a_recording_that_cannot_be_written_is_said_and_nothing_dies(core, tmp_path):

@@ -12,11 +12,11 @@ from msgspec import Meta
 
 from schemas.deployment import ViewerMode, ViewerSection
 from services.recordings.view_layout import SECONDS
-from services.runtime.process.own_files import make_own
 from services.visualizer.core import Visualizer
 from services.visualizer.program.viewer_connection import ViewerConnection
 from services.visualizer.render.arms_layout import SharedView, arms_blueprint
 from services.visualizer.render.layout import ArmLayout, blueprint
+from services.visualizer.render.recording_file import RecordingFile
 from services.visualizer.render.sink import APPLICATION, Sink
 
 SHARED_RECORDING = "arms-live"  # the same of every arm, or the viewer would show them one at a time
@@ -51,43 +51,41 @@ class Outputs:
         self._shared = shared
         self._recording_path = root / parameters.recording_path if parameters.recording_path else None
         self._viewer: Sink | None = None
-        self._recording: Sink | None = None
-        self._problem = ""
+        self._recording: RecordingFile | None = None
 
     def step(self, core: Visualizer, now: int, monotonic: float) -> str:
         """Sends a batch; `now` in [ns] UNIX, `monotonic` in [s]. Returns why an output is missing, or an empty text."""
-        self._open_recording(core)
+        recording = self._followed_recording(core, monotonic)
         self._follow_viewer(core, monotonic)
         updates = core.step(now)
-        for sink in (self._viewer, self._recording):
+        for sink in (self._viewer, recording):
             if sink is not None:
                 sink.write(updates)
         if self._connection is not None and self._viewer is None:
             return f"no viewer at {self._connection.host}:{self._connection.port}"
-        return self._problem
+        return "" if self._recording is None else self._recording.problem
 
     def close(self) -> None:
         """Hand over what is left, in clamp_stamp time."""
         if self._recording is not None:
-            self._recording.close(timeout=5.0)
+            self._recording.close()
         if self._viewer is not None and self._connection is not None and self._connection.is_alive:
             with suppress(RuntimeError):  # it may end while we hand over
                 self._viewer.close(timeout=1.0)
         if self._connection is not None:
             self._connection.close()
 
-    def _open_recording(self, core: Visualizer) -> None:
-        if self._recording_path is None or self._recording is not None or self._problem:
-            return
-        stream = rr.RecordingStream(APPLICATION, recording_id=_own_recording(core))
-        try:
-            self._recording_path.parent.mkdir(parents=True, exist_ok=True)
-            make_own(self._recording_path)
-            stream.save(str(self._recording_path))
-        except (OSError, RuntimeError) as error:
-            self._problem = f"cannot write the recording {self._recording_path}: {error}"
-            return
-        self._recording = self._own_sink(stream, core)
+    def _followed_recording(self, core: Visualizer, monotonic: float) -> Sink | None:
+        """The recording's sink, while its disk takes it."""
+        if self._recording_path is None:
+            return None
+        if self._recording is None:
+            self._recording = RecordingFile(
+                self._recording_path, _own_recording(core), lambda stream: self._own_sink(stream, core)
+            )
+        if self._recording.step(monotonic):
+            core.restart()
+        return self._recording.sink
 
     def _follow_viewer(self, core: Visualizer, monotonic: float) -> None:
         if self._connection is None:
