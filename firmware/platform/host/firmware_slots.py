@@ -28,6 +28,7 @@ log = logging.getLogger("virtual_esp32")
 
 SLOT_SIZE = 0x1E0000  # [bytes] as in platform/esp32/partitions.csv
 ELF = b"\x7fELF"
+UNUSABLE = (NoImage, OSError, LibraryMissing)  # why a slot's firmware is not started
 
 
 class ImageState(StrEnum):
@@ -77,12 +78,29 @@ class FirmwareSlots:
             self._keep(BootRecord(slot=self._record.slot, state=ImageState.PENDING))
         try:
             library = self._library(self._record.slot)
-        except (NoImage, OSError, LibraryMissing) as error:
+        except UNUSABLE as error:
             if not is_on_trial:
-                raise LibraryMissing(f"the firmware in {self._images[self._record.slot]}: {error}") from error
+                return self._other_slot(error)
             log.error("the new firmware does not start: %s", error)
             return self.boot()._replace(is_rolled_back=True)
         return Booted(f"ota_{self._record.slot}", library, is_on_trial, is_rolled_back)
+
+    def _other_slot(self, error: Exception) -> Booted:
+        """Starts the firmware of the other slot, as this one's cannot be; raises LibraryMissing where neither can."""
+        slot = self._record.slot
+        try:
+            library = self._library(1 - slot)
+        except UNUSABLE as others:
+            raise LibraryMissing(
+                f"no firmware can be started: {self._images[slot]}: {error}; the other slot: {others}. Remove "
+                f"{self._folder / self._name}_ota* to start with the one that is installed here, or run `make setup`"
+            ) from error
+        log.error(
+            "the firmware in %s cannot be started (%s): the other slot's is; `gemelo device update` writes a new one",
+            self._images[slot], error,
+        )  # fmt: skip
+        self._keep(BootRecord(slot=1 - slot))
+        return Booted(f"ota_{1 - slot}", library, False, True)
 
     def confirm(self) -> None:
         """The firmware that runs is good: it stays."""
@@ -158,8 +176,8 @@ class FirmwareSlots:
                 if old != library:
                     with suppress(OSError):
                         old.unlink()
-            if not library.exists():
-                library.write_bytes(code)
+            if not _holds(library, code):
+                library = _written(library, code)
         load_library(library)
         return library
 
@@ -188,6 +206,30 @@ def _refused() -> Iterator[None]:
         yield
     except OSError as error:
         raise SlotRefused(f"the flash memory cannot be written: {error.strerror}") from error
+
+
+def _holds(file: Path, code: bytes) -> bool:
+    """True if the file is this code and nothing else: one that was cut off would end whoever loads it."""
+    try:
+        return file.read_bytes() == code
+    except OSError:
+        return False
+
+
+def _written(library: Path, code: bytes) -> Path:
+    """A file with that code: `library`, or one in memory where the disk refuses it; raises OSError."""
+    beside = library.with_suffix(".tmp")
+    try:
+        beside.write_bytes(code)
+        os.replace(beside, library)
+    except OSError:
+        with suppress(OSError):
+            beside.unlink(missing_ok=True)
+        descriptor = os.memfd_create(library.name)  # stays open: it is the file's only name
+        with open(descriptor, "wb", closefd=False) as file:
+            file.write(code)
+        return Path(f"/proc/{os.getpid()}/fd/{descriptor}")
+    return library
 
 
 def _code(image: bytes) -> bytes:
