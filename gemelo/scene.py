@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from queue import SimpleQueue
 
 from gemelo.arguments import Vector
-from gemelo.errors import BadArgument, Refused
+from gemelo.errors import BadArgument, Lost, Refused
 from gemelo.scene_files import load_mesh, read_scene, write_scene
 from gemelo.session import PATIENCE, Session
 from gemelo.targets import number, point, quaternion, vector
@@ -25,6 +26,7 @@ from schemas.scene import (
     SceneDetach,
     SceneDisallow,
     SceneEdit,
+    SceneMesh,
     SceneMove,
     SceneObject,
     SceneRemove,
@@ -35,7 +37,8 @@ from schemas.scene import (
     Shape,
     SphereShape,
 )
-from schemas.topics import SCENE, SCENE_EDIT
+from schemas.scene_meshes import digests_in, with_meshes
+from schemas.topics import SCENE, SCENE_EDIT, scene_mesh
 
 TO_ANSWER = 10.0  # [s] a mesh of many triangles takes the planner some
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -288,6 +291,32 @@ class Scene:
         self._session.wait_for(has_last_edit, PATIENCE)
         return self._session.newest(SCENE)
 
+    def whole(self) -> PlanningScene:
+        """The scene as it is now with the files of its meshes, which it names by their digests otherwise.
+
+        >>> arm.scene.whole() == arm.scene.present
+        True
+        """
+        scene = self.present
+        return with_meshes(scene, {digest: self._mesh(digest) for digest in digests_in(scene)})
+
+    def _mesh(self, digest: str) -> bytes:
+        """The file of a mesh that stands in the scene; raises `Lost`."""
+        found: SimpleQueue[bytes] = SimpleQueue()
+        topic = scene_mesh(digest)
+
+        def take(mesh: SceneMesh) -> None:
+            found.put(mesh.data)
+            self._session.notify()
+
+        subscription = self._session.node.subscribe(topic, take)
+        try:
+            if not self._session.wait_for(lambda: not found.empty(), TO_ANSWER):
+                raise Lost(f"nothing heard of {topic.key} for {TO_ANSWER:g} s: was the mesh removed meanwhile?")
+        finally:
+            subscription.close()
+        return found.get()
+
     @property
     def objects(self) -> dict[str, SceneObject]:
         """All objects, by name.
@@ -302,7 +331,7 @@ class Scene:
 
         >>> arm.scene.save(folder + "/cell.json")
         """
-        write_scene(self.present, Path(path))
+        write_scene(self.whole(), Path(path))
 
     def load(self, path: str | Path) -> None:
         """Replaces the scene by a file's; raises `Error` where it holds none.

@@ -57,6 +57,7 @@ from schemas.topics import (
     camera_detections,
     camera_image,
     camera_info,
+    scene_mesh,
 )
 
 AnyTopic = Topic[Message]
@@ -85,8 +86,9 @@ BY_HAND: tuple[AnyTopic, ...] = (JOG, JOINT_TARGETS)
 EACH_CAMERA = "*"  # in a key: the name of any camera
 OF_CAMERAS: tuple[AnyTopic, ...] = tuple(make(EACH_CAMERA) for make in CAMERA_TOPICS)
 SEEN: tuple[AnyTopic, ...] = tuple(make(EACH_CAMERA) for make in (camera_image, camera_info, camera_detections))
-EVERYTHING: tuple[AnyTopic, ...] = (*TOPICS, *OF_CAMERAS)
-RECORDED = tuple(topic for topic in TOPICS if topic.recorded) + OF_CAMERAS
+MESHES: tuple[AnyTopic, ...] = (scene_mesh("*"),)  # of the scene, whatever their digests are
+EVERYTHING: tuple[AnyTopic, ...] = (*TOPICS, *MESHES, *OF_CAMERAS)
+RECORDED = (*(topic for topic in TOPICS if topic.recorded), *MESHES, *OF_CAMERAS)
 STOPS: tuple[AnyRequest, ...] = (DEVICE_STOP,)  # whoever may connect may stop the arm
 LOOKS: tuple[AnyRequest, ...] = (IK, FK, STATE_VALIDITY)  # answers that change nothing
 CONTROLS: tuple[AnyRequest, ...] = (CONTROL_TAKE, CONTROL_JOIN, CONTROL_GIVE)
@@ -104,11 +106,12 @@ ROLES: tuple[Role, ...] = (
         "visualizer", "everything that is seen to Rerun", "visualizer",
         reads=(DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, DEVICE_STATE, DEVICE_STATUS, DEVICE_EVENTS,
                SENSORS, DEVICE_SHAFT, PLANNED_PATH, SCENE, GRIPPER_STATE, CONTACTS, STEP_LEDGER, STOPPING_DISTANCE,
-               CONTROL, LOG, *SEEN),
+               CONTROL, LOG, *MESHES, *SEEN),
         asks=STOPS,
     ),
     Role(
-        "camera", "the images of all cameras", "camera", reads=(JOINT_STATES, GRIPPER_STATE, SCENE), asks=STOPS,
+        "camera", "the images of all cameras", "camera", reads=(JOINT_STATES, GRIPPER_STATE, SCENE, *MESHES),
+        asks=STOPS,
     ),
     Role("detector", "what is in the images", "detector", reads=(JOINT_STATES, *SEEN[:2]), asks=STOPS),
     Role(

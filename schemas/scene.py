@@ -30,11 +30,13 @@ class PlaneShape(Message, frozen=True, kw_only=True, tag="plane"):
 
 
 class MeshShape(Message, frozen=True, kw_only=True, tag="mesh"):
-    """An STL file: a path relative to the project or the robot's folder, or its content."""
+    """An STL file: a path relative to the project or the robot's folder, or its content, or the digest of that."""
 
     path: str = ""
     data: bytes = b""  # of the file; used where `path` is empty
     scale: Vector = (1.0, 1.0, 1.0)  # file's units to m
+    digest: str = ""  # of the file (scene_meshes.py), whose content is a `SceneMesh`; where `path` and `data` are empty
+    size: int = 0  # [bytes] of that file
 
 
 Shape = BoxShape | SphereShape | CylinderShape | PlaneShape | MeshShape
@@ -68,6 +70,13 @@ class PlanningScene(Message, frozen=True, kw_only=True):
     epoch: int = 0  # random, drawn where versions begin: no two scenes share both; 0: before the first change
     objects: tuple[SceneObject, ...] = ()
     allowed: tuple[AllowedPair, ...] = ()
+
+
+class SceneMesh(Message, frozen=True, kw_only=True):
+    """The file of a mesh that the scene names by its digest; latched, on a key of its own while the scene does."""
+
+    digest: str = ""
+    data: bytes = b""
 
 
 class SceneAdd(Message, frozen=True, kw_only=True, tag="add"):

@@ -63,7 +63,7 @@ from schemas.planning import (
     ValidityRequest,
     ValidityResponse,
 )
-from schemas.scene import Contacts, PlanningScene, SceneRequest, SceneResponse
+from schemas.scene import Contacts, PlanningScene, SceneMesh, SceneRequest, SceneResponse
 from schemas.system import LogRecord, NodeStatistics, ParameterChange
 
 M_co = TypeVar("M_co", bound=Message, covariant=True)
@@ -199,6 +199,12 @@ TOPICS: tuple[Topic[Message], ...] = (
     SENSORS, DEVICE_SHAFT, GRIPPER_STATE, STEP_LEDGER, STOPPING_DISTANCE, CONTROL,
     COMMANDS, COMMAND_ACKS, GATEWAY_INPUTS, CELL, LOG, STATISTICS, PARAMETER_CHANGES,
 )  # fmt: skip
+
+
+def scene_mesh(digest: str) -> Topic[SceneMesh]:
+    """The file of one mesh of the scene, which names it by this digest: a large file is not sent with every change."""
+    return Topic(f"scene/mesh/{digest}", SceneMesh, LATCHED, None, False, "planner", "the file of a mesh of the scene")
+
 
 # One of each for every camera of the cell file, by the camera's name.
 

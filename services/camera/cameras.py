@@ -29,6 +29,7 @@ from services.camera.virtual.world import CameraWorld
 from services.runtime.bus.wire import TooLarge
 from services.runtime.node import Node
 from services.runtime.node_clock import NodeClock
+from services.runtime.scene_meshes import SceneMeshes
 
 REOPEN = 3_000_000_000  # [ns] between two attempts to wake a camera that gives the same image again and again
 
@@ -144,5 +145,5 @@ def _watched_world(node: Node, arm: ArmDescription, cell: Cell) -> CameraWorld |
     world = CameraWorld(arm, cell, NodeClock(node, GATEWAY).to_own)
     node.subscribe(JOINT_STATES, world.on_joint_state)
     node.subscribe(GRIPPER_STATE, world.on_gripper_state)
-    node.subscribe(SCENE, world.on_scene)
+    node.subscribe(SCENE, SceneMeshes(node, world.on_scene).on_scene)
     return world

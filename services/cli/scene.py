@@ -185,7 +185,7 @@ def save(options: Options) -> ExitCode:
     from gemelo.scene_files import write_scene  # slow to load
 
     with connect_arm() as arm:
-        scene = arm.scene.present
+        scene = arm.scene.whole()
         write_scene(scene, options.file)
     print(f"{options.file} has the scene, version {scene.version}")
     return ExitCode.OK

@@ -117,4 +117,4 @@ def shape_text(shape: Shape) -> str:
             return "plane, solid below"
         case MeshShape():
             scale = "" if set(shape.scale) == {1.0} else f", scale {shape.scale[0]:g}"
-            return f"mesh {shape.path or f'of {len(shape.data)} bytes'}{scale}"
+            return f"mesh {shape.path or f'of {len(shape.data) or shape.size} bytes'}{scale}"

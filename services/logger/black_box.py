@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from schemas.message import Message
+from schemas.scene import PlanningScene
 from schemas.topics import Delivery, Topic
+from services.logger.core import is_past_mesh
 from services.logger.files import MCAP, prune, stem_of
 from services.logger.incident_story import incident_of
 from services.logger.incident_watch import IncidentWatch, Trigger
@@ -82,6 +84,9 @@ class BlackBox:
         entry = self._entries.popleft()
         if entry.topic.delivery is Delivery.LATCHED:
             self._latched[entry.topic.key, getattr(entry.message, "node", "")] = entry
+        if isinstance(entry.message, PlanningScene):  # from here on it is the oldest scene of the minute
+            scene = entry.message
+            self._latched = {key: each for key, each in self._latched.items() if not is_past_mesh(key[0], scene)}
 
 
 class BlackBoxWriter:

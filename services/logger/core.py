@@ -8,7 +8,9 @@ from typing import Any
 
 from schemas.device import CommandAck, CommandChunk
 from schemas.message import Message
-from schemas.topics import Delivery, Topic
+from schemas.scene import PlanningScene
+from schemas.scene_meshes import digests_in
+from schemas.topics import Delivery, Topic, scene_mesh
 from services.logger.command_log import CommandLog, CommandRow
 from services.recordings.channels import Entry
 
@@ -45,6 +47,12 @@ class Losses:
         return "; ".join(parts)
 
 
+def is_past_mesh(key: str, scene: PlanningScene) -> bool:
+    """True for the key of a mesh's file that `scene` does not name."""
+    digest = key.rpartition("/")[2]
+    return key == scene_mesh(digest).key and digest not in digests_in(scene)
+
+
 class Logger:
     """Collects messages between two writes, and keeps those that every file begins with."""
 
@@ -63,6 +71,8 @@ class Logger:
         if topic.delivery is Delivery.LATCHED:
             self._latched[topic.key, getattr(message, "node", "")] = entry
         match message:
+            case PlanningScene():
+                self._latched = {key: each for key, each in self._latched.items() if not is_past_mesh(key[0], message)}
             case CommandChunk():
                 self.commands.on_chunk(message, now)
             case CommandAck():

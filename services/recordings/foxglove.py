@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from schemas.frames import FrameTransforms, RobotDescription
-from schemas.scene import PlanningScene
+from schemas.scene import PlanningScene, SceneMesh
+from schemas.scene_meshes import with_meshes
 from schemas.system import LogRecord
 from services.recordings import foxglove_schemas as fox
 from services.recordings.channels import Channel, Entry, schema_of
@@ -39,6 +40,7 @@ class FoxgloveTwin:
 
     base: str = "base_link"
     scene: Entry | None = None
+    meshes: dict[str, bytes] = field(default_factory=dict)  # by digest
 
     def derived(self, entry: Entry) -> Iterator[Derived]:
         """What `entry` is in Foxglove's words: nothing, or messages with their channels."""
@@ -49,7 +51,11 @@ class FoxgloveTwin:
                 yield LOG, _log(record)
             case PlanningScene() as scene:
                 self.scene = entry
-                yield SCENE, _scene(scene, entry.stamp, self.base)
+                yield SCENE, _scene(with_meshes(scene, self.meshes), entry.stamp, self.base)
+            case SceneMesh() as mesh:
+                self.meshes[mesh.digest] = mesh.data
+                if self.scene is not None:
+                    yield from self.derived(self.scene)
             case RobotDescription() as description:
                 yield from self._described(description, entry)
 

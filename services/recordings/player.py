@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import msgspec
 
 from schemas.message import Message, encode
+from schemas.scene import SceneMesh
 from schemas.topics import ANY, Delivery
 from services.recordings.reader import RecordingReader, Row
 from services.recordings.table import NODES, recorded_topics
@@ -86,7 +87,7 @@ def payload_of(row: Row) -> bytes:
     """The message as it travels; raises msgspec's errors where the recording has another one under this name."""
     if not _kinds:
         _kinds.update({(topic.key, topic.message.__name__): topic.message for topic in recorded_topics()})
-    kind = _kinds.get((row.channel.topic, row.schema.name))
+    kind = SceneMesh if row.schema.name == SceneMesh.__name__ else _kinds.get((row.channel.topic, row.schema.name))
     if kind is None:
         return msgspec.msgpack.encode(msgspec.json.decode(row.message.data))
     return encode(msgspec.json.decode(row.message.data, type=kind))

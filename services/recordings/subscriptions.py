@@ -8,10 +8,11 @@ from typing import Any
 
 from schemas.message import Message
 from schemas.system import NodeRecord
-from schemas.topics import Topic
+from schemas.topics import SCENE, Topic
 from services.recordings.census import Census
 from services.recordings.table import NODES, recorded_topics, topics_of_node
 from services.runtime.node import Node
+from services.runtime.scene_meshes import SceneMeshes
 from services.runtime.topics import Subscription
 
 MAX_OTHERS = 512  # topics besides those of the table: what a node tells of itself is not to be trusted for more
@@ -31,6 +32,8 @@ class Subscriptions:
         for topic in recorded_topics():
             if topic is not NODES and is_chosen(topic.key):
                 self._subscribe(topic)
+        if is_chosen(SCENE.key):
+            node.subscribe(SCENE, SceneMeshes(node, lambda scene: None, on_message).on_scene, batch=ALL)
         Census(node, self._on_record)
 
     @property

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from schemas.message import Message
 from schemas.planning import AnswerInputs
 from schemas.scene import SceneResponse
+from schemas.scene_meshes import by_digest
 from schemas.topics import ANSWER_INPUTS, FK, IK, SCENE, SCENE_EDIT, STATE_VALIDITY
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import ArmDescription
@@ -82,6 +83,7 @@ class AnswersAgain:
         """True if answer and scene are the same again; an epoch is drawn by chance, and a full disk is none of ours."""
         before = self._scenes.scene(inputs.scene, f"the edit at {heard.at:.3f} s")
         store = SceneStore(self._arm, self._scenes.folders, before)
+        store.meshes.learn(self._scenes.meshes)
         links = lambda: link_poses(self._kinematics, standing(self._arm, inputs.present, inputs.age))  # noqa: E731
         built = lambda scene: self._scenes.built(scene, inputs.scene)  # noqa: E731
         response, world = changed(store, heard.message.question, links, inputs.stamp, built)
@@ -95,7 +97,9 @@ class AnswersAgain:
             self._comparison.aside[UNSEEN] += 1
             return True
         epoch = store.scene.epoch if before.epoch else shown.message.epoch
-        return self._comparison.hold(SCENE.key, shown, shown.message, replace(store.scene, epoch=epoch))
+        return self._comparison.hold(
+            SCENE.key, shown, by_digest(shown.message), replace(by_digest(store.scene), epoch=epoch)
+        )
 
 
 def _diskless(response: SceneResponse) -> SceneResponse:

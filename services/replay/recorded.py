@@ -6,6 +6,7 @@ import json
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
@@ -13,8 +14,9 @@ from typing import Any, Generic, TypeVar, cast
 import msgspec
 
 from schemas.message import Message
+from schemas.scene import SceneMesh
 from schemas.text_file import read_text
-from schemas.topics import Topic
+from schemas.topics import Topic, scene_mesh
 from services.arm.model.description import ArmDescription, load_arm
 from services.recordings.channels import schema_of
 from services.recordings.mcap_file import DEPLOYMENT, METADATA, ROBOT
@@ -93,6 +95,13 @@ class Recorded:
         """The messages of one of the topics, in their order."""
         return cast("list[Heard[M]]", self._heard[topic.key])
 
+    def meshes(self) -> dict[str, bytes]:
+        """The files of the meshes of all recorded scenes, by digest."""
+        before = scene_mesh("").key
+        rows = self._reader.rows(lambda topic: topic.startswith(before))
+        found = (msgspec.json.decode(row.message.data, type=SceneMesh) for row in rows)
+        return {mesh.digest: mesh.data for mesh in found}
+
     def require(self, topic: Topic[M]) -> list[Heard[M]]:
         """As `of`; raises `NotReplayable` where there is none."""
         if not self._heard[topic.key]:
@@ -150,7 +159,7 @@ class Recorded:
         return f"replay it with the files of commit {commit[:12]}, or {AGAIN}" if commit else AGAIN
 
     def _take(self, topic: Topic[Any], row: Row) -> None:
-        if row.schema.data != schema_of(described(topic)):
+        if not is_part_of(row.schema.data, schema_of(described(topic))):
             raise NotReplayable(
                 f"{self.path}: its message {row.schema.name} of {topic.key} has other fields than here: "
                 f"{_other_fields(row.schema.data, schema_of(described(topic)))}; {self._with_its_own_version()}"
@@ -173,6 +182,21 @@ def first_other_line(one: str, other: str) -> int:
     """The number of the first line, from 1, in which two texts differ."""
     lines = list(zip(one.splitlines(), other.splitlines(), strict=False))
     return next((number for number, (ours, theirs) in enumerate(lines, 1) if ours != theirs), len(lines) + 1)
+
+
+@lru_cache(maxsize=256)
+def is_part_of(recorded: bytes, here: bytes) -> bool:
+    """True if every field of the recorded schema is here with its type; one that was added since has its default."""
+    return recorded == here or _is_part_of(json.loads(recorded or b"{}"), json.loads(here or b"{}"))
+
+
+def _is_part_of(recorded: Any, here: Any) -> bool:
+    if isinstance(recorded, dict) and isinstance(here, dict):
+        fields = {key: value for key, value in recorded.items() if not (key == "description" and type(value) is str)}
+        return all(key in here and _is_part_of(value, here[key]) for key, value in fields.items())
+    if isinstance(recorded, list) and isinstance(here, list):
+        return len(recorded) == len(here) and all(map(_is_part_of, recorded, here))
+    return bool(recorded == here)
 
 
 def _other_fields(recorded: bytes, here: bytes) -> str:

@@ -6,6 +6,7 @@ from msgspec.structs import replace
 
 from schemas.planning import SceneVersion
 from schemas.scene import PlanningScene
+from schemas.scene_meshes import with_meshes
 from schemas.topics import SCENE
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import ArmDescription
@@ -24,6 +25,7 @@ class Scenes:
         self.heard: dict[tuple[int, int], Heard[PlanningScene]] = {}
         for heard in recorded.of(SCENE):
             self.heard[heard.message.version, heard.message.epoch] = heard
+        self.meshes = recorded.meshes()
         self._last: tuple[SceneVersion, World] | None = None
 
     def scene(self, version: SceneVersion, what: str) -> PlanningScene:
@@ -34,7 +36,7 @@ class Scenes:
                 f"{self._recorded.path}: version {version.version} of the scene, in which {what} was made, is not in "
                 "it; record from the planner's start, or `scene` too"
             )
-        return heard.message
+        return with_meshes(heard.message, self.meshes)
 
     def world(self, version: SceneVersion, what: str) -> World:
         """With the jaws; raises `NotReplayable`."""

@@ -152,6 +152,12 @@ class Node:
             publishers[topic.key] = Publisher(self._bus, topic, self.name, self._identity.instance)
         return publishers[topic.key]
 
+    def unpublish(self, topic: Topic[M]) -> None:
+        """Ends the publisher of a topic, with what late joiners would have got of it."""
+        publisher = self._endpoints.publishers.pop(topic.key, None)
+        if publisher is not None:
+            publisher.close()
+
     def subscribe(
         self, topic: Topic[M], on_message: Callable[[M], object], own: bool = False, batch: float | None = None
     ) -> Subscription[M]:

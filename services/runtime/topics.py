@@ -44,6 +44,10 @@ class Publisher(Generic[M]):
         """
         self._publication.put(self.encoded(message).payload)
 
+    def close(self) -> None:
+        """Nothing is published any more, and a late joiner gets no last message."""
+        self._publication.close()
+
     def encoded(self, message: M | Encoded[M]) -> Encoded[M]:
         """What `put` would send; raises as it does."""
         ready = encoded(message)

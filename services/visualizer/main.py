@@ -12,7 +12,7 @@ from schemas.deployment import Deployment
 from schemas.frames import RobotDescription
 from schemas.scene import MeshShape
 from schemas.text_file import read_text
-from schemas.topics import ANY, DESCRIPTION, LOG
+from schemas.topics import ANY, DESCRIPTION, LOG, SCENE
 from services.arm.cell.cell_file import deployed_cell
 from services.arm.model.description import load_arm
 from services.runtime.application import service
@@ -20,6 +20,7 @@ from services.runtime.deployment import deployments_beside, project_root, robot_
 from services.runtime.node import Node
 from services.runtime.node_clock import NodeClock
 from services.runtime.process.priority import step_behind
+from services.runtime.scene_meshes import SceneMeshes
 from services.visualizer.core import Visualizer
 from services.visualizer.feeds import feeds
 from services.visualizer.model.mesh_files import missing_meshes, scene_mesh
@@ -94,6 +95,8 @@ def _visualizer(
         if topic.writer != ANY and "stamp" in topic.message.__struct_fields__:
             clock = clocks.get(topic.writer) or clocks.setdefault(topic.writer, NodeClock(node, topic.writer))
             take = by_own_clock(clock, take)
+        if topic is SCENE:
+            take = SceneMeshes(node, take).on_scene
         node.subscribe(topic, take, own=topic is LOG, batch=1 / BATCH_RATE if is_series else None)
     return core
 

@@ -21,8 +21,10 @@ import rerun as rr
 from schemas.camera import CameraImage
 from schemas.deployment import ViewerMode
 from schemas.frames import RobotDescription
-from schemas.scene import MeshShape
-from schemas.topics import DESCRIPTION
+from schemas.scene import MeshShape, PlanningScene, SceneMesh
+from schemas.scene_meshes import with_meshes
+from schemas.topics import DESCRIPTION, SCENE
+from schemas.topics import scene_mesh as mesh_topic
 from services.arm.errors import DescriptionError
 from services.arm.model.description import load_arm
 from services.recordings.foxglove import CAMERA, IMAGE
@@ -63,7 +65,7 @@ def write_view(file: Path, rrd: Path, shadow: Path) -> Incident | None:
     folders = (shadow, project_root())
     try:
         core = _core(description, folders)
-        taken = _takers(core, shadow, cameras)
+        taken = _takers(core, shadow, cameras, _meshes_in(reader))
     except (DescriptionError, ValueError) as error:
         raise BadRecording(f'"{file}": its robot cannot be drawn: {error}') from error
     stream = rr.RecordingStream(APPLICATION, recording_id=file.stem)
@@ -108,6 +110,14 @@ def _cameras_in(reader: RecordingReader) -> tuple[str, ...]:
     return tuple(sorted(topic[len(before) : -len(after)] for topic in topics if topic.endswith(after)))
 
 
+def _meshes_in(reader: RecordingReader) -> dict[str, bytes]:
+    """The files of the meshes of all its scenes, by digest."""
+    before = mesh_topic("").key
+    rows = reader.rows(lambda topic: topic.startswith(before))
+    meshes = (msgspec.json.decode(row.message.data, type=SceneMesh) for row in rows)
+    return {mesh.digest: mesh.data for mesh in meshes}
+
+
 def _core(description: RobotDescription, folders: tuple[Path, ...]) -> Visualizer:
     model = parse_urdf(description.urdf)
 
@@ -117,11 +127,14 @@ def _core(description: RobotDescription, folders: tuple[Path, ...]) -> Visualize
     return Visualizer(model, description.robot, tool_link(model, description.robot_toml), load)
 
 
-def _takers(core: Visualizer, folder: Path, cameras: tuple[str, ...]) -> dict[str, Callable[[Row], None]]:
+def _takers(
+    core: Visualizer, folder: Path, cameras: tuple[str, ...], meshes: dict[str, bytes]
+) -> dict[str, Callable[[Row], None]]:
     """Who takes a row of each topic; one that is not as its message should be is left out."""
     found: dict[str, Callable[[Row], None]] = {}
     for topic, take, _ in feeds(core, load_arm(folder), cameras):
         found[topic.key] = _decoding(topic.message, take)
+    found[SCENE.key] = _decoding(PlanningScene, lambda scene: core.scene.on_scene(with_meshes(scene, meshes)))
     for name in cameras:
         found[f"{CAMERA}/{IMAGE}".format(name)] = _decoding_image(name, core.cameras.on_image)
     return found

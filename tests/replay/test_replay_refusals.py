@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 
@@ -117,6 +118,17 @@ def test_a_message_that_had_other_fields(changed):
 
     with pytest.raises(NotReplayable, match=r"JointState of joint_states has other fields.*new effort; no longer torq"):
         replay(changed("state_publisher", change), "state_publisher")
+
+
+def test_a_message_that_has_got_a_field_since_is_read_with_its_default(changed):
+    def change(record):
+        if isinstance(record, Schema) and record.name == "JointState":
+            schema = json.loads(record.data)
+            del schema["properties"]["effort"]
+            record.data = json.dumps(schema).encode()
+        return record
+
+    replay(changed("state_publisher", change), "state_publisher")
 
 
 def test_nothing_but_inputs(changed):

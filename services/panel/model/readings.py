@@ -22,6 +22,7 @@ from schemas.system import LogRecord
 from schemas.topics import Topic
 from services.arm.model.gripper import jaw_objects, jaws_apart
 from services.panel.model.pace import DrawPace
+from services.runtime.scene_meshes import SceneMeshes
 from services.runtime.topics import Latest
 
 M = TypeVar("M", bound=Message)
@@ -69,7 +70,8 @@ class BusReadings:
         self._shaft = self._shown(topics.DEVICE_SHAFT)
         self._errors, self._sensors = self._shown(topics.STEP_ERRORS), self._shown(topics.SENSORS)
         self._state, self._status = self._shown(topics.DEVICE_STATE), node.latest(topics.DEVICE_STATUS)
-        self._scene, self._contacts = node.latest(topics.SCENE), node.latest(topics.CONTACTS)
+        self._scene, self._contacts = PlanningScene(), node.latest(topics.CONTACTS)
+        node.subscribe(topics.SCENE, SceneMeshes(node, self._on_scene).on_scene)
         self._path, self._jog = node.latest(topics.PLANNED_PATH), self._shown(topics.JOG_STATUS)
         self._gripper = self._shown(topics.GRIPPER_STATE)
         self._ledger, self._stopping = self._shown(topics.STEP_LEDGER), self._shown(topics.STOPPING_DISTANCE)
@@ -104,6 +106,9 @@ class BusReadings:
         """What comes fifty times a second, and is shown five times."""
         return self._arm.node.latest(topic, on_demand=True)
 
+    def _on_scene(self, scene: PlanningScene) -> None:
+        self._scene = scene
+
     def _on_joints(self, state: JointState) -> None:
         self._joints.on_message(state)
         if self.pace.is_due(state.position, time.monotonic()):
@@ -122,8 +127,8 @@ class BusReadings:
 
     @property
     def scene(self) -> PlanningScene:
-        """The newest planning scene."""
-        return self._scene.message or PlanningScene()
+        """The newest planning scene, with the files of its meshes as far as they have come."""
+        return self._scene
 
     @property
     def jaws(self) -> tuple[SceneObject, ...]:

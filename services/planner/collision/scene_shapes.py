@@ -14,6 +14,7 @@ from services.arm.frames.transforms import Rigid, from_message
 from services.arm.stl import BadStl, read_stl
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
+LARGEST_FILE = 32_000_000  # [bytes]; chosen: the 500,000 triangles that a mesh may have are 25 million
 Folders = Sequence[Path]
 
 ANY = "*"
@@ -117,6 +118,13 @@ def _triangles(content: bytes, scale: tuple[float, float, float]) -> TriangleMes
 
 def _content(name: str, shape: MeshShape, folders: Folders) -> bytes:
     if not shape.path:
+        if shape.digest and not shape.data:
+            raise SceneError(f'object "{name}": nothing is known of its mesh {shape.digest}; add it with its file')
+        if len(shape.data) > LARGEST_FILE:
+            raise SceneError(
+                f'object "{name}": its mesh has {len(shape.data)} bytes, more than {LARGEST_FILE}; simplify it, or '
+                "write it as a binary STL file"
+            )
         return shape.data
     relative = PurePosixPath(shape.path)
     if relative.is_absolute() or ".." in relative.parts:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import msgspec
 
 from schemas.scene import AllowedPair, PlaneShape, PlanningScene, SceneObject
+from schemas.scene_meshes import meshes_in
 from services.arm.errors import suggestion
 from services.arm.model.description import ArmDescription
 from services.arm.model.gripper import JAWS
@@ -14,6 +15,7 @@ from services.planner.collision.scene_shapes import ANY, Folders, SceneError, sh
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 LONGEST_NAME = 64  # chosen: fits into a line of a table and of a refusal
+LARGEST_MESHES = 128_000_000  # [bytes] of the files of all meshes; chosen: the planner and its processes each have them
 MOST_OBJECTS = 1000  # chosen: more than a cell has; a plan stays fast among so many
 
 
@@ -22,6 +24,11 @@ def require_scene(arm: ArmDescription, scene: PlanningScene, folders: Folders) -
     if len(scene.objects) > MOST_OBJECTS:
         raise SceneError(
             f"the scene has {len(scene.objects)} objects, more than {MOST_OBJECTS}: merge some into meshes"
+        )
+    size = sum(len(content) for content in meshes_in(scene).values())
+    if size > LARGEST_MESHES:
+        raise SceneError(
+            f"the meshes of the scene have {size} bytes, more than {LARGEST_MESHES}: simplify or remove some"
         )
     names = [item.name for item in scene.objects]
     for item in scene.objects:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
@@ -12,8 +13,9 @@ from schemas.gripper import GripperState
 from schemas.joints import JointState
 from schemas.message import Vector
 from schemas.planning import PlanCode, PlanResponse
-from schemas.scene import Contacts, PlanningScene, SceneGrip, SceneRelease, SceneRequest, SceneResponse
-from schemas.topics import CONTACTS, GRIPPER_STATE, SCENE, SCENE_EDIT
+from schemas.scene import Contacts, PlanningScene, SceneGrip, SceneMesh, SceneRelease, SceneRequest, SceneResponse
+from schemas.scene_meshes import by_digest, meshes_in
+from schemas.topics import CONTACTS, GRIPPER_STATE, SCENE, SCENE_EDIT, scene_mesh
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import ArmDescription
 from services.arm.model.gripper import jaw_objects, jaws_apart
@@ -24,6 +26,7 @@ from services.planner.scene.scene_check import usable_part
 from services.planner.scene.scene_file import FILE, DamagedScene, load_scene, put_aside, save_scene
 from services.planner.scene.scene_store import SceneStore, changed, drawn_epoch
 from services.planner.scene.standing import link_poses, standing, version_of
+from services.runtime.bus.wire import Encoded, encoded
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.runtime.process.unwritten import RETRY
@@ -33,6 +36,17 @@ SETTLING = 0.003  # [m] chosen: by less the jaws settle, and plans stay those of
 PUBLISH_AGAIN = 0.5  # [s] between two answers to the scenes of others; chosen: two planners do not flood each other
 OWN = 8  # of its own scenes that a planner knows again; chosen: more than are published within a reader's delay
 OnWorld = Callable[[World], None]
+
+
+@dataclass(frozen=True)
+class Showing:
+    """A scene with everything that is made of it before any of it is shown: what cannot be made changes nothing."""
+
+    world: World  # of the thread of logic
+    world_of_plans: World  # a world is no thing for two threads
+    message: Encoded[PlanningScene]
+    meshes: dict[str, Encoded[SceneMesh]]  # by digest, all of the scene
+    contacts: Encoded[Contacts] | None = None  # where the arm stands, after an edit
 
 
 class SceneKeeper:
@@ -57,11 +71,12 @@ class SceneKeeper:
         self._folders = (project_root(), arm.folder)
         self._scene, self._contacts = node.publisher(SCENE), node.publisher(CONTACTS)
         self._published: deque[PlanningScene] = deque(maxlen=OWN)
+        self._shown: set[str] = set()  # digests of the meshes that are published
         self._store = SceneStore(arm, self._folders, self._restored(), node.clock)
         self._is_touching = False
         self._apart: float | None = None  # [m] of the jaws; None before the first word of them
         self.world = self._built(self._store.scene)
-        self._show()
+        self._show(self._prepared(self._store.scene))
         node.serve(SCENE_EDIT, self._edit)
         node.every(RETRY, self._save_again)
         self._other: PlanningScene | None = None  # that another process has published under this name
@@ -69,6 +84,11 @@ class SceneKeeper:
         node.every(PUBLISH_AGAIN, self._publish_again)
         if jaw_objects(arm, 0.0):
             node.subscribe(GRIPPER_STATE, self._on_gripper)
+
+    @property
+    def scene(self) -> PlanningScene:
+        """The scene with the files of its meshes, without the gripper's jaws."""
+        return self._store.scene
 
     def show_refusal(self, response: PlanResponse) -> None:
         """Shows what touches where a plan was refused, until one succeeds."""
@@ -90,10 +110,6 @@ class SceneKeeper:
         if other not in self._published:  # a late joiner is given the last one, which may be this planner's own
             self._other = other
 
-    def _publish(self) -> None:
-        self._published.append(self._store.scene)
-        self._scene.put(self._store.scene)
-
     def _publish_again(self) -> None:
         """Whoever followed the other scene gets this planner's; of two planners the older ends (bus/name_holder.py)."""
         other, self._other = self._other, None
@@ -102,7 +118,7 @@ class SceneKeeper:
                 "another process has published a scene as this planner, version %d of epoch %d: is there a second one? "
                 "The scene of this one is published again", other.version, other.epoch,
             )  # fmt: skip
-            self._publish()
+            self._publish(encoded(by_digest(self._store.scene)))
 
     def _on_gripper(self, state: GripperState) -> None:
         """The jaws have another opening: everything is checked with them there from now on.
@@ -112,28 +128,37 @@ class SceneKeeper:
         apart = jaws_apart(self._arm, state)
         if apart == self._apart:
             return
-        has_opened, self._apart = self._apart is not None and apart > self._apart + SETTLING, apart
+        before, self._apart = self._apart, apart
+        has_opened = before is not None and apart > before + SETTLING
+        try:
+            scene = self._store.touched(self._node.now()) if has_opened else self._store.scene
+            showing = self._prepared(scene)
+        except BaseException:
+            self._apart = before
+            raise
+        self._store.scene = scene
+        self._take_worlds(showing)
         if has_opened:
-            self._store.touch(self._node.now())
-        self.world = self._built(self._store.scene)
-        self._on_world(self._built(self._store.scene))
-        if has_opened:
-            self._publish()
+            self._publish(showing.message)
 
     def _edit(self, request: SceneRequest) -> SceneResponse:
         before, apart, stamp = self._store.scene, self._apart, self._node.now()
         present, age = self._states.message, self._states.age()
-        self._take_opening(request)
         links = lambda: link_poses(self._kinematics, standing(self._arm, present, age))  # noqa: E731
-        response, world = changed(self._store, request, links, stamp, self._built)
-        if world is None and self._apart != apart:
-            world = self._built(self._store.scene)
+        try:
+            self._take_opening(request)
+            response, showing = changed(self._store, request, links, stamp, self._prepared_edit)
+            if showing is None and self._apart != apart:
+                showing = self._prepared_edit(self._store.scene)
+        except BaseException:
+            self._store.scene, self._apart = before, apart
+            raise
         self._log.tell(SCENE_EDIT, stamp, present, age, version_of(self._with_jaws(before)))
-        if world is None:
+        if showing is None:
             return response
-        self.world = world
-        self._show()
-        self._tell_what_touches_here()
+        self._show(showing)
+        if showing.contacts is not None:
+            self._tell_what_touches_here(showing.contacts)
         return msgspec.structs.replace(response, reason=self._save(self._store.scene))
 
     def _take_opening(self, request: SceneRequest) -> None:
@@ -143,17 +168,30 @@ class SceneKeeper:
             said = GripperState(known=True, position=edit.opening)
             self._apart = jaws_apart(self._arm, said)
 
-    def _tell_what_touches_here(self) -> None:
+    def _tell_what_touches_here(self, contacts: Encoded[Contacts]) -> None:
         """After an edit: what touches where the arm stands; what a refused plan has shown was of another scene."""
-        configuration = self._configuration()
-        touching = () if configuration is None else tuple(self.world.contacts(configuration))
-        if configuration is not None and touching:
-            self._contacts.put(
-                Contacts(stamp=self._node.now(), name=self._arm.joint_names, position=configuration, contacts=touching)
-            )
-        elif self._is_touching:
-            self._contacts.put(Contacts(stamp=self._node.now()))
-        self._is_touching = bool(touching)
+        is_touching = bool(contacts.message.contacts)
+        if is_touching or self._is_touching:
+            self._contacts.put(contacts)
+        self._is_touching = is_touching
+
+    def _prepared(self, scene: PlanningScene) -> Showing:
+        """Everything that is shown of `scene`; raises `SceneError`, `ValueError` where it cannot be."""
+        meshes = {
+            digest: encoded(SceneMesh(digest=digest, data=content)) for digest, content in meshes_in(scene).items()
+        }
+        return Showing(self._built(scene), self._built(scene), encoded(by_digest(scene)), meshes)
+
+    def _prepared_edit(self, scene: PlanningScene) -> Showing:
+        showing = self._prepared(scene)
+        return replace(showing, contacts=self._contacts_here(showing.world))
+
+    def _contacts_here(self, world: World) -> Encoded[Contacts]:
+        configuration, now = self._configuration(), self._node.now()
+        touching = () if configuration is None else tuple(world.contacts(configuration))
+        if configuration is None or not touching:
+            return encoded(Contacts(stamp=now))
+        return encoded(Contacts(stamp=now, name=self._arm.joint_names, position=configuration, contacts=touching))
 
     def _built(self, scene: PlanningScene) -> World:
         return World(self._arm, self._kinematics, self._with_jaws(scene), self._folders)
@@ -162,10 +200,23 @@ class SceneKeeper:
         jaws = () if self._apart is None else jaw_objects(self._arm, self._apart)
         return msgspec.structs.replace(scene, objects=(*scene.objects, *jaws))
 
-    def _show(self) -> None:
-        """Tells the planner and the bus; a world is no thing for two threads, so the planner has one of its own."""
-        self._on_world(self._built(self._store.scene))
-        self._publish()
+    def _show(self, showing: Showing) -> None:
+        """Tells the planner and the bus: the files of meshes before the scene that names them."""
+        self._take_worlds(showing)
+        for digest in showing.meshes.keys() - self._shown:
+            self._node.publisher(scene_mesh(digest)).put(showing.meshes[digest])
+        self._publish(showing.message)
+        for digest in self._shown - showing.meshes.keys():
+            self._node.unpublish(scene_mesh(digest))
+        self._shown = set(showing.meshes)
+
+    def _take_worlds(self, showing: Showing) -> None:
+        self.world = showing.world
+        self._on_world(showing.world_of_plans)
+
+    def _publish(self, scene: Encoded[PlanningScene]) -> None:
+        self._published.append(scene.message)
+        self._scene.put(scene)
 
     def _configuration(self) -> Vector | None:
         """Where the arm stands, or None without a fresh joint state of all joints."""

@@ -80,10 +80,10 @@ def receive(pipe: IO[bytes], kind: msgspec.msgpack.Decoder[T]) -> T:
 
 
 def _exactly(pipe: IO[bytes], size: int) -> bytes:
-    content = b""
+    content = bytearray()
     while len(content) < size:
         more = pipe.read(size - len(content))
         if not more:
             raise EOFError("the other side has ended")
         content += more
-    return content
+    return bytes(content)

@@ -15,7 +15,7 @@ from schemas.device import GatewayInputs
 from schemas.frames import RobotDescription
 from schemas.message import BadMessage, Message, decode, encode
 from schemas.planning import PlanRequest, PlanResponse
-from schemas.scene import SceneRequest
+from schemas.scene import PlanningScene, SceneMesh, SceneRequest
 from schemas.system import Exchange
 from services.runtime.bus.interface import Arrival
 
@@ -31,6 +31,8 @@ MAX_PAYLOAD_OF: dict[str, int] = {  # [bytes]
     PlanResponse.__name__: TRAJECTORY,
     GoalRequest.__name__: TRAJECTORY,
     SceneRequest.__name__: TRAJECTORY,  # the file of a mesh: 500,000 triangles are 25
+    SceneMesh.__name__: TRAJECTORY,
+    PlanningScene.__name__: 4 * MEGABYTE,  # 1,000 objects, without the files of their meshes
     GatewayInputs.__name__: TRAJECTORY + 2 * MEGABYTE,  # the largest goal, and all that has come beside it
     Exchange.__name__: TRAJECTORY + 9 * MEGABYTE,  # a question, its answer (one of them is small), and who asked
 }
@@ -40,6 +42,8 @@ REMEDY_OF: dict[str, str] = {
     PlanResponse.__name__: "split the path, and plan its parts one after the other",
     GoalRequest.__name__: "send the trajectory in parts",
     SceneRequest.__name__: "add the objects one by one, and simplify their meshes",
+    SceneMesh.__name__: "simplify the mesh",
+    PlanningScene.__name__: "remove objects, or give them shorter names",
     RobotDescription.__name__: "simplify the URDF",
     CameraImage.__name__: "choose a smaller image",
 }

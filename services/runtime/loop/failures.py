@@ -1,4 +1,4 @@
-"""What the handlers and tasks of a service have raised: none of it ends the service, all of it is in the log."""
+"""Log of the errors that the handlers and tasks of a service raise: none of them ends the service."""
 
 from __future__ import annotations
 

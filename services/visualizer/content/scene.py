@@ -54,8 +54,10 @@ class SceneView:
         self._is_new = False
 
     def on_scene(self, message: PlanningScene) -> None:
-        """The planning scene: objects and attached objects."""
+        """The planning scene: objects and attached objects; a mesh without its file is drawn when that comes."""
         self._scene, self._is_new = message, True
+        shapes = {item.shape for item in message.objects if isinstance(item.shape, MeshShape)}
+        self._meshes = {shape: mesh for shape, mesh in self._meshes.items() if shape in shapes}
 
     def on_jaws(self, jaws: tuple[SceneObject, ...]) -> None:
         """The gripper's jaws, as far apart as they are."""
@@ -160,6 +162,8 @@ class SceneView:
                 return primitive_mesh(VisualShape("cylinder", (radius, length)), item.padding)
             case PlaneShape():
                 return _below(primitive_mesh(PLANE), item.padding)
+            case MeshShape(path="", data=b"", digest=digest) if digest:
+                return None
             case MeshShape():
                 return self._loaded(item.shape)
         return None
