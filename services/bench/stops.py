@@ -32,7 +32,7 @@ from schemas.topics import DEVICE_CONFIGURE, DEVICE_INJECT, DEVICE_STOP, FOLLOW_
 from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
 from services.bench.latency import sharp_start
 from services.bench.stack import Running, Stacks, families
-from services.bench.traffic import FORGED, OURS, connected, flood
+from services.bench.traffic import FORGED, GARBAGE, OURS, SESSIONS, connected, flood
 from services.mqtt.client import stop_loop
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.zenoh_bus import ZenohBus
@@ -46,8 +46,19 @@ RAMP = 0.8  # [s] of acceleration: the arm is stopped during it
 SPEED = 0.01  # [rad/s] below which the arm stands
 PATIENCE = 3.0  # [s]
 FLOOD_SECONDS = 60.0  # at the most
-FLOODS = ("requests", "commands", "holds", f"{FORGED}requests", f"{FORGED}holds")
-NEVER_MOVING = ("planner frozen", "flood of holds", f"flood of {FORGED}holds")  # conditions in which no move begins
+FLOODS = (
+    "requests",
+    "commands",
+    "holds",
+    "stops",
+    f"{FORGED}requests",
+    f"{FORGED}holds",
+    f"{FORGED}stops",
+    GARBAGE,
+    SESSIONS,
+)
+STOPPING = ("holds", "stops", f"{FORGED}holds", f"{FORGED}stops")
+NEVER_MOVING = ("planner frozen", *(f"flood of {what}" for what in STOPPING))  # conditions in which no move begins
 SLEEP = 0.002  # [s] of the thread that measures how late the bench itself wakes
 
 
@@ -209,6 +220,8 @@ def stop_ms(stacks: Stacks) -> Figure:
         caller.close()
     worst = max(wire, key=lambda name: quantile(wire[name], 0.99))
     reference = {f"{name} p99": quantile(samples, 0.99) for name, samples in wire.items()}
+    at_rest = quantile(wire["idle"], 0.99)
+    reference |= {f"{name}, times the idle p99": quantile(samples, 0.99) / at_rest for name, samples in wire.items()}
     reference["broker frozen, to the answer that it was not carried out, median"] = quantile(to_answer, 0.5)
     reference["broker frozen, from its thaw to the stop on the wire, median"] = quantile(after_thaw, 0.5)
     reference |= {f"{name}, the bench itself woke late p99": quantile(samples, 0.99) for name, samples in late.items()}
@@ -217,7 +230,7 @@ def stop_ms(stacks: Stacks) -> Figure:
         f"the worst condition is given: {worst}; load average {os.getloadavg()[0]:.1f}; "
         f"{CALLS} calls each, broker mosquitto, floods of 5,000 a second from a process on the same cores that keeps "
         "to no pace, a loop from one that does; p99 is "
-        f"{rounded(quantile(wire[worst], 0.99) / quantile(wire['idle'], 0.99)):g} times that of the idle stack"
+        f"{rounded(quantile(wire[worst], 0.99) / at_rest):g} times that of the idle stack"
     )
     return of_samples(wire[worst], GOAL, reference, note)
 

@@ -17,8 +17,9 @@ import subprocess
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import msgspec
@@ -52,6 +53,7 @@ from schemas.topics import (
 from services.mqtt.client import stop_loop
 from services.runtime.bus.pace import Pace, Rate
 from services.runtime.bus.zenoh_bus import ZenohBus
+from services.runtime.errors import BusError
 
 THERE, BACK = "gemelo-bench/there", "gemelo-bench/back"
 PATIENCE = 5.0  # [s] for a connection
@@ -73,8 +75,18 @@ REQUESTS: dict[str, tuple[tuple[str, Message], ...]] = {
     OURS: ((DEVICE_COMMAND.key, DeviceCommandRequest(command=SpeedCommand())),),
     "commands": ((DEVICE_COMMAND.key, DeviceCommandRequest(command=SpeedCommand())),),
     "holds": ((DEVICE_STOP.key, DeviceStopRequest(kind=StopKind.HOLD)),),
+    "stops": ((DEVICE_STOP.key, DeviceStopRequest(kind=StopKind.STOP)),),
 }
 FORGED = "forged "  # before one of these: each request under another name
+GARBAGE, SESSIONS = "garbage connections", "sessions"  # at the router's port
+RATES = {
+    GARBAGE: 30.0,
+    SESSIONS: 250.0,
+}  # [1/s] of those: more than twice the 12, and the 1,000 in 4 s, that kept others
+MOST_SESSIONS = 1000  # from joining; so many are kept open, and then ended and opened anew
+MOST_GARBAGE = 50  # connections that are kept open
+NO_HANDSHAKE = b"GET / HTTP/1.1\r\n\r\n"
+SHORTLY = 0.3  # [s] for the router to take a connection
 
 
 def main() -> None:
@@ -88,7 +100,8 @@ def main() -> None:
     echo.add_argument("--rate", type=float, required=True, help="[Hz]")
     echo.add_argument("--count", type=int, required=True)
     flood = kinds.add_parser("flood")
-    flood.add_argument("what", choices=[*REQUESTS, *(FORGED + what for what in REQUESTS), "targets", "mqtt"])
+    forged = [FORGED + what for what in REQUESTS]
+    flood.add_argument("what", choices=[*REQUESTS, *forged, GARBAGE, SESSIONS, "targets", "mqtt"])
     flood.add_argument("--port", type=int, required=True, help="of the router; for mqtt of the broker")
     flood.add_argument("--robot", required=True)
     flood.add_argument("--rate", type=float, default=RATE, help="[1/s]")
@@ -164,8 +177,9 @@ def ask(port: int, size: int, rate: float, count: int) -> list[float]:
 
 
 @contextmanager
-def flood(what: str, port: int, robot: str, seconds: float, rate: float = RATE) -> Iterator[None]:
-    """Sends `what` at `rate` [1/s] from another process, from its full rate on until the block ends."""
+def flood(what: str, port: int, robot: str, seconds: float) -> Iterator[None]:
+    """Sends `what` at its rate [1/s], for most RATE, from another process, until the block ends."""
+    rate = RATES.get(what, RATE)
     options = ["--port", str(port), "--robot", robot, "--rate", str(rate), "--seconds", str(seconds)]
     process = subprocess.Popen(
         [sys.executable, "-m", "services.bench.traffic", "flood", what, *options], stdout=subprocess.PIPE
@@ -181,7 +195,15 @@ def flood(what: str, port: int, robot: str, seconds: float, rate: float = RATE) 
 
 
 def _flood(options: argparse.Namespace) -> None:
-    send = _mqtt(options.port, options.robot) if options.what == "mqtt" else _bus(options.what, options)
+    match options.what:
+        case "mqtt":
+            send = _mqtt(options.port, options.robot)
+        case what if what == GARBAGE:
+            send = _garbage(options.port)
+        case what if what == SESSIONS:
+            send = _sessions(options.port, options.robot)
+        case what:
+            send = _bus(what, options)
     print("begun", flush=True)
     _pace(send, options.rate, options.seconds)
 
@@ -203,6 +225,38 @@ def _bus(what: str, options: argparse.Namespace) -> Callable[[], None]:
         bus.ask(key, schema, payload, 1.0, lambda answer: None)
 
     return ask
+
+
+def _garbage(port: int) -> Callable[[], None]:
+    """Connects to the router and sends what is no handshake."""
+    kept: deque[socket.socket] = deque()
+
+    def connect() -> None:
+        with suppress(OSError):
+            opened = socket.create_connection(("127.0.0.1", port), SHORTLY)
+            kept.append(opened)
+            opened.send(NO_HANDSHAKE)
+        if len(kept) > MOST_GARBAGE:
+            kept.popleft().close()
+
+    return connect
+
+
+def _sessions(port: int, robot: str) -> Callable[[], None]:
+    """Opens sessions of the bus, up to as many as the router takes, and then ends them all."""
+    kept: list[ZenohBus] = []
+
+    def join() -> None:
+        try:
+            kept.append(ZenohBus(RouterSection(port=port), robot))
+            is_full = len(kept) >= MOST_SESSIONS
+        except BusError:
+            is_full = True
+        if is_full:
+            while kept:
+                kept.pop().close()
+
+    return join
 
 
 def _mqtt(port: int, robot: str) -> Callable[[], None]:
