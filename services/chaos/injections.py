@@ -52,13 +52,18 @@ def signalled(name: str, number: signal.Signals) -> Begin:
     """A signal by which a terminal ends what was started in it."""
 
     def begin(site: ChaosSite, random: Random) -> str:
-        pid = site.stack.pid(name)
-        if pid:
-            resource.prlimit(pid, resource.RLIMIT_CORE, (0, resource.prlimit(pid, resource.RLIMIT_CORE)[1]))
+        with suppress(PermissionError, ProcessLookupError):  # mosquitto gives up root's rights
+            _leave_no_core(site.stack.pid(name))
         site.stack.kill(name, number)
         return f"{number.name} to {name}"
 
     return begin
+
+
+def _leave_no_core(pid: int) -> None:
+    """SIGQUIT has the kernel write what was in memory, where its limit allows that; raises `OSError`."""
+    _, most = resource.prlimit(pid, resource.RLIMIT_CORE)
+    resource.prlimit(pid, resource.RLIMIT_CORE, (0, most))
 
 
 def twin(name: str) -> Begin:

@@ -14,8 +14,8 @@ from paho.mqtt.enums import CallbackAPIVersion
 from services.mqtt.client import stop_loop
 from services.stack.stack import Stack, StackError
 
-TO_GIVE_WAY = 20.0  # [s] of start and look-around for a second process, on a busy machine
-TO_BEGIN = 15.0  # [s] until a second process has begun its work
+TO_BEGIN = 60.0  # [s] until a second process has loaded all and shows itself, on a machine without time
+TO_GIVE_WAY = 20.0  # [s] from there until it has looked around and ended
 TO_END = 10.0  # [s] after its SIGTERM
 POLL = 0.05  # [s]
 BACK_AT_ONCE = 1  # [s] after which a client whose id was taken over comes again, where it does
@@ -58,6 +58,8 @@ class TwinProcess:
 
     def gave_way(self) -> list[str]:
         """Waits until the second one has ended; what of that is wrong."""
+        if not _until(self._has_shown_itself, TO_BEGIN):
+            return [f"a second {self.name} has not begun within {TO_BEGIN:g} s: the machine gives it no time"]
         if not _until(lambda: self.has_ended, TO_GIVE_WAY):
             return [f"a second {self.name} goes on beside the first for {TO_GIVE_WAY:g} s"]
         found = self._untold()
@@ -67,15 +69,20 @@ class TwinProcess:
 
     def has_begun(self) -> bool:
         """Waits until the second one has begun its work: it says so where a process says that it is alive."""
-        alive = self._stack.run / f"{self.name}.alive"
-        mine = str(self._process.pid) if self._process is not None else ""
-        return _until(lambda: self.has_ended or _first_word(alive) == mine, TO_BEGIN) and not self.has_ended
+        return _until(lambda: self.has_ended or self._is_at_work(), TO_BEGIN) and not self.has_ended
 
     def one_is_left(self) -> list[str]:
         """Waits until one of both has ended; what of that is wrong."""
         if not _until(lambda: self.has_ended or not psutil.pid_exists(self.first), TO_GIVE_WAY):
             return [f"two of {self.name} go on beside each other for {TO_GIVE_WAY:g} s"]
         return self._untold() if self.has_ended else []
+
+    def _is_at_work(self) -> bool:
+        alive = self._stack.run / f"{self.name}.alive"
+        return self._process is not None and _first_word(alive) == str(self._process.pid)
+
+    def _has_shown_itself(self) -> bool:
+        return self.has_ended or self._log.stat().st_size > 0 or self._is_at_work()
 
     def _untold(self) -> list[str]:
         said = self._log.read_text(errors="replace").strip()
