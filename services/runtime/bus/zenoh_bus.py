@@ -38,6 +38,7 @@ from services.runtime.bus.branches import (
 from services.runtime.bus.dead_links import end_dead_links
 from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Query
 from services.runtime.bus.pace import Pace
+from services.runtime.bus.recognition import Recognition
 from services.runtime.bus.zenoh_config import client_config
 from services.runtime.bus.zenoh_declarations import (
     MAX_SECRET,
@@ -92,6 +93,8 @@ class ZenohBus:
         self._secret = secrets.token_hex(MAX_SECRET // 2)
         self._numbers = itertools.count(1)
         self._disconnected_since: float | None = None  # [s] monotonic
+        self._recognition = Recognition(RECONNECTION_TIMEOUT)
+        self._own_token = ""  # that the router is asked for
         self._tokens: list[ZenohDeclaration] = []
         self._queryables: list[ZenohQueryable] = []
         self._monitors: dict[str, ServerMonitor] = {}
@@ -127,11 +130,21 @@ class ZenohBus:
         return self._common_name
 
     def require_reconnection(self) -> None:
-        if self.is_connected or not router_answers(self._router.host, self._router.port, timeout=0.1):
+        now = time.monotonic()
+        if self.is_connected:
+            self._disconnected_since = None
+            if self._own_token:
+                self._recognition.ask(self._session, self._own_token)
+            is_served = all(self.wait_served(each.key, 0.0) for each in self._queryables if each.is_urgent)
+            if complaint := self._recognition.complaint(now, is_served):
+                raise BusError(complaint)
+            return
+        self._recognition.begin_anew()
+        if not router_answers(self._router.host, self._router.port, timeout=0.1):
             self._disconnected_since = None
             return
-        self._disconnected_since = self._disconnected_since or time.monotonic()
-        if time.monotonic() - self._disconnected_since > RECONNECTION_TIMEOUT:
+        self._disconnected_since = self._disconnected_since or now
+        if now - self._disconnected_since > RECONNECTION_TIMEOUT:
             raise BusError(f"the router is there, but did not take this session back within {RECONNECTION_TIMEOUT:g} s")
 
     def publish(
@@ -280,6 +293,7 @@ class ZenohBus:
 
     def declare_alive(self, key: str) -> ZenohDeclaration:
         token = ZenohDeclaration(self._session.liveliness().declare_token(key))
+        self._own_token = key
         self._tokens.append(token)  # one that nobody holds would be undeclared
         return token
 
@@ -288,13 +302,21 @@ class ZenohBus:
             if str(sample.key_expr) == key:  # a wildcard token stands for this one too, and says nothing of it
                 on_change(sample.kind == zenoh.SampleKind.PUT)
 
+        self._note_watch(key)
         return ZenohDeclaration(self._session.liveliness().declare_subscriber(key, on_sample, history=True))
 
     def watch_tokens(self, pattern: str, on_change: Callable[[str, bool], None]) -> ZenohDeclaration:
         def on_sample(sample: zenoh.Sample) -> None:
             on_change(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
+        self._note_watch(pattern)
         return ZenohDeclaration(self._session.liveliness().declare_subscriber(pattern, on_sample, history=True))
+
+    def _note_watch(self, pattern: str) -> None:
+        """Of tokens that a session watches it asks no router any more (Zenoh 1.10.2)."""
+        if self._own_token and zenoh.KeyExpr(pattern).intersects(zenoh.KeyExpr(self._own_token)):
+            self._own_token = ""
+            self._recognition.begin_anew()
 
     def alive(self, pattern: str) -> set[str]:
         replies = self._session.liveliness().get(pattern, timeout=1.0)

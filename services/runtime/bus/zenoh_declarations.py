@@ -84,13 +84,15 @@ class ZenohQueryable:
         self, session: zenoh.Session, key: str, on_query: Callable[[ZenohQuery], None], urgent: bool, is_verified: bool
     ) -> None:
         """`is_verified`: the router lets everyone ask as its own principal alone; else all are `local`."""
-        self._key, self._on_query, self._is_verified = key, on_query, is_verified
+        self.key, self.is_urgent = key, urgent  # is_urgent: while it is declared
+        self._on_query, self._is_verified = on_query, is_verified
         channel: Any = FifoChannel(QUERIES) if urgent else RingChannel(QUERIES)
         self._queryable: Any = session.declare_queryable(served_under(key), channel, complete=True)
         self._thread = threading.Thread(target=self._run, args=(self._queryable.handler,), daemon=True, name=key)
         self._thread.start()
 
     def close(self) -> None:
+        self.is_urgent = False
         self._queryable.undeclare()
 
     def join(self, timeout: float) -> None:
@@ -111,7 +113,7 @@ class ZenohQueryable:
             if (principal := asker_at(str(query.key_expr))) is None:  # it asks in the name of many
                 with query:
                     return
-            self._on_query(ZenohQuery(query, self._key, principal if self._is_verified else LOCAL))
+            self._on_query(ZenohQuery(query, self.key, principal if self._is_verified else LOCAL))
         except Exception:
             with suppress(OSError):  # a disk that is full takes no words
                 traceback.print_exc()
