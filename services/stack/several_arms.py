@@ -1,4 +1,4 @@
-"""`python -m services.stack.several_arms NAME ...`: what `make up ARMS="rm1 parol6"` starts, as files.
+"""`python -m services.stack.several_arms "NAME ..."`: what `make up ARMS="rm1 parol6"` starts, as files.
 
 Prints the path of a process-compose file: router, broker and viewer once, and every other process of
 process-compose.yaml once for each arm, named <robot>-<process>. What cannot run together is refused before anything is
@@ -101,12 +101,26 @@ def write(arms: Sequence[StackedArm], common: Deployment, root: Path, environ: M
     return written
 
 
+def words(texts: Sequence[str], root: Path) -> list[str]:
+    """The arms in texts as $ARMS: separated by blanks, one with blanks in quotes; a text that is a folder is one arm.
+
+    Raises `ConfigurationError` where a quote is not closed.
+    """
+    found = []
+    for text in texts:
+        try:
+            found += [text] if (root / text / "robot.toml").is_file() else shlex.split(text)
+        except ValueError as error:
+            raise ConfigurationError(f"ARMS={text}: {error}: put a path with a blank into quotes of its own") from error
+    return found
+
+
 def main(names: Sequence[str]) -> int:
     """0, or 1 with every problem on stderr."""
     root = project_root()
     try:
         common = load_deployment()
-        arms = stacked_arms(names, common, root)
+        arms = stacked_arms(words(names, root), common, root)
         problems = list(dict.fromkeys(each for arm in arms for each in start_problems(arm.deployment)))
         if not problems:
             print(write(arms, common, root, os.environ))

@@ -38,7 +38,7 @@ class Machine:
     """A project folder and a PATH with the common tools and nothing else."""
 
     def __init__(self, folder: Path) -> None:
-        self.root = folder / "project"
+        self.root = folder / "mi proyecto ñ"
         self.bin = folder / "bin"
         self.home = folder / "home"
         for each in (self.root, self.bin, self.home):
