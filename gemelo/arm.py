@@ -526,7 +526,10 @@ class Arm:
         after: Motion | None = None,
         **target: Unpack[Target],
     ) -> Motion:
-        """As `execute` and `move`, but returns as soon as the arm goes; a motion that still runs is taken over.
+        """As `execute` and `move`, but returns as soon as the arm goes.
+
+        A motion of this connection that still runs gives way to a target: it is slowed to rest on its path, as by
+        `cancel`, and the plan begins there. A plan must begin where the arm stands, and is refused while it moves.
 
         `after`: the plan begins where that motion ends, and in the same instant, without a pause. One motion can wait
         behind another; it is over too when that one ends before its goal.
@@ -537,6 +540,9 @@ class Arm:
         >>> motion.wait().status.name
         'SUCCEEDED'
         >>> first = arm.start(named="ready")
+        >>> arm.start(named="lifted").wait().status.name, first.status.name
+        ('SUCCEEDED', 'CANCELED')
+        >>> first = arm.start(named="ready")
         >>> second = arm.start(arm.plan(named="left", from_joints=first.plan.end), after=first)
         >>> first.wait().status.name, second.wait().status.name
         ('SUCCEEDED', 'SUCCEEDED')
@@ -545,6 +551,8 @@ class Arm:
             raise BadArgument("start a plan, or say where to: not both, not none")
         if target and after is not None and "from_joints" not in target:
             target["from_joints"] = after.plan.end
+        if target and after is None:
+            self._motions.bring_to_rest()
         return self._motions.start(plan if plan is not None else self.plan(**target), detached, after=after)
 
     def home(

@@ -298,6 +298,17 @@ class MotionRegistry:
             raise
         return motion
 
+    def bring_to_rest(self) -> None:
+        """Decelerates what this connection has started and returns when it rests; raises `Lost` where that is not said
+        in time."""
+        running = [motion for motion in self._started if not motion.is_over]
+        for motion in running:
+            motion.cancel()
+        if running and not self._session.wait_for(lambda: all(motion.is_over for motion in running), BRAKING):
+            raise Lost(f"the motion before was to stop, but did not say within {BRAKING:g} s that it rests")
+        if running:
+            self._session.changed()
+
     def cancel_attached(self) -> None:
         """Decelerates what this connection has started and nobody waits for, and waits until it rests."""
         running = [motion for motion in self._started if not motion.is_detached and not motion.is_over]

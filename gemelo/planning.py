@@ -20,6 +20,7 @@ from gemelo.frames import pose_from
 from gemelo.session import Session, answer_of
 from gemelo.targets import as_target, named_joints
 from gemelo.units import Pose
+from schemas.device import DeviceMode
 from schemas.motion import JointTrajectory
 from schemas.planning import (
     FkRequest,
@@ -27,6 +28,7 @@ from schemas.planning import (
     IkResponse,
     JointGoal,
     PlanCancel,
+    PlanCode,
     PlanProgress,
     PlanRequest,
     PlanResponse,
@@ -37,7 +39,7 @@ from schemas.planning import (
 )
 from schemas.scene import Contact
 from schemas.text_file import NotUtf8, read_text
-from schemas.topics import FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS, STATE_VALIDITY
+from schemas.topics import DEVICE_STATE, FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS, STATE_VALIDITY
 from services.arm.model.description import ArmDescription
 from services.runtime.clock import token
 from services.runtime.requests.client import PendingCall
@@ -184,10 +186,23 @@ def make_plan(session: Session, asked: PlanRequest, target: Target, on_progress:
             break
         session.wait_for(lambda: False, LOOK_AGAIN)  # the end of a jog, of a stream or of a stop
     if response.refusal is not None:
+        _require_no_homing(session, response.refusal)
         raise refused(session.description, response.refusal, request, target, response.code)
     if not response.trajectory.points:
         raise Refused(f"refused: the planner answered {response.code.name} without a trajectory", code=response.code)
     return Plan(session.description.name, target, response)
+
+
+def _require_no_homing(session: Session, refusal: Refusal) -> None:
+    """A start that cannot be planned from is no fault of the joints' while they look for their switches: raises
+    `Refused`."""
+    if refusal.check not in OF_THE_START:
+        return
+    state = session.latest(DEVICE_STATE)
+    session.wait_for(lambda: state.message is not None, LOOK_AGAIN * 3)
+    if state.message is not None and state.message.mode is DeviceMode.HOMING:
+        reason = "the arm is looking for its switches: wait until it is home, or end that with arm.stop()"
+        raise Refused(f"refused: {reason}", check="homing", reason=reason, code=PlanCode.INVALID_ROBOT_STATE)
 
 
 def find_configurations(session: Session, request: IkRequest, target: ToolGoal) -> Configurations:
@@ -272,6 +287,7 @@ def _nearest(arm: ArmDescription, refusal: Refusal, request: PlanRequest, target
     return Target(**{**kept, "joints": dict(zip(names, values, strict=False))})  # type: ignore[typeddict-item]
 
 
+OF_THE_START = ("start state", "moving start")  # checks of where the arm is, not of where it is to go
 NOT_THE_GOAL = ("start state",)  # checks whose nearest value is of something else
 GOALS = ("named", "joints", "position", "orientation", "rpy", "pose", "offset", "along")
 

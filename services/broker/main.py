@@ -60,14 +60,19 @@ def run(deployment: Deployment, log: logging.Logger) -> int:
 
     certificate = CertificateWatch(shown(section), log.warning, RENEWAL)
 
+    lock = " with TLS" if section.secure_folder else ""
+    answered = threading.Event()
+
     def beat() -> None:
+        if not answered.is_set():
+            answered.set()
+            log.info("%s listens on %s port %d%s", section.broker, host, port, lock)
         readiness.ready()
         readiness.beat()
         certificate.beat()
 
     is_embedded = section.broker is Broker.EMBEDDED
     command = embedded.command(section) if is_embedded else mosquitto.command(section, folder)
-    log.info("%s listens on %s port %d%s", section.broker, host, port, " with TLS" if section.secure_folder else "")
     step_ahead()  # the device's heartbeats pass through here
     return become(command, section, beat, readiness.not_ready)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from pathlib import Path
 
 import msgspec
@@ -13,8 +14,18 @@ from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options, Parser, json_option
 from services.cli.session import load_robot
 from services.cli.text_table import table
-from services.recordings.incidents import FOLDER, BlackBoxFile, Incident, black_boxes, read_incident, time_of
+from services.recordings.incidents import (
+    FOLDER,
+    BlackBoxFile,
+    Incident,
+    black_boxes,
+    is_saving,
+    read_incident,
+    time_of,
+)
 from services.runtime.deployment import project_root
+
+SAVING = "a black box of what has just happened is being saved: `gemelo blackbox list` has it in a few seconds"
 
 
 def list_options(parser: Parser) -> None:
@@ -24,18 +35,18 @@ def list_options(parser: Parser) -> None:
 
 def run_list(options: Options) -> ExitCode:
     """Prints the saved black boxes, the newest first."""
-    folder, found = _found()
+    folder, found, saving = _found()
     if options.json:
         print(msgspec.json.encode(found).decode())
     elif not found:
-        print(f"no black box in {folder}: nothing has happened yet")
+        print(saving or f"no black box in {folder}: nothing has happened yet")
     else:
         rows = [
             (str(number), time_of(each.incident.stamp), str(each.incident.kind), _clause(each.incident))
             for number, each in enumerate(found, 1)
         ]
         print(table(("N", "when", "what", "sentence"), rows))
-        print("\n`gemelo blackbox show N`, or `open N` to see it")
+        print("\n`gemelo blackbox show N`, or `open N` to see it" + (f"\n{saving}" if saving else ""))
     return ExitCode.OK
 
 
@@ -85,20 +96,22 @@ def _chosen(which: str) -> tuple[Path, Incident]:
     if not which.isdecimal():
         with one_sentence():
             return Path(which), read_incident(Path(which))
-    folder, found = _found()
+    folder, found, saving = _found()
     if not found:
-        raise CommandError(f"no black box in {folder}: nothing has happened yet")
+        raise CommandError(saving or f"no black box in {folder}: nothing has happened yet")
     if not 1 <= int(which) <= len(found):
         raise CommandError(f"there is no black box {which}: there are 1 to {len(found)}, `gemelo blackbox list`")
     chosen = found[int(which) - 1]
     return Path(chosen.path), chosen.incident
 
 
-def _found() -> tuple[Path, list[BlackBoxFile]]:
-    """The folder, and what is in it of the deployment's robot."""
+def _found() -> tuple[Path, list[BlackBoxFile], str]:
+    """The folder, what is in it of the robot, and what to say where one is being saved; empty where none is."""
     robot = load_robot()
     folder = project_root() / robot.deployment.paths.out / FOLDER
-    return folder, black_boxes(folder, robot.description.name)
+    name = robot.description.name
+    saving = SAVING if is_saving(folder, name, time.time()) else ""
+    return folder, black_boxes(folder, name), saving
 
 
 def _clause(incident: Incident) -> str:

@@ -19,6 +19,7 @@ from services.cli.text_table import table
 
 EVERY = 1.0  # [s] every node tells its figures once a second
 FIRST = 2.5  # [s] until two of every node have come
+SAMPLING = 1.0  # messages by which two counts of a steady stream over the same time may differ
 LATE_SHARE = 0.9  # of the promised rate: chosen, less is named
 HEADINGS = ("node", "CPU [%]", "memory [MB]", "loop [Hz]", "worst lateness [ms]", "received [1/s]", "lost", "bad")
 
@@ -186,9 +187,12 @@ def memory(info: NodeInfo | None) -> int | None:
 
 
 def slow_topics(figures: Mapping[str, Figures]) -> Iterator[SlowTopic]:
-    """Topics of which a node hears less than the table promises; silent ones may have no writer, and are left out."""
+    """Topics of which a node hears less than the table promises; silent ones may have no writer, and are left out.
+
+    Of a steady stream one message may lie on this or on that side of each end of a second: one less says nothing.
+    """
     for topic in TOPICS:
         for name, each in figures.items():
             heard = each.received().get(topic.key, 0.0)
-            if topic.rate is not None and 0.0 < heard < LATE_SHARE * topic.rate:
+            if topic.rate is not None and 0.0 < heard < LATE_SHARE * topic.rate - SAMPLING / each.seconds:
                 yield SlowTopic(node=name, topic=topic.key, heard=heard, promised=topic.rate, writer=topic.writer)

@@ -24,6 +24,7 @@ from services.runtime.process.ending import ended_by_signals
 from services.stack.results import new_results
 from services.stack.stack import Stack, StackError
 
+DRIVER = "sudo apt-get install mesa-vulkan-drivers libvulkan1"
 MOSQUITTO = (shutil.which("mosquitto"), shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin"))
 
 
@@ -105,10 +106,13 @@ def take_picture(recording: Path, png: Path) -> list[str]:
 
     Where no driver draws it there is none: that is said with its remedy, and fails nothing.
     """
-    from services.visualizer.program.screenshot import save_screenshot  # slow to load: rerun
+    from services.visualizer.program.screenshot import NoGraphics, save_screenshot  # slow to load: rerun
 
     try:
         save_screenshot(recording, png)
+    except NoGraphics as error:
+        say(f"no picture of the view: {missing_driver() or f'{error}: {DRIVER}'}")
+        return []
     except (RuntimeError, OSError) as error:
         if lack := missing_driver():
             say(f"no picture of the view: {lack}")

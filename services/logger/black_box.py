@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections import defaultdict, deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,14 @@ from services.logger.files import MCAP, prune, stem_of
 from services.logger.incident_story import incident_of
 from services.logger.incident_watch import IncidentWatch, Trigger
 from services.recordings.channels import Entry
-from services.recordings.incidents import BLACK_BOX, Incident, IncidentKind, incident_in, incident_metadata
+from services.recordings.incidents import (
+    BLACK_BOX,
+    Incident,
+    IncidentKind,
+    incident_in,
+    incident_metadata,
+    saving_mark,
+)
 from services.recordings.mcap_file import McapFile
 from services.recordings.reader import BadRecording, RecordingReader
 from services.recordings.view_layout import layout_metadata, layout_of
@@ -48,6 +56,11 @@ class BlackBox:
             self._forget_oldest()
         self._entries.append(Entry(topic, message, now))
         self._take(self._watch.on_message(topic, message, now))
+
+    @property
+    def is_pending(self) -> bool:
+        """True from an incident until `step` or `finish` returns it."""
+        return self._pending is not None
 
     def step(self, now: int, router: str = "") -> tuple[Incident, tuple[Entry, ...]] | None:
         """An incident that is to be saved now, with its messages; `now` in [ns] UNIX, with the `router` of now."""
@@ -111,6 +124,10 @@ class BlackBoxWriter:
         )
         self._thread.start()
 
+    @property
+    def is_writing(self) -> bool:
+        return self._thread is not None and self._thread.is_alive()
+
     def wait(self, timeout: float | None = None) -> None:
         """Until the file is written, `timeout` [s] at most."""
         if self._thread is not None:
@@ -125,6 +142,25 @@ class BlackBoxWriter:
             self._tell(f"{BLACK_BOX}{incident.sentence}; it cannot be written to {folder}: {error.strerror or error}")
         else:
             self._tell(f"{BLACK_BOX}{incident.sentence}; `gemelo blackbox open`, or {path}")
+
+
+class SavingMark:
+    """The file by which others see that a black box is being saved; a disk that takes none has no mark."""
+
+    def __init__(self, folder: Path, robot: str) -> None:
+        self._folder, self._file, self._is_set = folder, saving_mark(folder, robot), False
+
+    def show(self, is_saving: bool) -> None:
+        """Makes or removes the file where that has changed."""
+        if is_saving == self._is_set:
+            return
+        self._is_set = is_saving
+        with suppress(OSError):
+            if is_saving:
+                own_folder(self._folder)
+                self._file.touch()
+            else:
+                self._file.unlink(missing_ok=True)
 
 
 def prune_each_kind(folder: Path, robot: str, keep: int, ours: Sequence[str]) -> None:

@@ -9,7 +9,7 @@ from schemas.deployment import Deployment
 from schemas.message import Message
 from schemas.topics import Topic
 from services.arm.cell.cell_file import deployed_cell
-from services.logger.black_box import BlackBox, BlackBoxWriter
+from services.logger.black_box import BlackBox, BlackBoxWriter, SavingMark
 from services.logger.core import Batch, Logger
 from services.logger.disk import LoggerParameters, RecordingWriter
 from services.logger.images import record_cameras
@@ -62,9 +62,13 @@ def run(node: Node, deployment: Deployment) -> None:
         if told is not None and keep:
             saver.save(*told, project_root() / deployment.paths.out / FOLDER, keep)
 
+    mark = SavingMark(project_root() / deployment.paths.out / FOLDER, node.robot)
+    node.at_end(lambda: mark.show(False))
+
     def step(now: int) -> None:
         write(now, logger.step(now))
         save(black_box.step(now, node.router))
+        mark.show(parameters.value.keep_black_boxes > 0 and (black_box.is_pending or saver.is_writing))
         node.set_ready(not disk.problem, disk.problem)
 
     node.spin(step, rate=WRITE_RATE)

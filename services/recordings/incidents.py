@@ -15,6 +15,9 @@ BLACK_BOX = "black box: "  # the logger's line about a new one begins with it
 FOLDER = "blackbox"  # in the folder of what runs leave
 
 
+SAVING_AT_MOST = 60.0  # [s] from an incident to its file; a mark that is older is that of a logger that was killed
+
+
 class IncidentKind(StrEnum):
     """What a black box is saved for."""
 
@@ -47,6 +50,19 @@ class BlackBoxFile(msgspec.Struct, frozen=True, kw_only=True):
 
     path: str
     incident: Incident
+
+
+def saving_mark(folder: Path, robot: str) -> Path:
+    """The file that is there from an incident until its black box is written."""
+    return folder / f".{robot}.saving"
+
+
+def is_saving(folder: Path, robot: str, now: float) -> bool:
+    """True if a black box of the robot is being saved; `now` [s] UNIX."""
+    try:
+        return now - saving_mark(folder, robot).stat().st_mtime < SAVING_AT_MOST
+    except OSError:
+        return False
 
 
 def incident_metadata(incident: Incident) -> dict[str, dict[str, str]]:

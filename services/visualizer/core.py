@@ -29,6 +29,7 @@ from services.visualizer.model.rotations import Array
 from services.visualizer.model.visual_model import VisualJoint, VisualModel
 
 PANEL_PERIOD = 500_000_000  # [ns]
+AGAIN = 5_000_000_000  # [ns] after which the mode is sent again: a viewer that comes late has only the newest data
 AHEAD = 60_000_000_000  # [ns] chosen: a stamp further in the future is false, and the view would follow it there
 FARTHEST = 1e9  # [rad], [m] or [steps]: no joint gets there; beyond it the view's arithmetic overflows
 BAND = 0.5  # [steps] rounding to whole steps alone gives as much
@@ -53,6 +54,7 @@ class Visualizer:
         self._path_is_new = False
         self._trail_end: Array | None = None  # where the trail ends
         self._shown = ("", "")  # mode, panel
+        self._mode_at = 0  # [ns] UNIX, when the mode was sent last
         self._panel_at = 0
         self._latest = 0  # [ns] what is stamped later was never measured
         prismatic = frozenset(joint.name for joint in model.moving if joint.is_prismatic)
@@ -121,11 +123,12 @@ class Visualizer:
         self._latest = now + AHEAD
         return [*self._measured(), *self._ghost(), *self._step_errors(), *self._shafts(), *self._planned(),
                 *self._preview.take(now), *self.scene.take(now), *self.cameras.take(now), *self._device(now),
-                *self.event_log.take(self._latest)]  # fmt: skip
+                *self.event_log.take(now, self._latest)]  # fmt: skip
 
     def restart(self) -> None:
         """Sends the latched content again to a new viewer."""
         self._path_is_new = self._path is not None
+        self.event_log.say_again()
         self.scene.restart()
         self.cameras.restart()
         self._preview.restart()
@@ -196,7 +199,10 @@ class Visualizer:
         shown, self._shown = self._shown, (mode, text)
         updates: list[Update] = []
         if mode != shown[0]:
-            updates += [StateUpdate(entities.MODE, now, mode), Tint(entities.MEASURED, now, mode)]
+            updates.append(Tint(entities.MEASURED, now, mode))
+        if mode != shown[0] or now - self._mode_at >= AGAIN:
+            self._mode_at = now
+            updates.append(StateUpdate(entities.MODE, now, mode))
         updates += [TextPanel(entities.PANEL, now, text)] if text != shown[1] else []
         return updates
 

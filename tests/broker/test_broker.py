@@ -127,3 +127,26 @@ def test_mosquitto_is_told_to_send_at_once_and_to_keep_nothing():
     assert "allow_anonymous true" in conf
     assert "set_tcp_nodelay true" in conf
     assert "persistence false" in conf
+
+
+def test_a_broker_that_cannot_start_is_not_said_to_listen(monkeypatch, tmp_path):
+    """mosquitto itself ends, here for a file that it cannot use: nobody has listened, so nobody says so."""
+    program = tmp_path / "mosquitto"
+    program.write_text("#!/bin/sh\necho 'Error: Unable to open log file' >&2\nexit 1\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    broker = RunningBroker("mosquitto", tmp_path / "broker")
+    assert broker.popen.wait(20.0) == 1
+    assert "Unable to open log file" in broker.output
+    assert "listens on" not in broker.output
+
+
+@pytest.mark.parametrize("name", BROKERS)
+def test_a_broker_says_where_it_listens_once_it_answers(tmp_path, name):
+    broker = RunningBroker(name, tmp_path)
+    try:
+        wait_until(lambda: f"{name} listens on 127.0.0.1 port {broker.port}" in broker.output)
+        assert broker.output.count("listens on") == 1
+    finally:
+        broker.popen.terminate()
+        broker.popen.wait(20.0)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
 
 from services.cli.errors import ExitCode
 from services.cli.main import run
-from services.logger.black_box import write_black_box
-from services.recordings.incidents import Happening, Incident, IncidentKind
+from services.logger.black_box import SavingMark, write_black_box
+from services.recordings.incidents import Happening, Incident, IncidentKind, is_saving, saving_mark
 from services.recordings.mcap_file import McapFile
 
 SECOND = 1_000_000_000
@@ -62,6 +63,27 @@ def test_nothing_has_happened_yet(out, capsys):
     assert "nothing has happened yet" in capsys.readouterr().out
     assert run(["blackbox", "open"]) is ExitCode.FAILED
     assert "nothing has happened yet" in capsys.readouterr().err
+
+
+def test_one_that_is_being_saved_is_said_until_it_is_there(out, capsys):
+    mark = SavingMark(out / "blackbox", "rm1")
+    mark.show(True)
+    assert run(["blackbox", "list"]) is ExitCode.OK
+    assert run(["blackbox", "show"]) is ExitCode.FAILED
+    said = capsys.readouterr()
+    assert "is being saved" in said.out
+    assert "is being saved" in said.err
+    assert "nothing has happened" not in said.out + said.err
+    mark.show(False)
+    assert run(["blackbox", "list"]) is ExitCode.OK
+    assert "nothing has happened yet" in capsys.readouterr().out
+
+
+def test_the_mark_of_a_logger_that_was_killed_is_not_believed_for_ever(out, capsys):
+    SavingMark(out / "blackbox", "rm1").show(True)
+    os.utime(saving_mark(out / "blackbox", "rm1"), (START / 1e9, START / 1e9))
+    assert is_saving(out / "blackbox", "rm1", START / 1e9 + 1.0)
+    assert not is_saving(out / "blackbox", "rm1", START / 1e9 + 100.0)
 
 
 @pytest.mark.parametrize(

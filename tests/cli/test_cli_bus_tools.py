@@ -488,6 +488,19 @@ def test_a_topic_that_comes_too_seldom_is_named_and_a_silent_one_is_not():
     assert list(top.slow_topics({"planner": top.Figures(heard(0, 10), heard(second, 60))})) == []
 
 
+def test_a_steady_stream_is_not_called_slow_for_one_message_on_the_other_side_of_a_second():
+    """10 messages a second, of which the second between two reports has 9, 10 or 11."""
+
+    def heard(stamp: int, count: int) -> NodeStatistics:
+        return NodeStatistics(
+            stamp=stamp, node="logger", topics=(TopicStatistics(key="stopping_distance", received=count),)
+        )
+
+    at_rate = {count: top.Figures(heard(0, 0), heard(1_000_000_000, count)) for count in (7, 9, 10, 11)}
+    slow = {count: list(top.slow_topics({"logger": each})) for count, each in at_rate.items()}
+    assert [bool(slow[count]) for count in (7, 9, 10, 11)] == [True, False, False, False]
+
+
 def test_a_goal_of_somebody_else_is_cancelled_and_one_that_is_none_is_named(session, connected, stack, planner):
     with pytest.raises(CommandError, match='no goal begins with "nobody"'):
         action_watch.cancel(session, FOLLOW_JOINT_TRAJECTORY, "nobody")

@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import rerun
 
 from services.demo import main
+from services.visualizer.program import screenshot
 from tests.optional import lack
 
 LACK = "Vulkan missing: sudo apt-get install mesa-vulkan-drivers"
@@ -31,3 +33,39 @@ def test_with_a_driver_a_picture_that_cannot_be_taken_is_a_failure(
     monkeypatch.setattr(main, "missing_driver", str)
     (complaint,) = main.take_picture(tmp_path / "none.rrd", tmp_path / "none.png")
     assert complaint.startswith("no picture: there is no recording")
+
+
+def test_a_viewer_that_finds_nothing_that_draws_leaves_the_picture_out_with_its_remedy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The driver's file is there, and does not work: what the viewer says on a machine without Vulkan's own library."""
+    monkeypatch.setattr(main, "missing_driver", str)
+    panicked = (
+        "thread 'main' panicked at 'Failed to get render context'\nre_viewer/src/app/mod.rs:1425\nstack backtrace:"
+    )
+    viewer = tmp_path / "rerun"
+    viewer.write_text(f'#!/bin/sh\ncat >&2 <<"END"\n{panicked}\nEND\nexit 134\n')
+    viewer.chmod(0o755)
+    monkeypatch.setattr(screenshot, "rerun_binary", lambda: viewer)
+    recording = tmp_path / "demo.rrd"
+    recording.touch()
+    assert main.take_picture(recording, tmp_path / "none.png") == []
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line.startswith("demo: no picture of the view: no Vulkan driver draws here")
+    assert "sudo apt-get install mesa-vulkan-drivers" in line
+
+
+@pytest.mark.full
+def test_the_real_viewer_without_vulkan_draws_or_is_left_out_and_fails_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for variable in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
+        monkeypatch.setenv(variable, str(tmp_path / "none.json"))
+    recording = tmp_path / "demo.rrd"
+    stream = rerun.RecordingStream("demo")
+    stream.save(recording)
+    stream.log("point", rerun.Points3D([[0.0, 0.0, 0.0]]))
+    stream.flush()
+    assert main.take_picture(recording, tmp_path / "demo.png") == []
+    lines = capsys.readouterr().out.splitlines()
+    assert (tmp_path / "demo.png").is_file() != (len(lines) == 1)

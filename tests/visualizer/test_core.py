@@ -1,5 +1,6 @@
 """Messages become columns: in screen units, thinned while nothing moves, and none is lost when something does."""
 
+import itertools
 import math
 import warnings
 from itertools import pairwise
@@ -266,3 +267,19 @@ def test_a_stamp_of_the_far_future_does_not_take_the_view_with_it(core):
     times = [int(time) for update in updates if hasattr(update, "times") for time in update.times]
     assert START + 20_000_000 in times
     assert max(times) <= START + AHEAD + 30_000_000
+
+
+def test_a_viewer_that_comes_late_finds_the_mode_and_the_newest_line_among_the_newest_data(core):
+    """The viewer's server keeps some minutes: what was said once, before them, is gone for who comes later."""
+    second = 1_000_000_000
+    core.event_log.on_log(LogRecord(stamp=START, node="planner", text="ready"))
+    core.on_device_state(DeviceState(stamp=START, mode=DeviceMode.IDLE))
+    seen = [update for at in range(301) for update in core.step(START + at * second)]
+    modes = [update.time for update in seen if isinstance(update, StateUpdate)]
+    assert max(after - before for before, after in itertools.pairwise(modes)) <= 6 * second
+    lines = [update for update in seen if isinstance(update, LogLines)]
+    assert [each.texts for each in lines][:2] == [
+        ("11:06:40 planner: ready",), ("11:07:40 nothing new since 11:06:40: planner: ready",),
+    ]  # fmt: skip
+    assert len(lines) == 6
+    assert len([update for update in seen if isinstance(update, Tint)]) == 1  # what costs more is sent when it changes

@@ -261,6 +261,7 @@ ENGLISH: dict[str, str] = {
     "reason_drivers_off": "the drivers are off",
     "reason_unreferenced": "not referenced: {value}",
     "reason_is_homing": "it is homing",
+    "reason_nothing_planned": "nothing is planned",
     "reason_is_moving": "it is moving ({value})",
     "reason_already_armed": "they are on already",
     "reason_already_disarmed": "they are off already",

@@ -263,6 +263,7 @@ SPANISH: dict[str, str] = {
     "reason_drivers_off": "los motores están apagados",
     "reason_unreferenced": "sin referencia: {value}",
     "reason_is_homing": "está buscando el origen",
+    "reason_nothing_planned": "no hay nada planificado",
     "reason_is_moving": "se está moviendo ({value})",
     "reason_already_armed": "ya están encendidos",
     "reason_already_disarmed": "ya están apagados",

@@ -10,6 +10,7 @@ from services.visualizer.content import entities
 from services.visualizer.content.thinning import LAST_STAMP
 from services.visualizer.content.updates import LogLines, Update
 
+AGAIN = 60_000_000_000  # [ns] after which the newest line is said again: a viewer that comes late has only some minutes
 EVENT_LEVELS = {"fault": "ERROR", "estop": "ERROR", "homing_stopped": "WARNING", "inject_refused": "WARNING"}
 
 
@@ -18,6 +19,8 @@ class EventLog:
 
     def __init__(self) -> None:
         self._lines: list[tuple[int, str, str]] = []  # [ns], text, level
+        self._newest: tuple[int, str, str] | None = None
+        self._sent = 0  # [ns] when a line was sent last
 
     def add(self, stamp: int, text: str, level: str = "INFO") -> None:
         """`stamp` in ns UNIX; `level` as in `LogLevel`'s names."""
@@ -32,11 +35,22 @@ class EventLog:
         text = f"{message.device}: {message.event}" + (f" ({message.detail})" if message.detail else "")
         self.add(message.stamp, text, EVENT_LEVELS.get(message.event, "INFO"))
 
-    def take(self, latest: int = LAST_STAMP) -> list[Update]:
-        """The lines since the last call; one of after `latest` [ns] is of then."""
+    def say_again(self) -> None:
+        """The newest line is for a new viewer too."""
+        self._sent = 0
+
+    def take(self, now: int, latest: int = LAST_STAMP) -> list[Update]:
+        """The lines since the last call; one of after `latest` [ns] is of then. Where nothing is new for `AGAIN`, the
+        newest one once more."""
         lines, self._lines = self._lines, []
+        if lines:
+            self._newest = lines[-1]
+        elif self._newest is not None and now - self._sent >= AGAIN:
+            at, text, level = self._newest
+            lines = [(now, f"nothing new since {time_of_day(at)}: {text}", level)]
         if not lines:
             return []
+        self._sent = now
         stamps, said, levels = zip(*((min(stamp, latest), *line) for stamp, *line in lines), strict=True)
         texts = tuple(f"{time_of_day(stamp)} {text}" for stamp, text in zip(stamps, said, strict=True))
         return [LogLines(entities.LOG, np.array(stamps, dtype=np.int64), texts, levels)]

@@ -6,6 +6,7 @@ The program's own `--screenshot-to` shoots before a recording has been loaded; t
 from __future__ import annotations
 
 import os
+import re
 import socket
 import subprocess
 import time
@@ -22,6 +23,12 @@ from services.visualizer.program.rerun_program import environment, rerun_binary
 SETTLE = 6.0  # [s] until the viewer's own notices have gone and every chunk is drawn
 DRAWN = 1.5  # [s] until another time is drawn
 LOOPBACK = "127.0.0.1"
+# The viewer's words where it finds nothing that draws (Rerun 0.34: wgpu's, or its own without a render context).
+NOTHING_DRAWS = re.compile(r"(?i)render context|no suitable .*adapter|adapter.*not found|(?:create|request).*adapter")
+
+
+class NoGraphics(RuntimeError):
+    """Nothing draws on this machine."""
 
 
 def save_screenshot(
@@ -57,12 +64,21 @@ def _headless_viewer(rrd: Path, log: Path, size: tuple[int, int]) -> Iterator[tu
     try:
         yield viewer, port
     except Exception as error:
-        words = log.read_text(errors="replace").strip()[-600:]
-        raise RuntimeError(f"no picture of {rrd}: {error}; the viewer says: {words or 'nothing'}") from error
+        words = log.read_text(errors="replace")
+        if NOTHING_DRAWS.search(words):
+            raise NoGraphics("no Vulkan driver draws here without a display") from error
+        raise RuntimeError(f"no picture of {rrd}: {error}; the viewer says: {_main_words(words)}") from error
     finally:
         viewer.kill()
         viewer.wait()
         log.unlink(missing_ok=True)
+
+
+def _main_words(text: str) -> str:
+    """The viewer's own complaint, else its last line, without colours and the backtrace."""
+    lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", text).splitlines() if line.strip()]
+    complaints = [line for line in lines if re.search(r"panicked|ERROR|[Ee]rror:", line)]
+    return " ".join([*complaints[:2], *([] if complaints else lines[-1:])])[:600] or "nothing"
 
 
 def _connected(viewer: subprocess.Popen[bytes], port: int, deadline: float) -> ViewerClient:

@@ -41,7 +41,7 @@ class MoveTab:
             named.on_update(lambda event: self._name(event))
         ask = self._operator.motions.ask
         kit.button(words("plan"), self._operator.plan, color="blue", first=ask)
-        kit.button(words("execute"), self._operator.execute, color="green", needs="move")
+        kit.button(words("execute"), self._operator.execute, color="green", needs="execute")
         kit.button(words("plan_and_execute"), self._operator.plan_and_execute, color="green", needs="move", first=ask)
         kit.reasons(move=words("execute"))
         self.plan = kit.line()
