@@ -30,6 +30,7 @@ from services.runtime.bus.branches import principal_of
 from services.runtime.bus.connection import await_router, connect
 from services.runtime.bus.interface import Bus, Declaration
 from services.runtime.bus.name_holder import NameHolder, StopWatch
+from services.runtime.bus.wire import Encoded, encoded
 from services.runtime.certificate_watch import CertificateWatch
 from services.runtime.client_watch import Absences, ClientWatch
 from services.runtime.clock import SYSTEM, Clock
@@ -195,13 +196,22 @@ class Node:
         self.subscribe(topic, latest.on_message)
         return latest
 
-    def serve(self, request: Request[Q, R], handler: Callable[[Q], R], worker: bool = False) -> None:
+    def serve(self, request: Request[Q, R], handler: Callable[[Q], R | Encoded[R]], worker: bool = False) -> None:
         """Answers `request` with `handler(question)`; `Refused` raised there reaches the client.
 
         With `worker` the handler runs in the node's one worker thread, for answers that take longer
-        than a period of the loop; what it shares with the thread of logic is its own care.
+        than a period of the loop; what it shares with the thread of logic is its own care. A handler that changes
+        something returns its answer `encoded` before the change: else what cannot be sent is refused after it.
         """
-        self._serve(request, lambda question, pending: pending.reply(handler(question)), worker)
+
+        def answer(question: Q, pending: Pending[R]) -> None:
+            response = handler(question)
+            if isinstance(response, Encoded):
+                pending.send(response)
+            else:
+                pending.reply(response)
+
+        self._serve(request, answer, worker)
 
     def serve_later(self, request: Request[Q, R], handler: Callable[[Q, Pending[R]], None]) -> RequestServer[Q, R]:
         """As `serve`; the handler keeps the `Pending` and answers when it can, from any thread."""
@@ -469,9 +479,14 @@ class Node:
             self.log.warning("%s", text)
 
     def _set_parameter(self, wanted: SetParameter) -> Parameter:
-        parameter = self._parameters.set(wanted)
-        change = ParameterChange(stamp=self.now(), node=self.name, parameter=parameter)
-        self.publisher(PARAMETER_CHANGES).put(change)
+        publisher, changes = self.publisher(PARAMETER_CHANGES), list[Encoded[ParameterChange]]()
+
+        def encode_change(parameter: Parameter) -> None:
+            encoded(parameter)  # the answer
+            changes.append(publisher.encoded(ParameterChange(stamp=self.now(), node=self.name, parameter=parameter)))
+
+        parameter = self._parameters.set(wanted, encode_change)
+        publisher.put(changes[-1])
         return parameter
 
     def holds_name(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import logging
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Generic, TypeVar, cast
 
 import msgspec
@@ -161,19 +161,24 @@ class ParameterRegistry:
         """All with their present values."""
         return Parameters(parameters=tuple(each for declared in self._sets for each in declared.listed()))
 
-    def set(self, wanted: SetParameter) -> Parameter:
-        """Raises `RequestRefused` with the nearest name, the type or the range."""
+    def set(self, wanted: SetParameter, check: Callable[[Parameter], object] = lambda parameter: None) -> Parameter:
+        """Raises `RequestRefused` with the nearest name, the type or the range.
+
+        `check` is given the parameter as it would be; where it raises, nothing has changed.
+        """
         for declared in self._sets:
             if wanted.name in declared.names:
                 before = declared.value
                 parameter = declared.set(wanted.name, wanted.value)
                 if wanted.save:
-                    try:
-                        self._saved.keep(self._saved.read() | {parameter.name: parameter.value})
-                    except RequestRefused:
-                        declared.value = before  # what was asked for was both
-                        raise
                     parameter = msgspec.structs.replace(parameter, saved_in=str(self._saved.path))
+                try:
+                    check(parameter)
+                    if wanted.save:
+                        self._saved.keep(self._saved.read() | {parameter.name: parameter.value})
+                except BaseException:
+                    declared.value = before  # what was asked for was all of it
+                    raise
                 kept = f", saved in {parameter.saved_in}" if parameter.saved_in else ""
                 self._log.info("parameter %s = %r%s", parameter.name, parameter.value, kept)
                 return parameter

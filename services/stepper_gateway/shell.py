@@ -197,7 +197,11 @@ class Shell:
     def _on_goal(self, goal_id: str, goal: FollowJointTrajectoryGoal) -> GoalDecision:
         if self._is_silent():
             return refuse(FollowErrorCode.DEVICE_FAILED, WAS_STOPPED)
-        return _decision(self._give(GoalInput(goal_id, goal, self._server.session_of(goal_id))))
+        try:
+            return _decision(self._give(GoalInput(goal_id, goal, self._server.session_of(goal_id))))
+        except Exception:
+            self._give(CancelInput(goal_id))  # it is refused, so the arm must not follow it
+            raise
 
     def _on_cancel(self, goal_id: str) -> str:
         return str(self._give(CancelInput(goal_id)))
@@ -205,7 +209,11 @@ class Shell:
     def _on_grip(self, goal_id: str, goal: GripperCommandGoal) -> GoalDecision:
         if self._is_silent():
             return refuse(FollowErrorCode.DEVICE_FAILED, WAS_STOPPED)
-        return _decision(self._give(GripInput(goal_id, goal, self._gripper.session_of(goal_id))))
+        try:
+            return _decision(self._give(GripInput(goal_id, goal, self._gripper.session_of(goal_id))))
+        except Exception:
+            self._give(GripCancelInput(goal_id))
+            raise
 
     def _on_grip_cancel(self, goal_id: str) -> str:
         return str(self._give(GripCancelInput(goal_id)))
@@ -262,31 +270,41 @@ class Shell:
         return ticket
 
     def _carry_out(self, outputs: list[Output]) -> None:
+        """All of them, in order, whatever becomes of one: the core counts each as done. The first error is raised."""
+        failures = []
         for output in outputs:
-            match output:
-                case SendFrame(kind, payload, urgent):
-                    if self._link is not None and (urgent or not self._silent):
-                        self._link.send(kind, payload, urgent)
-                case Publish(topic, message):
-                    self._node.publisher(topic).put(message)
-                case GoalExecuting(goal_id):
-                    self._server.executing(goal_id)
-                case GoalProgress(goal_id, feedback):
-                    self._server.feedback(goal_id, feedback)
-                case GoalFinished(goal_id, status, result):
-                    self._server.finish(goal_id, status, result)
-                case GripperExecuting(goal_id):
-                    self._gripper.executing(goal_id)
-                case GripperProgress(goal_id, told):
-                    self._gripper.feedback(goal_id, told)
-                case GripperFinished(goal_id, status, gripped):
-                    self._gripper.finish(goal_id, status, gripped)
-                case Answer(ticket, response):
-                    self._callers.pop(ticket).reply(response)
-                case KeepLedger(record):
-                    self._ledger.keep(record)
-                case LogLine(level, text):
-                    self._node.log.log(level, "%s", text)
+            try:
+                self._carry_out_one(output)
+            except Exception as error:
+                failures.append(error)
+        if failures:
+            raise failures[0]
+
+    def _carry_out_one(self, output: Output) -> None:
+        match output:
+            case SendFrame(kind, payload, urgent):
+                if self._link is not None and (urgent or not self._silent):
+                    self._link.send(kind, payload, urgent)
+            case Publish(topic, message):
+                self._node.publisher(topic).put(message)
+            case GoalExecuting(goal_id):
+                self._server.executing(goal_id)
+            case GoalProgress(goal_id, feedback):
+                self._server.feedback(goal_id, feedback)
+            case GoalFinished(goal_id, status, result):
+                self._server.finish(goal_id, status, result)
+            case GripperExecuting(goal_id):
+                self._gripper.executing(goal_id)
+            case GripperProgress(goal_id, told):
+                self._gripper.feedback(goal_id, told)
+            case GripperFinished(goal_id, status, gripped):
+                self._gripper.finish(goal_id, status, gripped)
+            case Answer(ticket, response):
+                self._callers.pop(ticket).reply(response)
+            case KeepLedger(record):
+                self._ledger.keep(record)
+            case LogLine(level, text):
+                self._node.log.log(level, "%s", text)
 
 
 def _decision(reply: Reply) -> GoalDecision:

@@ -141,7 +141,7 @@ class SceneKeeper:
         if has_opened:
             self._publish(showing.message)
 
-    def _edit(self, request: SceneRequest) -> SceneResponse:
+    def _edit(self, request: SceneRequest) -> Encoded[SceneResponse]:
         before, apart, stamp = self._store.scene, self._apart, self._node.now()
         present, age = self._states.message, self._states.age()
         links = lambda: link_poses(self._kinematics, standing(self._arm, present, age))  # noqa: E731
@@ -150,16 +150,18 @@ class SceneKeeper:
             response, showing = changed(self._store, request, links, stamp, self._prepared_edit)
             if showing is None and self._apart != apart:
                 showing = self._prepared_edit(self._store.scene)
+            answer = encoded(response)
         except BaseException:
             self._store.scene, self._apart = before, apart
             raise
         self._log.tell(SCENE_EDIT, stamp, present, age, version_of(self._with_jaws(before)))
         if showing is None:
-            return response
+            return answer
         self._show(showing)
         if showing.contacts is not None:
             self._tell_what_touches_here(showing.contacts)
-        return msgspec.structs.replace(response, reason=self._save(self._store.scene))
+        unsaved = self._save(self._store.scene)
+        return encoded(msgspec.structs.replace(response, reason=unsaved)) if unsaved else answer
 
     def _take_opening(self, request: SceneRequest) -> None:
         """Who grips says how far the jaws are apart: what is planned next must not wait for their next state."""

@@ -99,13 +99,19 @@ class ActionServer(Generic[G, F, R]):
 
     def executing(self, goal_id: str) -> None:
         """The goal is being carried out."""
-        self._set(self._goals[goal_id], GoalStatusCode.EXECUTING)
+        if (goal := self._goals.get(goal_id)) is not None:
+            self._set(goal, GoalStatusCode.EXECUTING)
 
     def finish(self, goal_id: str, status: GoalStatusCode, result: R) -> None:
-        """The goal has ended; its result is kept for two minutes. Ending it twice is an error."""
+        """The goal has ended; its result is kept for two minutes. Ending it twice is an error.
+
+        One that was refused because its decision failed, though the core had begun it, ends unseen.
+        """
         if not status.is_terminal:
             raise ValueError(f"a goal cannot end as {status.name}")
-        goal = self._goals[goal_id]
+        goal = self._goals.get(goal_id)
+        if goal is None:
+            return
         if goal.status.is_terminal:
             raise ValueError(f"goal {goal_id} has ended already, as {goal.status.name}")
         raw = msgspec.Raw(encode(result))

@@ -6,7 +6,7 @@ import math
 import threading
 import traceback
 from collections.abc import Callable, Mapping
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import msgspec
 
@@ -85,6 +85,9 @@ class Pending(Protocol[R_contra]):
     def reply(self, response: R_contra) -> None:
         """Only the first answer counts; from any thread. One that is too large to be sent becomes a refusal."""
 
+    def send(self, response: Encoded[Any]) -> None:
+        """As `reply`, with what is encoded already."""
+
     def refuse(self, kind: str, message: str) -> None:
         """As `reply`, with why not."""
 
@@ -145,13 +148,16 @@ class PendingGroup(Generic[R]):
 
     def reply(self, response: R) -> None:
         try:
-            answer = encoded(response)
+            self.send(encoded(response))
         except TooLarge as error:
-            return self.refuse(TOO_LARGE, str(error))
+            self.refuse(TOO_LARGE, str(error))
+
+    def send(self, response: Encoded[R]) -> None:
+        """As `reply`, with what is encoded already."""
         for query in self._take():
-            query.send(answer)
+            query.send(response)
         if report := self._take_report():
-            report.answered(self._clients(), answer.payload)
+            report.answered(self._clients(), response.payload)
 
     def refuse(self, kind: str, message: str) -> None:
         for query in self._take():
