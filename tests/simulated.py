@@ -39,16 +39,23 @@ def found_by_connect(arm: SimulatedArm) -> Iterator[None]:
 
 
 def make_ready(arm: gemelo.Arm) -> None:
-    """Does what a person would do after whatever a test has left."""
+    """Does what a person would do after whatever a test has left, once the arm rests."""
     assert arm.wait_for(lambda: arm.device.mode is not gemelo.DeviceMode.RUN and not is_moving(arm), 20.0)
+    put_right(arm)
+
+
+def put_right(arm: gemelo.Arm) -> None:
+    """Armed, referenced, at full speed, with an empty scene; what is so already is left alone."""
     if arm.device.mode is gemelo.DeviceMode.HOLD:
         arm.stop()
     if not arm.device.state.armed:
         arm.device.arm()
     if not all(arm.device.state.referenced):
         arm.reference(where_it_stands(arm))
-    arm.speed(1.0)
-    arm.scene.clear()
+    if arm.device.state.speed != 1.0:
+        arm.speed(1.0)
+    if arm.scene.present.objects or arm.scene.present.allowed:
+        arm.scene.clear()
 
 
 def where_it_stands(arm: gemelo.Arm) -> dict[str, float]:

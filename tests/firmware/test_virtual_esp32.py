@@ -25,9 +25,9 @@ def test_the_device_answers_moves_and_leaves_in_order(bed: Bed):
     t0, t1, t2 = struct.unpack("<QQQ", bed.answer("sync/r")[8:-4])
     assert t0 == 987654321
     assert 0 < t1 <= t2
-    bed.beat()
-    assert bed.move(200, 0.5)[20] == 0
-    assert bed.event("finished")["stream"] == 1
+    with bed.beating():
+        assert bed.move(200, 0.5)[20] == 0
+        assert bed.event("finished")["stream"] == 1
     assert bed.end_device(signal.SIGTERM) == 0
     wait_for(lambda: bed.status["online"] is False, "the offline status")
     here = [200, 0, 0]

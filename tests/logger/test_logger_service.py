@@ -102,6 +102,9 @@ def running(deployment, network, **parameters):
             assert not thread.is_alive()
 
 
+HANGS = 60.0  # [s] in which processes start, write and end, unless they hang
+
+
 def wait_for(is_done, timeout=10.0):
     deadline = time.monotonic() + timeout
     while not is_done():
@@ -374,15 +377,18 @@ def recorded_events(records):
             yield msgspec.json.decode(record.data)["event"]
 
 
-def test_sigterm_ends_it_with_a_finished_file(environment, tmp_path):
+def test_sigterm_ends_it_with_a_finished_file(environment, deployment, tmp_path):
     with process("services.runtime.router", environment), process("services.logger.main", environment) as logger:
-        wait_for(lambda: (tmp_path / "run" / "logger.ready").exists())
-        time.sleep(0.6)
+        wait_for(lambda: (tmp_path / "run" / "logger.ready").exists(), HANGS)
+        with Node("gateway", deployment) as gateway:
+            for index in range(300):
+                gateway.publisher(DEVICE_EVENTS).put(DeviceEvent(event=str(index)))
+            wait_for(lambda: sum(path.stat().st_size for path in recordings(tmp_path, ".mcap")) > 3000, HANGS)
         logger.terminate()
-        assert logger.wait(3.0) == 0
+        assert logger.wait(HANGS) == 0
     (path,) = recordings(tmp_path, ".mcap")
     with path.open("rb") as file:
-        assert make_reader(file).get_summary().statistics.message_count > 0
+        assert make_reader(file).get_summary().statistics.message_count >= 300
     assert not (tmp_path / "run" / "logger.ready").exists()
 
 

@@ -15,7 +15,7 @@ import gemelo
 from schemas import system
 from services.runtime.endpoints import parameter_request, parameters_request
 from services.stack.stack import Stack
-from tests.simulated import where_it_stands
+from tests.simulated import put_right
 
 READY = 60.0  # [s] in which a process that a test has killed is there again
 LETS_GO = 6.0  # [s] in which control, motions and processes of a client that has just ended are over
@@ -127,30 +127,22 @@ class Reset:
             if value != usual:
                 yield f"{node}'s parameter {name} is {value}, it was {usual}"
                 setting = parameter_request(node)
-                self._arm.node.call(setting, system.SetParameter(name=name, value=usual), 5.0)
+                self._arm.node.call(setting, system.SetParameter(name=name, value=usual), READY)
 
     def _read_parameters(self) -> Values:
         found: Values = {}
         for node in self._stack.processes:
             if node in self._arm.node.alive():
-                answer = self._arm.node.call(parameters_request(node), system.Empty(), 5.0)
+                asked = parameters_request(node)  # which a node that has just come serves a moment after it is seen
+                assert self._becomes(lambda asked=asked: self._arm.node.is_served(asked), READY), f"{asked.key}: nobody"
+                answer = self._arm.node.call(asked, system.Empty(), READY)
                 found |= {(node, each.name): each.value for each in answer.parameters}
         return found
 
     def _put_right(self) -> None:
         """Without a word: armed, referenced, at full speed, with an empty scene."""
-        arm = self._arm
         self._stack.wait_ready(READY)
-        if arm.device.mode is gemelo.DeviceMode.HOLD:
-            arm.stop()
-        if not arm.device.state.armed:
-            arm.device.arm()
-        if not all(arm.device.state.referenced):
-            arm.reference(where_it_stands(arm))
-        if arm.device.state.speed != 1.0:
-            arm.speed(1.0)
-        if arm.scene.present.objects or arm.scene.present.allowed:
-            arm.scene.clear()
+        put_right(self._arm)
 
     def _stand(self, where: dict[str, float]) -> None:
         arm = self._arm

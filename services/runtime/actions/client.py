@@ -108,15 +108,19 @@ class ActionClient(Generic[G, F, R]):
     def _ask(self, request: Request[Q, A], question: Q, end: float, number: int = 0, attempt: float = ATTEMPT) -> A:
         """Asks until it is answered, `attempt` [s] each time; raises `NoAnswer` after `end` [s] monotonic.
 
-        `number` as that of `Bus.ask`.
+        That is of the try that had most time: the last one may end before anything can come back. `number` as that of
+        `Bus.ask`.
         """
+        most, why = 0.0, NoAnswer("")
         while True:
             left = max(0.05, min(attempt, end - self._bus.clock.monotonic()))
             try:
                 return requests.call(self._bus, request, question, left, number)
-            except NoAnswer:
+            except NoAnswer as error:
+                if left >= most:
+                    most, why = left, error
                 if self._bus.clock.monotonic() >= end - PAUSE:
-                    raise
+                    raise why from None
                 self._bus.clock.sleep(PAUSE)  # the answer that none will come is there at once
 
     def _on_feedback(self, message: GoalFeedback) -> None:
