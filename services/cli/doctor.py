@@ -244,6 +244,7 @@ def twin(session: CommandSession) -> Iterator[Diagnosis]:
     node.wait(LISTENING)
     nodes, up = living(session), when_silent(session.deployment.router.host)
     yield Diagnosis(Verdict.OK if nodes else Verdict.ERROR, "nodes", ", ".join(nodes) or "none", "" if nodes else up)
+    yield from twins(node.twins())
     yield device(statuses[-1] if statuses else None, states[-1] if states else None, up, node.now())
     yield from warning(statuses[-1] if statuses else None)
     told = _told(session, nodes)
@@ -251,6 +252,15 @@ def twin(session: CommandSession) -> Iterator[Diagnosis]:
     yield from unwritten(info for info, _ in told.values())
     yield from descriptors(info for info, _ in told.values() if info.host == session.node.info().host)
     yield clocks({name: clock for name, (_, clock) in told.items() if clock is not None})
+
+
+def twins(borne: Mapping[str, tuple[str, ...]]) -> Iterator[Diagnosis]:
+    """Several nodes of one name: the older gives way by itself, unless it stands still."""
+    for name, processes in borne.items():
+        remedy = f"the older ends by itself within 2 s; if it does not, end {processes[0]}"
+        yield Diagnosis(
+            Verdict.ERROR, f"two {name}", f"{name} lives {len(processes)} times: {', '.join(processes)}", remedy
+        )
 
 
 def _told(session: CommandSession, nodes: Iterable[str]) -> dict[str, tuple[NodeInfo, ClockOffset | None]]:

@@ -358,6 +358,10 @@ class Node:
         """The addresses of all living nodes of the robot, this one too: names, behind a person's certificate's."""
         return identity.alive(self._bus, self._warn_of_token)
 
+    def twins(self) -> dict[str, tuple[str, ...]]:
+        """The processes of each address that several living nodes bear, the oldest first; empty where all is well."""
+        return identity.twins(self._bus)
+
     def now(self) -> int:
         """[ns] UNIX time: for stamps."""
         return self.clock.unix()

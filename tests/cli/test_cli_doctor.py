@@ -20,6 +20,7 @@ from services.cli import doctor
 from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.mqtt import secure_folder
+from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.clock_offset import ClockOffset
 from services.runtime.deployment import when_silent
 from tests.disks import WAYS, refusing_disk
@@ -40,6 +41,19 @@ def test_the_doctor_finds_a_twin_that_is_well(session, stack):
     assert found["device"].found == "rm1 is online, round trip 2.0 ms"
     assert found["clocks"].verdict is doctor.Verdict.OK
     assert found["versions of the nodes"].verdict is doctor.Verdict.OK
+
+
+def test_the_doctor_names_two_nodes_of_one_name(session, stack, network):
+    bus = MemoryBus(network)
+    for started in ("00000000000000000001.11.cellar", "00000000000000000002.22.attic"):
+        bus.declare_alive(f"@id/planner/planner/{started}")
+    bus.declare_alive("@id/*/*/*")
+    found = {each.subject: each for each in doctor.twin(session)}
+    bus.close()
+    assert found["two planner"].verdict is doctor.Verdict.ERROR
+    assert found["two planner"].found == "planner lives 2 times: process 11 on cellar, process 22 on attic"
+    assert found["two planner"].remedy.endswith("end process 11 on cellar")
+    assert not [each for each in doctor.twin(session) if each.subject.startswith("two ")]
 
 
 def test_the_doctor_without_a_twin_says_what_would_do(monkeypatch, capsys):

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import socket
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -21,8 +25,21 @@ def test_a_taken_port_is_named_with_its_holder_and_the_key_to_change() -> None:
         with pytest.raises(PortTaken) as taken:
             require_free("127.0.0.1", port, "viewer", "web_port")
     assert f"port {port} on 127.0.0.1 is taken by " in str(taken.value)
-    assert f"(pid {os.getpid()})" in str(taken.value)
+    assert f"(pid {os.getpid()}), which runs in {Path.cwd()}: stop that" in str(taken.value)
     assert "GEMELO_VIEWER_WEB_PORT or [viewer] web_port" in str(taken.value)
+
+
+def test_a_port_of_a_twin_that_was_forgotten_in_another_folder_is_named_with_that_folder(tmp_path: Path) -> None:
+    listening = (
+        "import socket; s = socket.create_server(('127.0.0.1', 0)); print(s.getsockname()[1], flush=True); input()"
+    )
+    command = [sys.executable, "-c", listening]
+    with subprocess.Popen(command, cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None
+        port = int(other.stdout.readline())
+        with pytest.raises(PortTaken, match=re.escape(f"(pid {other.pid}), which runs in {tmp_path} (a twin of that")):
+            require_free("127.0.0.1", port, "router")
+        other.kill()
 
 
 @pytest.mark.parametrize(("host", "port"), [("192.0.2.1", 1883), ("127.0.0.1", 70000)])

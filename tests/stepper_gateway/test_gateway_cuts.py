@@ -87,7 +87,7 @@ def assert_at(rig: VirtualArm, target: tuple[float, ...]) -> None:
 
 
 @given(CUTS)
-@examples(quick=7, full=15)
+@examples(quick=7, full=100)
 def test_every_goal_ends_in_time_and_a_success_is_true(cut: Cut) -> None:
     lost = Lost(cut)
     trajectory = move(HOME, READY)
@@ -103,7 +103,7 @@ def test_every_goal_ends_in_time_and_a_success_is_true(cut: Cut) -> None:
 
 
 @given(CUTS, st.floats(0.0, 3.0))
-@examples(quick=5, full=10)
+@examples(quick=5, full=60)
 def test_every_cancelled_goal_ends_in_time_and_the_arm_does_not_go_on_by_itself(cut: Cut, when: float) -> None:
     lost = Lost(cut)
     rig = lost.rig
@@ -119,7 +119,7 @@ def test_every_cancelled_goal_ends_in_time_and_the_arm_does_not_go_on_by_itself(
 
 
 @given(CUTS, st.sampled_from((JAWS, 0.0, 0.02)))
-@examples(quick=5, full=10)
+@examples(quick=5, full=60)
 def test_every_goal_of_the_gripper_ends_in_time(cut: Cut, position: float) -> None:
     lost = Lost(cut)
     if lost.rig.grip(position).accepted:
@@ -133,7 +133,7 @@ COMMANDS = tuple(
 
 
 @given(CUTS, st.floats(0.0, 3.2), st.lists(st.sampled_from(COMMANDS), min_size=1, max_size=3))
-@examples(quick=7, full=15)
+@examples(quick=7, full=100)
 def test_every_command_is_answered_in_time_and_what_was_accepted_was_done(
     cut: Cut, when: float, wanted: list[DeviceCommandKind]
 ) -> None:
@@ -151,7 +151,7 @@ def test_every_command_is_answered_in_time_and_what_was_accepted_was_done(
 
 
 @given(CUTS, st.floats(0.0, 3.2))
-@examples(quick=4, full=8)
+@examples(quick=4, full=60)
 def test_a_configuration_and_an_injection_are_answered_in_time(cut: Cut, when: float) -> None:
     lost = Lost(cut)
     rig = lost.rig

@@ -14,6 +14,7 @@ from services.cli.device_snapshot import device_snapshot
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.virtual_arm import VirtualArm, rm1
 from services.visualizer.content.panel import PanelInputs, panel
+from tests.stepper_gateway.test_gateway_twins import Twins
 from tests.stepper_gateway.test_gateway_two_devices import TwoDevices
 
 CUT = {"hb", "sync", "cmd", "traj"}
@@ -75,6 +76,17 @@ def test_two_devices_of_one_name_are_named_in_every_view() -> None:
         for said in ('two devices call themselves "rm1"', "boot 0000004d (virtual", "boot 05b8fac7", "nothing moves"):
             assert said in text, view
     assert shown(arm)["doctor"].startswith("error ")
+
+
+def test_two_gateways_on_one_device_are_said_in_every_view() -> None:
+    arm = Twins()
+    arm.ready()
+    arm.join()
+    assert arm.run(2.0, lambda: "another gateway" in newest(arm, DEVICE_STATUS).reason)
+    for view, text in shown(arm).items():
+        assert "is asked by another gateway too: nothing moves until there is one" in text, view
+        assert "a forgotten `make up`" in text, view
+        assert "NOT USABLE" in text.upper(), view
 
 
 @pytest.mark.parametrize("cause", ["two planners live, process 1 on a and process 2 on b", "an old sketch"])

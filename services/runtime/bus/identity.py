@@ -90,6 +90,18 @@ def addresses(keys: Iterable[str], warn: Warn = lambda text: None) -> Iterator[s
             yield address
 
 
+def twins(bus: Bus) -> dict[str, tuple[str, ...]]:
+    """The processes of each address that several living nodes bear, as `process 12 on host`, the oldest first."""
+    borne: dict[str, list[str]] = {}
+    for key in sorted(bus.alive(f"{IDENTITY}/*/*/*")):
+        found = TOKEN.fullmatch(key)
+        address = address_of(found[1], found[2]) if found else None
+        if address is not None:
+            pid, host = instance_of(key)
+            borne.setdefault(address, []).append(f"process {pid} on {host}")
+    return {address: tuple(processes) for address, processes in borne.items() if len(processes) > 1}
+
+
 def is_token(key: str) -> bool:
     """True if `key` is what a node declares of itself; others may stand for many."""
     return TOKEN.fullmatch(key) is not None

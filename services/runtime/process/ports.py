@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import socket
+from pathlib import Path
 
 
 class PortTaken(Exception):
@@ -27,13 +28,19 @@ def require_free(host: str, port: int, section: str, key: str = "port") -> None:
 
 
 def _holder(port: int) -> str:
-    """`" by mosquitto (pid 7)"`, or nothing where the system does not tell."""
+    """`" by mosquitto (pid 7), which runs in /home/ana/arm"`, or nothing where the system does not tell.
+
+    A twin that was started in another folder and forgotten ends with `make down` there.
+    """
     import psutil  # 20 ms that only a taken port is worth
 
     try:
         for connection in psutil.net_connections("tcp"):
             if connection.status == psutil.CONN_LISTEN and connection.laddr.port == port and connection.pid:
-                return f" by {psutil.Process(connection.pid).name()} (pid {connection.pid})"
+                holder = psutil.Process(connection.pid)
+                where = holder.cwd()
+                forgotten = " (a twin of that folder ends with `make down` there)" if Path(where) != Path.cwd() else ""
+                return f" by {holder.name()} (pid {connection.pid}), which runs in {where}{forgotten}"
     except psutil.Error:
         pass
     return ""
