@@ -14,7 +14,7 @@ def is_old(age: float) -> bool:
 
 
 def round_trip_text(round_trip: float, age: float) -> str:
-    """`round trip 2.3 ms`, and `measured 40 s ago` where it is old; both in [s]."""
+    """`round trip 2.3 ms`, and `measured 40 s ago` where it is old: `round_trip` [s], measured `age` [s] ago."""
     trip = f"round trip {1e3 * round_trip:.1f} ms"
     return f"{trip}, measured {age:.0f} s ago" if is_old(age) else trip
 

@@ -1,4 +1,4 @@
-"""What each view shows of a device that speaks and does not hear, of two of one name, and of an old figure."""
+"""Views of a device that speaks and does not hear, of two of one name, and of a figure that is old."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What else writes under the device's name: a second device, or a program that is none.
+"""Other writers under the device's name: a second device, or a program that is none.
 
 A second device sends states of another boot beside those of the present one, and goes on. A device that restarts has
 another boot too, but then the old one's states end within a network's delay. One frame, or old ones that come again in

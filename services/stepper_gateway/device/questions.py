@@ -62,7 +62,7 @@ class Questions:
         return self._unanswered > 0 and now - self._unanswered_since > LATE_ANSWER
 
     def is_deaf(self, now: float) -> bool:
-        """True if nothing that is asked has been answered for DEAF_AFTER: what is sent does not arrive."""
+        """True if at `now` [s] monotonic nothing that is asked has been answered for DEAF_AFTER: nothing arrives."""
         return self._unanswered >= LEAST_UNANSWERED and now - self._unanswered_since > DEAF_AFTER
 
     def deaf_since(self, moment: Moment) -> int:
@@ -74,7 +74,7 @@ class Questions:
         return self._deaf_since
 
     def has_twin(self, now: float) -> bool:
-        """True if the device answers another gateway: what each sends would move the arm of the other."""
+        """True if at `now` [s] monotonic the device answers another gateway: what each sends would move the arm."""
         return now - self._twin_seen <= TWIN_SEEN
 
     def _on_strange_answer(self, reply: SyncReply, arrival: float) -> None:

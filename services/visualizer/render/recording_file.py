@@ -33,7 +33,7 @@ class RecordingFile:
         self.problem = ""  # why nothing is written now
 
     def step(self, monotonic: float) -> bool:
-        """Looks after the file; True where it was opened just now, and is to get everything from the start."""
+        """Looks after the file at `monotonic` [s]; True where it was opened just now, and gets all from the start."""
         if monotonic < self._next:
             return False
         if self.sink is None:
