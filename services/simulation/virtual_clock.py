@@ -17,14 +17,14 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from types import FrameType
 from typing import TypeVar
 
 from services.runtime.clock import DrivenLoop
 from services.simulation.baton import Baton, VirtualCondition
-from services.simulation.idleness import IdleTime
+from services.simulation.participants import IdleTime, Participant, Wait
 
 T = TypeVar("T")
 
@@ -53,23 +53,6 @@ class LoopTurns:
     loop: DrivenLoop
     at: int | None = None
     is_busy: bool = False  # in a turn
-
-
-@dataclass(eq=False)
-class Wait:
-    """What one thread waits for, and until when [ns]."""
-
-    is_so: Callable[[], bool]
-    end: float
-
-
-@dataclass(eq=False)
-class Participant:
-    """A thread that has waited before."""
-
-    thread: threading.Thread
-    waits: list[Wait] = field(default_factory=list)  # one within the other, where a handler waits too
-    idle: IdleTime | None = None  # since somebody waits for it; None where it waits itself
 
 
 class VirtualClock:

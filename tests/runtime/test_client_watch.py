@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from services.runtime.client_watch import FIRST_SIGHT, LINGER, MAX_IDLE, RETURN, SETTLE, ClientWatch
+from services.runtime.client_watch import FIRST_SIGHT, LINGER, MAX_IDLE, RETURN, SETTLE, Absence, ClientWatch
 
 
 class Tokens:
@@ -66,6 +66,23 @@ def test_nothing_is_concluded_while_the_router_is_away_nor_right_after_it() -> N
     assert clients.take_lost(131.0) == []
     assert clients.take_lost(131.0 + 0.9 * RETURN) == []
     assert clients.take_lost(131.0 + 1.1 * RETURN) == [("goal", "@id/a")]
+
+
+def test_what_was_missing_when_the_router_came_back_counts_from_a_while_after_that() -> None:
+    tokens = Tokens()
+    absence = Absence(tokens.watch, lambda: tokens.is_connected, "@id/a", 100.0)
+    tokens.watchers["@id/a"](True)
+    assert absence.seconds(110.0) == 0.0
+    tokens.watchers["@id/a"](False)
+    assert absence.seconds(112.0) == 2.0
+    tokens.is_connected = False
+    assert absence.seconds(120.0) == 0.0
+    tokens.is_connected = True
+    assert absence.seconds(121.0) == 0.0
+    assert absence.seconds(121.0 + RETURN) == 0.0
+    assert absence.seconds(121.0 + RETURN + 3.0) == 3.0
+    absence.close()
+    assert tokens.closed == 1
 
 
 def test_a_goal_that_has_ended_is_forgotten_and_its_client_after_a_while() -> None:

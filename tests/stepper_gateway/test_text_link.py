@@ -210,6 +210,14 @@ def test_any_bytes_are_answers_or_counted_and_take_no_memory(pieces: list[bytes]
     assert reader.feed(b"<ACK,9,1>\n") == [LineAnswer(9, 1)], "what came before does not spoil what follows"
 
 
+def test_what_comes_between_the_answers_is_counted_and_they_are_not() -> None:
+    reader = AnswerReader()
+    assert reader.feed(b"<ACK,7,12>\n<ACK,8,13>\n") == [LineAnswer(7, 12), LineAnswer(8, 13)]
+    assert reader.bad == 0
+    reader.feed(b"<AC,9,14>\n<ACK,9,14>\n")
+    assert reader.bad == 1
+
+
 @pytest.mark.parametrize(
     "frame", [b"<ACK,1>", b"<ACK,,5>", b"<ACK,4294967296,5>", b"<ACK,1,-5>", b"<ack,1,5>", b"<ACK,1,5,6>", b"<>"]
 )

@@ -1,9 +1,14 @@
-"""How long a thread has slept by itself: who computes, or is ready to where the machine has no time for it, is busy."""
+"""The threads that take part in virtual time: what each waits for, and how long one at work has slept by itself.
+
+Who computes, or is ready to where the machine has no time for it, does not sleep.
+"""
 
 from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 SLEEPING = ("S", "Z", "X", "T")  # standard: of proc(5); a thread that waits for a disk is in D
@@ -33,3 +38,20 @@ class IdleTime:
         if self._began is None:
             self._began = now, busy
         return now - self._began[0] - (busy - self._began[1])
+
+
+@dataclass(eq=False)
+class Wait:
+    """What one thread waits for, and until when [ns]."""
+
+    is_so: Callable[[], bool]
+    end: float
+
+
+@dataclass(eq=False)
+class Participant:
+    """A thread that has waited before."""
+
+    thread: threading.Thread
+    waits: list[Wait] = field(default_factory=list)  # one within the other, where a handler waits too
+    idle: IdleTime | None = None  # since somebody waits for it; None where it waits itself
