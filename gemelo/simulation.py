@@ -392,7 +392,7 @@ def _start(arm: ArmDescription, start: str | Joints | None) -> tuple[Mapping[str
         values = named_joints(arm, start, "start")
     for name, value in values.items():
         joint = arm.joint(name)
-        if not joint.is_within(value):
+        if not joint.is_within(joint.rounded(value)):
             raise BadArgument(
                 f'start: joint "{name}": {value:g} {joint.unit} is beyond its limits, {joint.lower:.4g} to '
                 f"{joint.upper:.4g}; nearest that can: {joint.clamp(value):.4g}"

@@ -122,7 +122,7 @@ class _Search:
             return
         for name, value in joints.items():
             joint = self._robot.joint(name)
-            if not joint.is_within(value):
+            if not joint.is_within(joint.rounded(value)):
                 limits = f"{joint.lower:.4g} to {joint.upper:.4g} {joint.unit}"
                 yield "joints", f'joint "{name}" = {value:g} {joint.unit} is beyond its limits, {limits}'
 

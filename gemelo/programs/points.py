@@ -145,7 +145,7 @@ def _whole(robot: ArmDescription, name: str, joints: Joints) -> dict[str, float]
     if missing:
         raise BadArgument(f'point "{name}" has no value for joint {", ".join(missing)}: a point has all joints')
     for joint in robot.joints:
-        if not joint.is_within(values[joint.name]):
+        if not joint.is_within(joint.rounded(values[joint.name])):
             raise BadArgument(
                 f'point "{name}": joint "{joint.name}" = {values[joint.name]:g} {joint.unit} is beyond its limits, '
                 f"{joint.lower:.4g} to {joint.upper:.4g} {joint.unit}"

@@ -170,3 +170,13 @@ def test_a_line_that_comes_too_near_says_the_clearance_that_would_do(rm1: ArmDes
 )
 def test_the_clearance_that_would_do_is_kept_by_the_two_and_may_be_asked_for(distance: float, usable: float | None):
     assert usable_clearance(distance, 0.004) == usable
+
+
+def test_validity_takes_a_limit_that_only_rounding_misses_and_nothing_farther_beyond_it(rm1: ArmDescription):
+    kinematic, free = KinematicRequests(rm1), World(rm1, Planner(rm1).kinematics, PlanningScene())
+    home = JointState(name=rm1.joint_names, position=(0.0, 0.0, 0.0))
+    codes = [
+        kinematic.validity(ValidityRequest(name=("brazo_joint",), position=(2.95 + beyond,)), home, 0.0, free).code
+        for beyond in (9e-5, 2e-4)
+    ]
+    assert codes == [PlanCode.SUCCESS, PlanCode.INVALID_GOAL_CONSTRAINTS]

@@ -77,12 +77,26 @@ def test_an_unknown_frame_has_a_nearest_name(planner: Planner, home: JointState)
     assert refusal.remedy == 'use "base_link"'
 
 
-@pytest.mark.parametrize("beyond", [1e-6, 0.001, 3.0])
+@pytest.mark.parametrize("beyond", [2e-4, 0.001, 3.0])
 def test_a_goal_just_beyond_a_limit_says_by_how_much(planner: Planner, home: JointState, beyond: float):
     goal = JointGoal(name=("brazo_joint",), position=(2.95 + beyond,))
     refusal = refused(planner.plan(PlanRequest(goal=goal), home), PlanCode.INVALID_GOAL_CONSTRAINTS)
     assert f"rad is {beyond:.4g} rad above its upper limit of 2.95 rad" in refusal.message
     assert refusal.nearest == (2.95,)
+
+
+@pytest.mark.parametrize("beyond", [1e-9, 2.7e-6, 9.9e-5])
+def test_a_limit_that_only_rounding_misses_is_the_limit(planner: Planner, home: JointState, beyond: float):
+    for value, limit in ((2.95 + beyond, 2.95), (-2.95 - beyond, -2.95)):
+        goal = JointGoal(name=("brazo_joint",), position=(value,))
+        there = JointState(name=planner.arm.joint_names, position=(0.0, value, 0.2))
+        for request, place in (
+            (PlanRequest(goal=goal), -1),
+            (PlanRequest(goal=NamedGoal(name="home"), start=there), 0),
+        ):
+            response = planner.plan(request, home)
+            assert response.code is PlanCode.SUCCESS, response.refusal
+            assert limit in response.trajectory.points[place].positions
 
 
 def test_a_joint_beyond_its_limit_is_clamped_in_the_goals_own_form(planner: Planner, home: JointState):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from pathlib import Path
 
@@ -20,6 +21,7 @@ def check_with_yourdfpy(arm: ArmDescription) -> list[Finding]:
     except ModuleNotFoundError:
         remedy = "install the extra `view` to have the meshes opened"
         return [warning(file, "meshes", "not opened, because yourdfpy is not installed", remedy)]
+    logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)  # what it would warn of, the other checks say with lines
     try:
         other = yourdfpy.URDF.load(str(arm.urdf_path))
     except Exception as problem:  # of any mesh format's reader

@@ -36,6 +36,7 @@ from services.arm.motors.steps import StepScale, step_scale
 
 ROBOT_FILE = "robot.toml"
 DEFAULT_URDF = "robot.urdf"
+ROUNDING = 1e-4  # [rad] or [m] chosen: pi in four decimals; a limit that is missed by it was rounded
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,11 @@ class Joint:
     def clamp(self, position: float) -> float:
         """The nearest position [rad] or [m] within the limits."""
         return min(max(position, self.lower), self.upper)
+
+    def rounded(self, position: float) -> float:
+        """The limit where `position` [rad] or [m] misses it by no more than `ROUNDING`, else `position`."""
+        limit = self.clamp(position)
+        return limit if abs(position - limit) <= ROUNDING else position
 
     def is_within(self, position: float) -> bool:
         """True if `position` [rad] or [m] is within the limits."""

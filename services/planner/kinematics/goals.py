@@ -89,8 +89,7 @@ class Goals:
         if values is None:
             where = f"{self._arm.srdf_path.name} of {self._arm.name}"
             raise unknown_name(INVALID, "unknown state", goal.name, self._arm.state_names, where)
-        self._require_limits(self._arm.joint_names, values)
-        return values
+        return self._within_limits(self._arm.joint_names, values)
 
     def _joints(self, goal: JointGoal, start: Start) -> Start:
         if goal.name == self._arm.joint_names and are_usable(self._arm, goal.position):
@@ -101,17 +100,18 @@ class Goals:
         for name in goal.name:
             if name not in self._arm.joint_names:
                 raise unknown_name(INVALID, "unknown joint", name, self._arm.joint_names, self._arm.name)
-        self._require_limits(goal.name, goal.position)
-        values = dict(zip(goal.name, goal.position, strict=True))
+        values = dict(zip(goal.name, self._within_limits(goal.name, goal.position), strict=True))
         return tuple(values.get(name, value) for name, value in zip(self._arm.joint_names, start, strict=True))
 
-    def _require_limits(self, names: tuple[str, ...], positions: Vector) -> None:
+    def _within_limits(self, names: tuple[str, ...], positions: Vector) -> Vector:
+        """`positions` [rad] or [m], those at a limit that only rounding misses; raises `PlanRefused` for one beyond."""
         joints = [self._arm.joint(name) for name in names]
         nearest = tuple(joint.clamp(position) for joint, position in zip(joints, positions, strict=True))
         for joint, position in zip(joints, positions, strict=True):
             require_unwound(INVALID, joint, position)
-            if not joint.is_within(position):
+            if not joint.is_within(joint.rounded(position)):
                 raise beyond_limit(self._arm, joint, position, nearest)
+        return nearest
 
     def _poses(self, goal: PoseGoal, frame: Rigid, start: Start, deadline: Deadline) -> Iterator[Start]:
         target = target_of(goal, frame)

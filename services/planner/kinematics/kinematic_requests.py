@@ -89,7 +89,7 @@ class KinematicRequests:
         [s] is of `present`. A refusal names the nearest one on the straight joint path from `present`."""
         try:
             asked = self._completed(FkRequest(name=request.name, position=request.position), present, age)
-            self._require_limits(request, asked)
+            asked = self._within_limits(request, asked)
         except PlanRefused as refused:
             return ValidityResponse(code=refused.code, refusal=refused.refusal)
         contacts = tuple(world.contacts(asked, world.clearance))
@@ -98,12 +98,17 @@ class KinematicRequests:
         touching = self._touching(asked, self._nearest_free(asked, present, age, world), contacts, world)
         return ValidityResponse(code=touching.code, refusal=touching.refusal, contacts=contacts)
 
-    def _require_limits(self, request: ValidityRequest, asked: Start) -> None:
+    def _within_limits(self, request: ValidityRequest, asked: Start) -> Start:
+        """`asked`, the named joints at a limit that only rounding misses; raises `PlanRefused` for one beyond it."""
         values = dict(zip(self._arm.joint_names, asked, strict=True))
         for joint in self._arm.joints:
-            if joint.name in request.name and not joint.is_within(values[joint.name]):
+            if joint.name not in request.name:
+                continue
+            if not joint.is_within(joint.rounded(values[joint.name])):
                 within = tuple(self._arm.joint(name).clamp(values[name]) for name in request.name)
                 raise beyond_limit(self._arm, joint, values[joint.name], within)
+            values[joint.name] = joint.clamp(values[joint.name])
+        return tuple(values[name] for name in self._arm.joint_names)
 
     def _nearest_free(self, asked: Start, present: JointState | None, age: float, world: World) -> Start:
         """The last free configuration on the straight joint path from `present`; empty where there is none."""

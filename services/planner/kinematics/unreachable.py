@@ -43,6 +43,7 @@ class UnreachableRefusals:
     ) -> None:
         self._arm, self._kinematics, self._ik = arm, kinematics, ik
         self._task_space, self._collisions = able, collisions
+        self._carrying = _carrying(arm)
 
     def refusal(self, goal: PoseGoal, target: ToolTarget, frame: Rigid, near: Array, deadline: Deadline) -> PlanRefused:
         """The refusal for a position out of reach, or for an orientation that the arm cannot have there, with the
@@ -155,10 +156,27 @@ class UnreachableRefusals:
         return tuple(local.tolist())
 
     def _held(self, configuration: Array) -> list[str]:
-        """The joints that stand at a limit, in words."""
+        """The joints between base and tool that stand at a limit, in words."""
         held = []
         for joint, value in zip(self._arm.joints, configuration.tolist(), strict=True):
+            if joint.name not in self._carrying:
+                continue
             for side, limit in (("lower", joint.lower), ("upper", joint.upper)):
                 if abs(value - limit) < 1e-9:
                     held.append(f"{joint.name} at its {side} limit of {limit:g} {joint.unit}")
         return held
+
+
+def _carrying(arm: ArmDescription) -> frozenset[str]:
+    """The joints whose motion moves the tool against the base; a gripper's jaw beside the tool does not."""
+    above = {joint.child: joint for joint in arm.model.joints}
+
+    def leading(link: str) -> set[str]:
+        names = set()
+        while link in above:
+            joint = above[link]
+            names.add(joint.mimic.joint if joint.mimic is not None else joint.name)
+            link = joint.parent
+        return names
+
+    return frozenset(leading(arm.tool_frame) ^ leading(arm.base_frame))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from schemas.joints import JointState
 from schemas.planning import PlanCode
-from services.arm.model.description import ArmDescription, Joint
+from services.arm.model.description import ROUNDING, ArmDescription, Joint
 from services.planner.request.per_arm import once_per_arm
 from services.planner.request.refusals import malformed, moving_start, stale_state, start_beyond_limit, unknown_name
 
@@ -15,7 +15,7 @@ from services.planner.request.refusals import malformed, moving_start, stale_sta
 STALE_AFTER = 0.5  # [s] without a joint state; standard: as long as the device waits for a heartbeat
 REST = 0.01  # share of a joint's velocity limit below which it stands
 MOST_TURNED = 90.0  # [rad] of a joint without limits: the native planner takes 100, and a search goes half a turn more
-ROUNDING = 0.51  # [steps] executed positions are whole steps, so they may be this far beyond a limit
+HALF_STEP = 0.51  # [steps] executed positions are whole steps, so they may be this far beyond a limit
 
 
 def resolve_start(
@@ -31,7 +31,7 @@ def resolve_start(
     for joint in arm.joints:
         value = values[joint.name]
         require_unwound(PlanCode.INVALID_ROBOT_STATE, joint, value)
-        if abs(value - joint.clamp(value)) > ROUNDING * joint.steps.resolution:
+        if abs(value - joint.clamp(value)) > max(ROUNDING, HALF_STEP * joint.steps.resolution):
             raise start_beyond_limit(joint, value)
     return tuple(joint.clamp(values[joint.name]) for joint in arm.joints)
 
