@@ -28,6 +28,11 @@ def add_options(parser: Parser) -> None:
     parser.add_argument("--output", type=Path, default=Path("urdf"), metavar="FOLDER", help="of robots; else urdf")
     parser.add_argument("--motor", default="", help="of every joint, as NEMA 17, NEMA 23 or 28BYJ-48")
     parser.add_argument("--driver", default="", help="of every motor, as A4988, DRV8825, TMC2209 or DM542")
+    add_xacro(parser)
+
+
+def add_xacro(parser: Parser) -> None:
+    """Adds the arguments of a xacro file."""
     parser.add_argument(
         "--xacro",
         type=xacro_argument,

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from schemas.text_file import read_text
 from services.cli.errors import CommandError, ExitCode, usage
+from services.cli.import_robot import add_xacro
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.text_table import table
 from services.cli.units import positive_length
@@ -35,18 +36,19 @@ def folder_option(parser: Parser) -> None:
 def check_option(parser: Parser) -> None:
     """Adds the folder or URDF."""
     parser.add_argument("folder", type=Path, metavar="FOLDER_OR_URDF", help="a robot's folder, an export's, or a URDF")
+    add_xacro(parser)
 
 
 def run_check(options: Options) -> ExitCode:
     """Checks a robot's folder, or what `gemelo import` would read."""
-    return print_findings(options.folder)
+    return print_findings(options.folder, dict(options.xacro))
 
 
-def print_findings(folder: Path) -> ExitCode:
+def print_findings(folder: Path, xacro: Mapping[str, str]) -> ExitCode:
     """Prints every finding; FAILED if one of them is an error."""
     from services.arm.checks.check import Severity  # slow to load: numpy and trimesh
 
-    findings = _findings(folder)
+    findings = _findings(folder, xacro)
     for finding in findings:
         print(finding)
     errors, warnings = (sum(each.severity is kind for each in findings) for kind in (Severity.ERROR, Severity.WARNING))
@@ -54,7 +56,7 @@ def print_findings(folder: Path) -> ExitCode:
     return ExitCode.FAILED if errors else ExitCode.OK
 
 
-def _findings(folder: Path) -> list[Finding]:
+def _findings(folder: Path, xacro: Mapping[str, str]) -> list[Finding]:
     """Of a robot's folder; of a source for `gemelo import` where there is no robot.toml."""
     from services.arm.checks.check import Severity  # slow to load: numpy and trimesh
     from services.arm.checks.check import check as findings_in
@@ -67,16 +69,13 @@ def _findings(folder: Path) -> list[Finding]:
         is_broken = any(finding.severity is Severity.ERROR for finding in findings)
         return findings if is_broken else [*findings, *trial_findings(folder)]
     from services.arm.errors import DescriptionError
-    from services.robot_import.link_mending import shapeless
-    from services.robot_import.mending import mend
-    from services.robot_import.source import find_source
+    from services.robot_import.importing import ImportOptions, source_findings
 
+    print(f"{folder} has no {ROBOT_FILE}: as `gemelo import {folder}` reads it, which mends what is a note")
     try:
-        mended = mend(find_source(folder))
+        return source_findings(ImportOptions(folder, Path(), yes=True, xacro=xacro))
     except DescriptionError as error:
         raise CommandError(str(error)) from error
-    print(f"{folder} has no {ROBOT_FILE}: as `gemelo import {folder}` reads it, which mends what is a note")
-    return [*shapeless(mended), *mended.findings()]
 
 
 def fit_options(parser: Parser) -> None:
@@ -157,6 +156,8 @@ def print_matrix(folder: Path, write: bool, always_within: float | None) -> Exit
     verdicts = collision_matrix(arm, tell=_say, always_within=always_within)
     wanted, lines = plan_of(text, verdicts)
     print(listing(verdicts))
+    for each in (verdict for verdict in verdicts if verdict.is_doubtful):
+        print(f"warning: {arm.srdf_path.name}: {doubt_of(each)}")
     changed = with_pairs(text, wanted)
     print("\n".join(lines) if lines else f"{arm.srdf_path} says the same: nothing to change")
     if lines and write:
@@ -193,6 +194,17 @@ def plan_of(text: str, verdicts: list[LinkPairData]) -> tuple[dict[tuple[str, st
                 was = f", was {present[pair]}" if pair in present else ""
                 lines.append(f"add {' and '.join(verdict.pair)} ({verdict.reason}{was})")
     return wanted, lines
+
+
+def doubt_of(verdict: LinkPairData) -> str:
+    """Why a pair that is always near is checked all the same, and what would do."""
+    first, second = verdict.pair
+    near, far = 1000.0 * verdict.nearest, 1000.0 * verdict.farthest
+    return (
+        f"pair {first} and {second}: they are always near ({near:.1f} to {far:.1f} mm), and come to touch as they are "
+        f'drawn -> checked; if that is no collision, write <disable_collisions link1="{first}" link2="{second}" '
+        'reason="User"/>'
+    )
 
 
 def _why(verdict: LinkPairData | None) -> str:

@@ -15,12 +15,12 @@ from services.arm.model.description import ArmDescription, load_arm
 from services.arm.model.urdf import Triple
 from services.arm.model.urdf_edit import with_collisions
 from services.collision_fitting.excess import depth_in
+from services.collision_fitting.link_meshes import HULLS
 from services.collision_fitting.mesh_fit import LinkFit
 from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-HULLS = "meshes/collision"  # from the URDF on
 OUTSIDE = 1e-6  # [m] that a corner may be outside the shapes as they are loaded again: a rounding
 
 

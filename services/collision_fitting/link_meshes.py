@@ -1,13 +1,16 @@
-"""The visual meshes of a link as one mesh in its frame: read by trimesh, refused where it cannot be a link."""
+"""The meshes that a link touches with, else those it is drawn with, as one mesh in its frame: read by trimesh, refused
+where they cannot be a link."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.checks.meshes import scene_of
+from services.arm.checks.meshes import IN_MILLIMETRES, MOST_TRIANGLES, scene_of
 from services.arm.errors import DescriptionError
 from services.arm.frames.transforms import from_rpy
 from services.arm.model.urdf import Geometry, UrdfLink
@@ -15,24 +18,45 @@ from services.planner.collision_geometry.shapes import TriangleMesh, matrix_of
 
 Array = NDArray[np.float64]
 
+HULLS = "meshes/collision"  # from the URDF on: where fitted hulls are
 # Tuning constants: chosen, where a line does not say measured or standard.
-SMALLEST, LARGEST = 0.002, 3.0  # [m] along its longest side; what is beyond is in another unit
+SMALLEST, LARGEST = 0.002, IN_MILLIMETRES  # [m] along its longest side; what is beyond is in another unit
 FLAT = 1e-3  # thickness as a share of the longest side below which a mesh is no solid
-MOST_TRIANGLES = 500_000
+ROUND = 48  # sides of a cylinder that stands among the meshes of a link
+
+
+def link_mesh(link: UrdfLink, folder: Path) -> TriangleMesh | None:
+    """What shapes are fitted to, in the link's frame [m]: its own collision meshes with the shapes among them, else its
+    visual meshes; None where it has neither. Raises `DescriptionError` with the file."""
+    own = own_collisions(link)
+    if not own:
+        return visual_mesh(link, folder)
+    return _joined([_placed(shape, link.name, folder) for shape in own])
+
+
+def own_collisions(link: UrdfLink) -> tuple[Geometry, ...]:
+    """The collision shapes where one of them is a mesh that was not fitted, but given with the robot."""
+    given = any(shape.mesh is not None and not shape.mesh.startswith(f"{HULLS}/") for shape in link.collisions)
+    return link.collisions if given else ()
 
 
 def visual_mesh(link: UrdfLink, folder: Path) -> TriangleMesh | None:
     """All visual meshes of a link in its frame [m], None where it has none; raises `DescriptionError` with the file."""
     found = [_placed(visual, link.name, folder) for visual in link.visuals if visual.mesh is not None]
-    if not found:
-        return None
+    return _joined(found) if found else None
+
+
+def _joined(found: Sequence[TriangleMesh]) -> TriangleMesh:
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in found)])
     faces = np.vstack([mesh.faces + start for mesh, start in zip(found, starts[:-1], strict=True)])
     return TriangleMesh(np.vstack([mesh.vertices for mesh in found]), faces.astype(np.int32))
 
 
 def _placed(visual: Geometry, link: str, folder: Path) -> TriangleMesh:
-    assert visual.mesh is not None
+    pose = matrix_of((visual.origin.xyz, from_rpy(*visual.origin.rpy)))
+    if visual.mesh is None:
+        solid = _solid(visual, link)
+        return TriangleMesh(solid.vertices @ pose[:3, :3].T + pose[:3, 3], solid.faces)
     if visual.mesh.startswith("package://"):
         raise DescriptionError(
             f'link "{link}": mesh "{visual.mesh}" is a ROS package path: write one relative to {folder}'
@@ -42,8 +66,24 @@ def _placed(visual: Geometry, link: str, folder: Path) -> TriangleMesh:
     mesh = _read(path, where)
     scaled = mesh.vertices * np.array(visual.scale)
     _require_solid(scaled, where)
-    pose = matrix_of((visual.origin.xyz, from_rpy(*visual.origin.rpy)))
     return TriangleMesh(scaled @ pose[:3, :3].T + pose[:3, 3], mesh.faces)
+
+
+def _solid(shape: Geometry, link: str) -> TriangleMesh:
+    """Triangles of a box, a cylinder or a ball about its own origin; a round one's corners are outside of it."""
+    import trimesh  # half a second
+
+    wider = 1.0 / math.cos(math.pi / ROUND)
+    match shape.shape:
+        case "box":
+            solid = trimesh.creation.box(shape.size)
+        case "cylinder":
+            solid = trimesh.creation.cylinder(wider * shape.size[0], shape.size[1], ROUND)
+        case "sphere":
+            solid = trimesh.creation.icosphere(3, wider * shape.size[0])
+        case _:
+            raise DescriptionError(f'link "{link}": <{shape.shape}> in <collision> is no shape of a URDF')
+    return TriangleMesh(np.asarray(solid.vertices, dtype=float), np.asarray(solid.faces, dtype=np.int32))
 
 
 def _read(path: Path, where: str) -> TriangleMesh:
@@ -54,11 +94,13 @@ def _read(path: Path, where: str) -> TriangleMesh:
         whole = scene_of(path).to_mesh()
         vertices, faces = np.asarray(whole.vertices, dtype=float), np.asarray(whole.faces, dtype=np.int32)
     except Exception as error:  # whatever its many readers raise for a damaged file
-        raise DescriptionError(f"{where} cannot be read: {type(error).__name__}: {error}") from error
+        raise DescriptionError(f"{where} cannot be read: {error}") from error
     if not len(faces):
         raise DescriptionError(f"{where} holds no triangle")
     if len(faces) > MOST_TRIANGLES:
-        raise DescriptionError(f"{where} has {len(faces)} triangles, more than {MOST_TRIANGLES}: simplify it")
+        raise DescriptionError(
+            f"{where} has {len(faces)} triangles, more than {MOST_TRIANGLES}: `gemelo import` makes it coarser"
+        )
     used, numbers = np.unique(faces, return_inverse=True)
     if not np.isfinite(vertices[used]).all():
         raise DescriptionError(f"{where}: a corner of it is not finite: export it again")

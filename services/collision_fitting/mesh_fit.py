@@ -18,7 +18,7 @@ from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.description import ArmDescription
 from services.collision_fitting.excess import SHARE, Excess, excess_of
 from services.collision_fitting.fitted_shape import Fitted
-from services.collision_fitting.link_meshes import visual_mesh
+from services.collision_fitting.link_meshes import link_mesh
 from services.collision_fitting.mesh_surface import MeshSurface
 from services.collision_fitting.parts import shapes_around
 from services.planner.collision_geometry.shapes import TriangleMesh
@@ -69,7 +69,7 @@ def fit_links(
                 f'{arm.urdf_path}: there is no link "{name}"{suggestion(name, arm.model.link_names)}'
             )
     wanted = [link for link in arm.model.links if not only or link.name in only]
-    meshes = {link.name: visual_mesh(link, arm.urdf_path.parent) for link in wanted}
+    meshes = {link.name: link_mesh(link, arm.urdf_path.parent) for link in wanted}
     bare = [name for name in only if meshes[name] is None]
     if bare or not any(meshes.values()):
         of = f'link "{bare[0]}" has' if bare else "its links have"
@@ -131,5 +131,6 @@ def beyond_bound(fit: LinkFit, most: int) -> str:
     return (
         f'link "{fit.link}": {100.0 * excess.share:.0f} % of the surface of its {len(fit.shapes)} shapes is within '
         f"{1000.0 * fit.within:.3g} mm of its mesh, not {100.0 * SHARE:.0f} %: that much is within "
-        f"{1000.0 * excess.p95:.1f} mm, and ({place}) mm stands {1000.0 * excess.worst:.1f} mm beyond it: give {remedy}"
+        f"{1000.0 * excess.p95:.1f} mm, and ({place}) mm stands {1000.0 * excess.worst:.1f} mm beyond it: give "
+        f"`gemelo collision fit` {remedy}"
     )

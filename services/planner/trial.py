@@ -185,7 +185,12 @@ def main() -> None:
     """Prints the findings."""
     logging.basicConfig(format="%(message)s", level=logging.INFO)  # to the standard error: how large models are made
     logging.getLogger(assembly.__name__).addFilter(lambda record: record.levelno < logging.WARNING)  # findings say it
-    for finding in trial(load_arm(Path(sys.argv[1]))):
+    arm = load_arm(Path(sys.argv[1]))
+    try:
+        found = trial(arm)
+    except ValueError as why:  # of an arm that the planner cannot take
+        found = [error(arm.urdf_path.name, "robot", str(why), "join the links that are fixed to one another")]
+    for finding in found:
         print(msgspec.json.encode(finding).decode())
 
 

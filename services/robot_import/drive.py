@@ -98,8 +98,11 @@ def _pin(text: str) -> int:
     return value
 
 
-def driven_toml(drives: Sequence[JointDrive], device: str, reference: Mapping[str, float]) -> str:
-    """[device], [[driver]], [[input]] and [[joint]] of robot.toml; `reference` [rad] or [m] is where the arm is put."""
+def driven_toml(
+    drives: Sequence[JointDrive], device: str, reference: Mapping[str, float], accelerations: Mapping[str, float]
+) -> str:
+    """[device], [[driver]], [[input]] and [[joint]] of robot.toml; `reference` [rad] or [m] is where the arm is put,
+    `accelerations` [rad/s^2] or [m/s^2] are what its owner allows."""
     drivers = {drive.driver.name: drive.driver for drive in drives}
     blocks = [f"[device]\nname = {json.dumps(device)}\n"]
     blocks += [
@@ -114,17 +117,20 @@ def driven_toml(drives: Sequence[JointDrive], device: str, reference: Mapping[st
         for drive in drives
         if drive.switch != "none"
     ]
-    return "\n".join([*blocks, *(_joint_toml(drive, reference[drive.joint.name]) for drive in drives)])
+    return "\n".join([*blocks, *(_joint_toml(drive, reference[drive.joint.name], accelerations) for drive in drives)])
 
 
-def bare_toml(joints: Sequence[UrdfJoint], reference: Mapping[str, float]) -> str:
-    """[[joint]] of an arm without motors: speeds that a person may change; `reference` [rad] or [m] by joint."""
+def bare_toml(joints: Sequence[UrdfJoint], reference: Mapping[str, float], accelerations: Mapping[str, float]) -> str:
+    """[[joint]] of an arm without motors: speeds that a person may change; `reference` [rad] or [m] and
+    `accelerations` [rad/s^2] or [m/s^2] by joint."""
     blocks = ["# Without motors: to plan and look at only. docs/my_own_arm.md says what to add for a real arm.\n"]
     for joint in joints:
         speed = ""  # a sliding joint's is its URDF's
         if joint.kind is not JointKind.PRISMATIC and joint.limit is not None:
             speed = f"max_speed_rpm = {60.0 * joint.limit.velocity / math.tau:.9g}\n"
-        rest = f"ramp_time = {RAMP_TIME_BARE}\n{_reference(reference[joint.name])}"
+        velocity = joint.limit.velocity if joint.limit is not None else 0.0
+        ramp = _ramp_time(RAMP_TIME_BARE, velocity, accelerations.get(joint.name))
+        rest = f"ramp_time = {ramp}\n{_reference(reference[joint.name])}"
         blocks.append(f"[[joint]]\nname = {json.dumps(joint.name)}\n{speed}{rest}")
     return "\n".join(blocks)
 
@@ -134,7 +140,13 @@ def _reference(position: float) -> str:
     return f"reference_position = {position:.9g}\n" if position else ""
 
 
-def _joint_toml(drive: JointDrive, reference: float) -> str:
+def _ramp_time(usual: float, velocity: float, acceleration: float | None) -> float:
+    """[s] to full speed [rad/s] or [m/s]; longer than usual where the acceleration [rad/s^2] or [m/s^2] is less."""
+    return usual if acceleration is None else max(usual, math.ceil(1e4 * velocity / acceleration) / 1e4)
+
+
+def _joint_toml(drive: JointDrive, reference: float, accelerations: Mapping[str, float]) -> str:
+    ramp = _ramp_time(RAMP_TIME, drive.rpm / 60.0 * drive.travel_per_turn, accelerations.get(drive.joint.name))
     rack = ""
     if drive.pinion_radius is not None:
         rack = f'transmission = "rack_and_pinion"\npinion_radius = {drive.pinion_radius!r}\n'
@@ -142,7 +154,7 @@ def _joint_toml(drive: JointDrive, reference: float) -> str:
     return (
         f"# {drive.motor.name}: {drive.motor.source}.\n"
         f'[[joint]]\nname = {json.dumps(drive.joint.name)}\nwire_name = "q{drive.number}"\n{rack}'
-        f"max_speed_rpm = {drive.rpm:.9g}\nramp_time = {RAMP_TIME}\n"
+        f"max_speed_rpm = {drive.rpm:.9g}\nramp_time = {ramp}\n"
         f"{_reference(reference)}{_homing_toml(drive)}"
         f"\n[joint.motor]\ndriver = {json.dumps(drive.driver.name)}\n"
         f"pulses_per_turn = {drive.motor.full_steps * drive.microsteps}\ngear_ratio = {json.dumps(str(total))}\n"

@@ -3,29 +3,36 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from pathlib import Path
 
 from services.arm.checks.findings import Finding, error, note
-from services.arm.checks.meshes import SMALLEST, Facts, MeshFacts, is_in_millimetres, link_volume
+from services.arm.checks.meshes import SMALLEST, Facts, MeshFacts, facts_of, link_volume
 from services.arm.checks.units import LARGEST_GYRATION, gyration
-from services.arm.checks.urdf import principal_moments
-from services.arm.model.urdf import Geometry, UrdfLink
-from services.robot_import.mended import Mended, links_of, subject_of
+from services.arm.checks.urdf import UNTOUCHED, principal_moments
+from services.arm.model.urdf import UrdfLink
+from services.robot_import.mended import Mended, links_of, meshes_of, subject_of
+from services.robot_import.questions import Questions, yes_or_no
+
+MOST_NAMED = 3
 
 
 def references(mended: Mended) -> None:
-    """The files that meshes mean; a missing one is an error."""
+    """The files that meshes mean. A missing one is an error, but for one to look at of a link whose collision shapes
+    are all there: these are drawn."""
     by_package: dict[str, int] = {}
     missing: set[tuple[ET.Element, str]] = set()  # most are in <visual> and in <collision>
-    for link, _, _, mesh in _meshes(mended):
+    for link, _, item, _, mesh in meshes_of(mended):
         reference = mesh.get("filename", "")
-        found = mended.source.find(reference) if reference else None
+        found = _found(mended, link, mesh, reference)
         if found is None and reference and (link, reference) not in missing:
             missing.add((link, reference))
-            message = f'mesh "{reference}" is not there{mended.source.near(reference)}'
-            line = mended.xml.lines.get(mesh, 0)
-            file = mended.source.label
-            mended.errors.append(error(file, subject_of(link), message, f"put it below {mended.source.root}", line))
+            message = f'mesh "{reference}" is not there'
+            if item.tag == "visual" and _touches_wholly(mended, link):
+                link.remove(item)
+                mended.warn(mesh, subject_of(link), message, "left out: it is drawn with its <collision>")
+                continue
+            message += mended.source.near(reference)
+            mended.fail(mesh, subject_of(link), message, f"put it below {mended.source.root}")
         elif found is not None:
             mended.files[reference] = found
             if reference.startswith("package://"):
@@ -36,24 +43,38 @@ def references(mended: Mended) -> None:
         mended.notes.append(note(mended.source.label, "meshes", message, "relative paths, the files copied"))
 
 
-def millimetres(mended: Mended) -> None:
-    """Gives meshes in millimetres a scale."""
-    said: set[str | None] = set()  # most are in <visual> and in <collision>
-    for link, _, geometry, mesh in _meshes(mended):
+def _found(mended: Mended, link: ET.Element, mesh: ET.Element, reference: str) -> Path | None:
+    """The file; one of the same name in another format where that is the only one."""
+    found = mended.source.find(reference) if reference else None
+    if found is not None or not reference:
+        return found
+    other = mended.source.in_another_format(reference)
+    if other is not None and reference not in mended.files:
+        message = f'mesh "{reference}" is not there, but {other.name} is'
+        mended.say(mesh, subject_of(link), message, f'filename="{other.name}"')
+    return other
+
+
+def _touches_wholly(mended: Mended, link: ET.Element) -> bool:
+    """True if it has collision shapes, and each mesh of them is there and can be read."""
+    shapes = [item.find("geometry/mesh") for item in link.findall("collision")]
+    files = [mended.source.find(mesh.get("filename", "")) for mesh in shapes if mesh is not None]
+    return bool(shapes) and all(file is not None and isinstance(facts_of(file), MeshFacts) for file in files)
+
+
+def unreadable(mended: Mended) -> None:
+    """A mesh to look at that cannot be read is left out where the collision shapes can."""
+    for link, _, item, geometry, mesh in meshes_of(mended):
         known = mended.facts(geometry)
-        if isinstance(known, MeshFacts) and is_in_millimetres(geometry, known):
-            scale = " ".join(f"{0.001 * value:.9g}" for value in geometry.scale)
-            length = known.longest * max(map(abs, geometry.scale))
-            message = f'mesh "{geometry.mesh}" is {length:.4g} m long: it is in millimetres'
-            mesh.set("scale", scale)
-            if geometry.mesh not in said:
-                mended.say(mesh, subject_of(link), message, f'scale="{scale}"')
-            said.add(geometry.mesh)
+        if isinstance(known, str) and item.tag == "visual" and _touches_wholly(mended, link):
+            link.remove(item)
+            message = f'mesh "{geometry.mesh}": {known}'
+            mended.warn(mesh, subject_of(link), message, "left out: it is drawn with its <collision>")
 
 
 def flat(mended: Mended) -> None:
     """A mesh without volume is drawn nowhere and fitted to nothing."""
-    for link, item, geometry, mesh in _meshes(mended):
+    for link, _, item, geometry, mesh in meshes_of(mended):
         known = mended.facts(geometry)
         if isinstance(known, MeshFacts) and known.is_flat:
             message = f'mesh "{geometry.mesh}" in <{item.tag}> bounds no volume'
@@ -63,7 +84,7 @@ def flat(mended: Mended) -> None:
 
 def tiny(mended: Mended) -> None:
     """A mesh of less than two millimetres is a placeholder; or, where it is scaled, scaled too much."""
-    for link, item, geometry, mesh in _meshes(mended):
+    for link, _, item, geometry, mesh in meshes_of(mended):
         known = mended.facts(geometry)
         scale = max(map(abs, geometry.scale))
         if not isinstance(known, MeshFacts) or not 0.0 < known.longest * scale < SMALLEST:
@@ -151,13 +172,31 @@ def _even_density(link: UrdfLink, mass: float, facts: Facts) -> ET.Element | Non
     return element
 
 
-def _meshes(mended: Mended) -> Iterator[tuple[ET.Element, ET.Element, Geometry, ET.Element]]:
-    """Link, visual or collision, how it was read, and its <mesh>."""
-    for link, model in links_of(mended):
-        shapes = zip(
-            (*link.findall("visual"), *link.findall("collision")), (*model.visuals, *model.collisions), strict=True
-        )
-        for item, geometry in list(shapes):
-            mesh = item.find("geometry/mesh")
-            if mesh is not None:
-                yield link, item, geometry, mesh
+def untouched(mended: Mended, questions: Questions) -> None:
+    """Links that are drawn and have no <collision>: as the owner has it where others have one, which is said; where no
+    link has one, all get shapes."""
+    bare = [(element, link) for element, link in links_of(mended) if link.visuals and not link.collisions]
+    if not bare:
+        return
+    names = ", ".join(link.name for _, link in bare[:MOST_NAMED])
+    names += f" and {len(bare) - MOST_NAMED} more" if len(bare) > MOST_NAMED else ""
+    has_some = any(link.collisions for link in mended.model.links)
+    question = f"fit collision shapes to what is only drawn ({names})?"
+    mended.fits_bare = not has_some or questions.ask("shapes_for_drawn", question, "no", yes_or_no)
+    for element, _ in bare if not mended.fits_bare else ():
+        remedy = 'nothing will touch it; shapes_for_drawn = "yes" in --answers fits shapes to it'
+        mended.warn(element, subject_of(element), UNTOUCHED, remedy)
+    if mended.fits_bare:
+        element, _ = bare[0]
+        message = f"{len(bare)} links are drawn and have no <collision> ({names})"
+        mended.say(element, subject_of(element), message, "shapes are fitted to what is drawn")
+
+
+def own_collisions(mended: Mended) -> None:
+    """Collision meshes of a person's own, to which shapes are fitted."""
+    own = [(element, link) for element, link in links_of(mended) if any(each.mesh for each in link.collisions)]
+    other = [each for each in own if {s.mesh for s in each[1].collisions} != {s.mesh for s in each[1].visuals}]
+    if other:
+        element, _ = other[0]
+        message = f"{len(other)} links have <collision> meshes of their own"
+        mended.say(element, subject_of(element), message, "collision shapes are fitted to these, not to the <visual>")

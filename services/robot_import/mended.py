@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from services.arm.checks.findings import Finding, Severity, note, once, warning
+from services.arm.checks.findings import Finding, Severity, error, note, once, warning
 from services.arm.checks.meshes import MeshFacts, check_meshes, facts_of
 from services.arm.checks.urdf import check_urdf, fault_finding
 from services.arm.model.urdf import Geometry, UrdfLink, UrdfModel, model_of
 from services.arm.model.xml_reader import XmlReader
+from services.robot_import.questions import Questions, one_of
 from services.robot_import.source import RobotSource
+
+if TYPE_CHECKING:
+    from services.robot_import.semantics import Semantics
 
 
 @dataclass
@@ -24,6 +30,12 @@ class Mended:
     files: dict[str, Path]  # mesh references as written, and the files that they mean
     notes: list[Finding] = field(default_factory=list)
     errors: list[Finding] = field(default_factory=list)
+    sized: set[str] = field(default_factory=set)  # mesh references of whose unit a person is asked
+    renamed: dict[str, str] = field(default_factory=dict)  # links and joints by the names that they had
+    accelerations: dict[str, float] = field(default_factory=dict)  # [rad/s^2] or [m/s^2] by joint
+    semantics: Semantics | None = None  # of the SRDF beside the source
+    fits_bare: bool = False  # collision shapes for links that are only drawn
+    questions: Questions = field(default_factory=lambda: Questions({}, takes_defaults=True))
 
     @property
     def model(self) -> UrdfModel:
@@ -35,7 +47,7 @@ class Mended:
         model, faults = model_of(XmlReader(self.xml.root, self.xml.lines))
         file = self.source.label
         found = [*self.errors, *(fault_finding(fault, file) for fault in faults)]
-        found += [*check_urdf(model, Path(file), has_meshes=False), *check_meshes(model, file, self.facts)]
+        found += [*check_urdf(model, Path(file), has_meshes=False), *check_meshes(model, file, self.facts, self.sized)]
         return sorted(once([*found, *self.notes]), key=lambda each: list(Severity).index(each.severity))
 
     def facts(self, geometry: Geometry) -> MeshFacts | str | None:
@@ -46,6 +58,20 @@ class Mended:
     def say(self, element: ET.Element, subject: str, message: str, remedy: str) -> None:
         """Notes what is mended."""
         self.notes.append(note(self.source.label, subject, message, remedy, self.xml.lines.get(element, 0)))
+
+    def fail(self, element: ET.Element, subject: str, message: str, remedy: str) -> None:
+        """Says what has no one answer: an error."""
+        self.errors.append(error(self.source.label, subject, message, remedy, self.xml.lines.get(element, 0)))
+
+    def choose(self, key: str, element: ET.Element, subject: str, message: str, words: Sequence[str]) -> str | None:
+        """Which of the words a person says to what has no one answer; None, after an error, where nobody is there."""
+        question = f"{subject}: {message}: {' or '.join(words)}?"
+        said = self.questions.ask_without_default(key, question, one_of(*words))
+        if said is None:
+            remedy = f'correct it in the source, or write {key} = "{words[0]}"'
+            others = f" ({', '.join(words)})" if words[1:] else ""
+            self.fail(element, subject, message, f"{remedy}{others} into a file for `gemelo import --answers`")
+        return said
 
     def warn(self, element: ET.Element, subject: str, message: str, remedy: str) -> None:
         """Warns of what a default stands for that nobody has given."""
@@ -60,6 +86,18 @@ def _facts(file: Path) -> MeshFacts | str:
 def links_of(mended: Mended) -> list[tuple[ET.Element, UrdfLink]]:
     """Each <link>, and how it was read."""
     return list(zip(mended.xml.root.findall("link"), mended.model.links, strict=True))
+
+
+def meshes_of(mended: Mended) -> Iterator[tuple[ET.Element, UrdfLink, ET.Element, Geometry, ET.Element]]:
+    """Link and how it was read, visual or collision and how that was read, and its <mesh>."""
+    for link, model in links_of(mended):
+        shapes = zip(
+            (*link.findall("visual"), *link.findall("collision")), (*model.visuals, *model.collisions), strict=True
+        )
+        for item, geometry in list(shapes):
+            mesh = item.find("geometry/mesh")
+            if mesh is not None:
+                yield link, model, item, geometry, mesh
 
 
 def subject_of(link: ET.Element) -> str:

@@ -10,18 +10,24 @@ import xml.etree.ElementTree as ET
 from services.arm.errors import DescriptionError
 from services.arm.model.urdf import JointKind, model_of
 from services.arm.model.xml_reader import XmlReader, parse_xml
-from services.robot_import import link_mending, number_mending, unit_mending
+from services.robot_import import link_mending, mesh_places, motion_limits, number_mending, unit_mending
 from services.robot_import.joint_mending import fix_free_base, fix_locked, follow_the_motor
 from services.robot_import.mended import Mended, numbers_in
+from services.robot_import.mesh_units import mesh_units
+from services.robot_import.moveit_limits import joint_limits
+from services.robot_import.questions import Questions
 from services.robot_import.source import RobotSource
 from services.robot_import.stick_figure import sticks
 
 FOREIGN = ("gazebo", "transmission", "ros2_control", "sensor")
 MOVES = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
 
+ROUNDED_AXIS = 0.002  # chosen: of a length that differs from 1 by less, the digits were rounded
 
-def mend(source: RobotSource) -> Mended:
-    """The source, mended; raises `DescriptionError` where it is no URDF at all."""
+
+def mend(source: RobotSource, questions: Questions | None = None) -> Mended:
+    """The source, mended, as `questions` say where there is no one answer; raises `DescriptionError` where it is no
+    URDF at all."""
     try:
         xml = parse_xml(source.text)
         model_of(xml)
@@ -29,7 +35,7 @@ def mend(source: RobotSource) -> Mended:
         raise DescriptionError(f"{source.urdf}: {said}") from said
     _require_links(xml, source)
     xml.faults.clear()
-    mended = Mended(source, xml, {})
+    mended = Mended(source, xml, {}, questions=questions or Questions({}, takes_defaults=True))
     for step in (
         _foreign,
         _prefixed,
@@ -38,19 +44,27 @@ def mend(source: RobotSource) -> Mended:
         number_mending.separators,
         number_mending.capitals,
         link_mending.references,
+        link_mending.unreadable,
         _free_base,
         _endless,
         unit_mending.degrees,
         unit_mending.lengths,
         _axes,
+        motion_limits.soft_limits,
+        motion_limits.calibrations,
         _mimics,
         fix_locked,
-        link_mending.millimetres,
+        mesh_units,
         link_mending.flat,
         link_mending.tiny,
         link_mending.frames,
         link_mending.inertias,
+        mesh_places.mesh_places,
+        mesh_places.collisions_beside,
+        mesh_places.masses_away,
+        link_mending.own_collisions,
         link_mending.unseen,
+        joint_limits,
         sticks,
     ):
         step(mended)
@@ -135,7 +149,7 @@ def _names(mended: Mended) -> None:
             old = element.get("name", "")
             if re.fullmatch(r"[A-Za-z0-9_.-]+", old):
                 continue
-            new = safe_name(old, known)
+            new = mended.renamed[old] = safe_name(old, known)
             element.set("name", new)
             mended.say(element, f'{tag} "{old}"', "its name has blanks or letters that commands do not take", f"{new}")
             for joint in mended.xml.root.findall("joint"):
@@ -175,7 +189,8 @@ def _axes(mended: Mended) -> None:
             joint.remove(axis)
         elif length >= 1e-9 and abs(length - 1.0) > 1e-6:
             text = " ".join(f"{value / length:.9g}" for value in numbers)
-            mended.say(axis, where, f'its axis "{axis.get("xyz")}" is {length:.4g} long, not 1', f'xyz="{text}"')
+            if abs(length - 1.0) > ROUNDED_AXIS:
+                mended.say(axis, where, f'its axis "{axis.get("xyz")}" is {length:.4g} long, not 1', f'xyz="{text}"')
             axis.set("xyz", text)
     for axis, where in harmless[:1]:  # some exporters write it for every frame
         more = f", and of {len(harmless) - 1} more" if harmless[1:] else ""
@@ -186,6 +201,8 @@ def _mimics(mended: Mended) -> None:
     follow_the_motor(mended.xml, mended.say)
     for joint in mended.xml.root.findall("joint"):
         mimic = joint.find("mimic")
-        if mimic is not None and joint.get("type") in MOVES:
+        if mimic is not None and joint.get("type") == JointKind.FIXED:
+            joint.remove(mimic)  # some readers wonder aloud at it
+        elif mimic is not None and joint.get("type") in MOVES:
             message = f'follows joint "{mimic.get("joint")}"'
             mended.say(mimic, f'joint "{joint.get("name")}"', message, "it gets no motor of its own")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -11,16 +12,20 @@ from numpy.typing import NDArray
 
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.kinematics.self_collisions import SelfCollisionChecker
+from services.arm.kinematics.self_collisions import LinkPair
 from services.arm.model.description import ArmDescription
 from services.arm.model.urdf import JointKind, UrdfJoint
 
 Array = NDArray[np.float64]
+Wanted = Callable[[Array], bool]  # of a state (n,) [rad] or [m]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 CLEAR = 0.008  # [m] between links that may touch, in a named state: twice what plans keep, if any state has it
 TIGHT = 0.001  # [m] that must be between them at least
 TRIES = 3000
+LOOKS = 400  # states that are looked at for how far apart a pair can be
+SHARE_OF_MOST = 0.9  # of that, which is as much room as there can be
+HALVINGS = 12
 INSET = 0.01  # of the travel from a limit to `home`
 ASIDE = 1e-3  # of the travel from a limit to any named state
 READY = 0.4  # of the way from the middle to the limits, at most, for `ready`
@@ -41,21 +46,80 @@ def _zero(lower: Array, upper: Array) -> Array:
     return np.where((lower <= 0.0) & (upper >= 0.0), 0.0, inside)
 
 
-def named_states(arm: ArmDescription) -> dict[str, dict[str, float]]:
-    """`home`, near zero, and `ready`, away from it [rad] or [m]; raises `DescriptionError` where none is free."""
-    checker = Kinematics(arm).collisions
-    urdf = [arm.model.joint(name) for name in arm.joint_names]
-    lower, upper = np.array([_range(joint) for joint in urdf]).T
-    home = _first_free(checker, states_around(_zero(lower, upper), lower, upper), "home", arm)
+@dataclass(frozen=True)
+class NamedStates:
+    """The states by name, each by joint [rad] or [m], and a sentence for each that is not where one expects it."""
+
+    states: dict[str, dict[str, float]]
+    said: tuple[str, ...]
+
+
+def named_states(arm: ArmDescription, given: Mapping[str, Mapping[str, float]]) -> NamedStates:
+    """`home`, near zero, and `ready`, away from it [rad] or [m], with the joints at the values that are `given` for
+    them; raises `DescriptionError` where none is free."""
+    room = Room(arm)
+    lower, upper = limits_of(arm)
+    zero = _zero(lower, upper)
+    fixed = {name: _pinned(arm, given.get(name, {})) for name in ("home", "ready")}
+    home = _first_free(room, np.where(np.isnan(fixed["home"]), zero, fixed["home"]), fixed["home"], "home", arm)
+    said = tuple(_not_at_zero(room, home, zero, arm, fixed["home"]))
     middle, half = (lower + upper) / 2.0, (upper - lower) / 2.0
     least = np.minimum(NEAREST_READY, NEAREST_READY_SHARE * (upper - lower))
-    away = (
-        each for each in states_around(middle + READY * 0.5 * half, lower, upper) if (abs(each - home) >= least).any()
-    )
-    ready = _first_free(checker, away, "ready", arm)
+
+    def is_away(state: Array) -> bool:
+        return bool((abs(state - home) >= least).any())
+
+    away = None if "ready" in given else is_away
+    center = np.where(np.isnan(fixed["ready"]), middle + READY * 0.5 * half, fixed["ready"])
+    ready = _first_free(room, center, fixed["ready"], "ready", arm, away)
     inside = _inside(lower, upper)
-    rounded = {"home": np.clip(np.round(home, 4), *inside), "ready": np.clip(np.round(ready, 4), *inside)}
-    return {name: dict(zip(arm.joint_names, state.tolist(), strict=True)) for name, state in rounded.items()}
+    states = {}
+    for name, state in (("home", home), ("ready", ready)):
+        free = np.isnan(fixed[name])
+        rounded = np.where(free, np.clip(np.round(state, 4), *inside), state)
+        states[name] = dict(zip(arm.joint_names, rounded.tolist(), strict=True))
+    return NamedStates(states, said)
+
+
+def _pinned(arm: ArmDescription, values: Mapping[str, float]) -> Array:
+    """(n,) the given values, nan for the other joints."""
+    return np.array([values.get(name, math.nan) for name in arm.joint_names])
+
+
+def limits_of(arm: ArmDescription) -> tuple[Array, Array]:
+    """(n,) each [rad] or [m]."""
+    lower, upper = np.array([_range(arm.model.joint(name)) for name in arm.joint_names]).T
+    return lower, upper
+
+
+class Room:
+    """How much of the room that there can be each pair of links has in a state."""
+
+    def __init__(self, arm: ArmDescription) -> None:
+        self.checker = Kinematics(arm).collisions
+        self._wanted: dict[LinkPair, float] = {}  # [m] less than CLEAR, of pairs that never have that
+        lower, upper = limits_of(arm)
+        random = np.random.default_rng(SEED)
+        zero = _zero(lower, upper)
+        tight = {pair: apart for pair, apart in self.checker.distances(zero).items() if apart <= CLEAR}
+        for number in range(LOOKS if tight else 0):
+            one = np.arange(len(zero)) == number % len(zero)
+            inside = random.uniform(*_inside(lower, upper))
+            state = np.where(one, inside, zero) if number < LOOKS // 2 else inside
+            apart = self.checker.distances(state)
+            tight = {pair: max(most, apart[pair]) for pair, most in tight.items() if most <= CLEAR}
+            if not tight:
+                break
+        for pair, most in tight.items():
+            if most <= CLEAR:
+                self._wanted[pair] = max(TIGHT, SHARE_OF_MOST * most)
+
+    def is_clear(self, state: Array) -> bool:
+        """True if in `state` (n,) [rad] or [m] every pair is CLEAR, or nearly as far apart as it can be where that is
+        less."""
+        if not self._wanted:
+            return self.checker.distance(state) > CLEAR
+        return all(apart > self._wanted.get(pair, CLEAR) for pair, apart in self.checker.distances(state).items())
 
 
 def states_around(center: Array, lower: Array, upper: Array) -> Iterator[Array]:
@@ -72,22 +136,72 @@ def _inside(lower: Array, upper: Array) -> tuple[Array, Array]:
     return lower + aside, upper - aside
 
 
-def _first_free(checker: SelfCollisionChecker, states: Iterator[Array], name: str, arm: ArmDescription) -> Array:
-    """(n,) [rad] or [m] the first that is CLEAR, else the one with the most room if that is above TIGHT."""
+def _first_free(
+    room: Room, center: Array, fixed: Array, name: str, arm: ArmDescription, is_wanted: Wanted | None = None
+) -> Array:
+    """(n,) [rad] or [m] the state nearest to `center` with as much room as there can be, else the one with the most
+    room if that is above TIGHT; the joints that are `fixed` stay. Where all are, they are a person's."""
+    lower, upper = limits_of(arm)
+    free = np.isnan(fixed)
     best, most = np.empty(0), -math.inf
-    for state in states:
-        distance = checker.distance(state)
-        if distance > CLEAR:
-            return state
+    for drawn in states_around(center, lower, upper):
+        state = np.where(free, drawn, center)
+        if is_wanted is not None and not is_wanted(state):
+            continue
+        if room.is_clear(state):
+            return _pulled_back(room.is_clear, state, center, is_wanted)
+        distance = room.checker.distance(state)
         if distance > most:
             best, most = state, distance
+        if not free.any():
+            return state
     if most > TIGHT:
-        return best
-    touching = ", ".join(f"{first} and {second}" for first, second in checker.pairs_within(best, TIGHT)) or "none"
+        least = SHARE_OF_MOST * most
+        return _pulled_back(lambda each: room.checker.distance(each) >= least, best, center, is_wanted)
+    touching = ", ".join(f"{first} and {second}" for first, second in room.checker.pairs_within(best, TIGHT)) or "none"
     raise DescriptionError(
         f'{arm.name}: no configuration of {TRIES} is free of contact for the state "{name}"; in the best one touch: '
         f"{touching}. See with `gemelo collision matrix` how near they are elsewhere, and correct shapes or limits"
     )
+
+
+def _pulled_back(is_free: Wanted, state: Array, center: Array, is_wanted: Wanted | None) -> Array:
+    """(n,) `state` with each joint as near to `center` as it may be while the state is free, one after the other."""
+
+    def is_good(tried: Array) -> bool:
+        return is_free(tried) and (is_wanted is None or is_wanted(tried))
+
+    for _ in range(2):
+        for joint in np.argsort(-abs(state - center)):
+            near, far = center[joint], state[joint]
+            here = np.arange(len(state)) == joint
+            if near == far:
+                continue
+            if is_good(np.where(here, near, state)):
+                state = np.where(here, near, state)
+                continue
+            for _ in range(HALVINGS):
+                middle = 0.5 * (near + far)
+                near, far = (near, middle) if is_good(np.where(here, middle, state)) else (middle, far)
+            state = np.where(here, far, state)
+    return state
+
+
+def _not_at_zero(room: Room, home: Array, zero: Array, arm: ArmDescription, fixed: Array) -> Iterator[str]:
+    """Why `home` is not zero, with the pair that is too near there."""
+    if not np.isnan(fixed).any():
+        return
+    moved = [f"{name} {value:.4g}" for name, value in zip(arm.joint_names, home, strict=True) if abs(value) > ASIDE]
+    if not moved:
+        return
+    apart = room.checker.distances(zero)
+    pair = min(apart, key=lambda each: apart[each], default=None)
+    if pair is not None and apart[pair] <= CLEAR and (abs(home - zero) > ASIDE).any():
+        near = f"{' and '.join(pair)} are {1000.0 * apart[pair]:.1f} mm apart" if apart[pair] > 0.0 else (
+            f"{' and '.join(pair)} touch")  # fmt: skip
+        yield f"home is not at zero, where {near}: it is at {', '.join(moved)}, and 0 for all other joints"
+    else:
+        yield f"home is not at zero, which is not within the limits: it is at {', '.join(moved)}"
 
 
 def _range(joint: UrdfJoint) -> tuple[float, float]:
@@ -97,8 +211,10 @@ def _range(joint: UrdfJoint) -> tuple[float, float]:
     return joint.limit.lower, joint.limit.upper
 
 
-def srdf_text(name: str, joints: Sequence[str], states: Mapping[str, Mapping[str, float]]) -> str:
-    """An SRDF with the group `arm` and its states [rad] or [m], and no pair of links yet."""
+def srdf_text(
+    name: str, joints: Sequence[str], states: Mapping[str, Mapping[str, float]], more: Sequence[str] = ()
+) -> str:
+    """An SRDF with the group `arm` and its states [rad] or [m], `more` lines, and no pair of links yet."""
     lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>", '  <group name="arm">']
     lines += [f"    <joint name={quoteattr(joint)}/>" for joint in joints]
     lines += ["  </group>"]
@@ -106,4 +222,4 @@ def srdf_text(name: str, joints: Sequence[str], states: Mapping[str, Mapping[str
         lines.append(f'  <group_state name={quoteattr(state)} group="arm">')
         lines += [f'    <joint name={quoteattr(joint)} value="{values[joint]:.9g}"/>' for joint in joints]
         lines.append("  </group_state>")
-    return "\n".join([*lines, "</robot>", ""])
+    return "\n".join([*lines, *more, "</robot>", ""])

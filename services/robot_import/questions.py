@@ -46,6 +46,18 @@ class Questions:
         """As `ask`; the default where it was not given and nobody is there to be asked."""
         return self.ask(key, question, default, parse) if key in self._given or sys.stdin.isatty() else parse(default)
 
+    def ask_without_default(self, key: str, question: str, parse: Callable[[str], T]) -> T | None:
+        """As `ask`, of what has no default; None where it was not given and nobody is there to be asked."""
+        if key not in self._given and (self._takes_defaults or not sys.stdin.isatty()):
+            return None
+        return (
+            self._parsed(key, self.answers[key], parse) if key in self.answers else self.ask(key, question, "", parse)
+        )
+
+    def rehearsal(self) -> Questions:
+        """The same given answers, and defaults for all else."""
+        return Questions(self._given, takes_defaults=True)
+
     def given_below(self, prefix: str) -> dict[str, str]:
         """The given answers whose keys begin with `prefix`, by what follows it; they count as asked for."""
         below = {key: value for key, value in self._given.items() if key.startswith(prefix)}

@@ -14,21 +14,23 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from schemas.text_file import read_text
+from services.arm.checks.findings import Finding, Severity, note
 from services.arm.checks.meshes import MeshFacts
 from services.arm.errors import DescriptionError
 from services.arm.model.description import load_arm
 from services.arm.model.srdf_edit import entries, with_pairs
 from services.arm.model.urdf import UrdfJoint, UrdfLink, UrdfModel
+from services.arm.model.virtual_drive import device_name
 from services.robot_import.drive import JointDrive, bare_toml, driven_toml
 from services.robot_import.mended import Mended
 from services.robot_import.mesh_copies import copy_meshes
-from services.robot_import.poses import named_states, srdf_text, zero_state
+from services.robot_import.pairs import ONE_THREAD, sampled_pairs, write_pairs
+from services.robot_import.poses import NamedStates, named_states, srdf_text, zero_state
+from services.robot_import.semantics import srdf_lines
 
 # [m] chosen: what shapes that are fitted to meshes may stand beyond them. Links that are never farther apart than this
 # beyond the clearance are parts of one hinge, whose true distance such shapes cannot tell.
 EXCESS, EXCESS_SHARE = 0.005, 0.01  # the latter of the longest mesh
-# Of the steps in processes of their own: with matrices of three columns the threads of BLAS cost a fourth more CPU.
-ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
 COMMAND_LINE = "services.cli.main"  # its steps in a process of their own: they load the planner
 
 
@@ -48,22 +50,31 @@ class Description:
         heading = "# Written by `gemelo import`; docs/my_own_arm.md says what each key is.\n"
         for key, value in (("name", self.name), ("base_frame", self.base), ("tool_frame", self.tool)):
             heading += f"{key} = {json.dumps(value)}\n"
-        rest = driven_toml(self.drives, self.name, reference) if self.drives else bare_toml(self.joints, reference)
+        given = self.mended.accelerations
+        if self.drives:
+            rest = driven_toml(self.drives, device_name(self.name), reference, given)
+        else:
+            rest = bare_toml(self.joints, reference, given)
         return f"{heading}\n{rest}"
 
 
-def write_robot(folder: Path, description: Description) -> None:
-    """Fills the empty `folder`, each step with its time; raises `DescriptionError`."""
+def write_robot(folder: Path, description: Description) -> list[Finding]:
+    """Fills the empty `folder`, each step with its time, and returns what is to be said of the result; raises
+    `DescriptionError`."""
+    mended = description.mended
     with step("meshes and robot.urdf"):
-        model = description.mended.model  # before `_write_urdf` replaces collision shapes
-        _write_urdf(folder, description.mended, description.name, model)
+        model = mended.model  # before `_write_urdf` replaces collision shapes
+        _write_urdf(folder, mended, description.name, model)
     joints, zero = [joint.name for joint in description.joints], zero_state(description.joints)
     (folder / "robot.srdf").write_text(srdf_text(description.name, joints, {"home": zero}), encoding="utf-8")
     (folder / "robot.toml").write_text(description.robot_toml(zero), encoding="utf-8")
-    _collisions(folder, description.mended, model)
+    findings = _collisions(folder, mended, model)
+    if any(each.severity is Severity.ERROR for each in findings):
+        return findings
     with step("home and ready, where nothing touches"):
-        home = _write_states(folder)
-        (folder / "robot.toml").write_text(description.robot_toml(home), encoding="utf-8")
+        states = _write_states(folder, mended)
+        (folder / "robot.toml").write_text(description.robot_toml(states.states["home"]), encoding="utf-8")
+    return [*findings, *(note("robot.srdf", 'state "home"', said) for said in states.said)]
 
 
 @contextmanager
@@ -79,40 +90,40 @@ def _write_urdf(folder: Path, mended: Mended, name: str, model: UrdfModel) -> No
     root = mended.xml.root
     root.set("name", name)
     for link, known in zip(root.findall("link"), model.links, strict=True):
-        _prepare_collisions(link, known)
+        if mended.fits_bare and not known.collisions and not _is_fitted(known, mended):
+            _touch_as_drawn(link)
     copy_meshes(mended, folder)
     ET.indent(root)
     text = '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
     (folder / "robot.urdf").write_text(text, encoding="utf-8")
 
 
-def _prepare_collisions(element: ET.Element, link: UrdfLink) -> None:
-    """Shapes of a person's own stay; a drawing of boxes and cylinders serves as collision shape too."""
-    if _is_fitted(link):
-        for collision in element.findall("collision"):
-            element.remove(collision)
-    elif not link.collisions:
-        for visual in element.findall("visual"):
-            collision = ET.SubElement(element, "collision")
-            collision.extend(ET.fromstring(ET.tostring(part)) for part in visual if part.tag in ("origin", "geometry"))
+def _touch_as_drawn(element: ET.Element) -> None:
+    """A drawing of boxes and cylinders serves as collision shape too."""
+    for visual in element.findall("visual"):
+        collision = ET.SubElement(element, "collision")
+        collision.extend(ET.fromstring(ET.tostring(part)) for part in visual if part.tag in ("origin", "geometry"))
 
 
-def _is_fitted(link: UrdfLink) -> bool:
-    """True if it is drawn with a mesh and has no shapes but meshes."""
+def _is_fitted(link: UrdfLink, mended: Mended) -> bool:
+    """True if its own collision shapes have a mesh, or it has none, is drawn with a mesh, and is to get some."""
     drawn = any(visual.mesh is not None for visual in link.visuals)
-    return drawn and (not link.collisions or any(shape.mesh is not None for shape in link.collisions))
+    if link.collisions:
+        return any(shape.mesh is not None for shape in link.collisions)
+    return drawn and mended.fits_bare
 
 
-def _collisions(folder: Path, mended: Mended, model: UrdfModel) -> None:
+def _collisions(folder: Path, mended: Mended, model: UrdfModel) -> list[Finding]:
     """Shapes around the meshes, and the pairs of links that need no check."""
-    links = [link.name for link in model.links if _is_fitted(link)]
+    links = [link.name for link in model.links if _is_fitted(link, mended)]
     if links:
         with step(f"collision shapes for {len(links)} links"):
             _run("collision", "fit", str(folder), "--meshes", "--write", "--link", *links)
     with step("pairs of links that need no check"):
+        arm = load_arm(folder)
         excess = max(EXCESS, EXCESS_SHARE * _longest(mended, model))
-        within = f"{1000.0 * (load_arm(folder).clearance + excess):.3g}mm"
-        _run("collision", "matrix", str(folder), "--write", *(["--always-within", within] if links else []))
+        pairs = sampled_pairs(folder, arm.clearance + excess if links else None)
+        return list(write_pairs(arm, pairs, mended))
 
 
 def _longest(mended: Mended, model: UrdfModel) -> float:
@@ -130,12 +141,15 @@ def _run(*words: str) -> None:
         raise DescriptionError(f"gemelo {' '.join(words)} failed: {done.stdout.strip() or 'see above'}")
 
 
-def _write_states(folder: Path) -> dict[str, float]:
-    """The SRDF anew with states that are free of contact, and the pairs that are in it; returns `home` [rad] or [m]."""
+def _write_states(folder: Path, mended: Mended) -> NamedStates:
+    """The SRDF anew with states that are free of contact, those of the owner's SRDF, and the pairs that are in it."""
     arm = load_arm(folder)
     before = read_text(arm.srdf_path)
     pairs = {(first, second): entry.reason for entry in entries(before) for first, second in [sorted(entry.pair)]}
-    states = named_states(arm)
-    text = srdf_text(arm.name, arm.joint_names, states)
+    known = mended.semantics
+    given = {name: known.state(name, arm.joint_names) for name in ("home", "ready")} if known else {}
+    found = named_states(arm, {name: values for name, values in given.items() if values})
+    more = srdf_lines(known, arm.joint_names, found.states) if known else []
+    text = srdf_text(arm.name, arm.joint_names, found.states, more)
     arm.srdf_path.write_text(with_pairs(text, pairs), encoding="utf-8")
-    return states["home"]
+    return found

@@ -10,13 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from services.arm.errors import DescriptionError, suggestion
+from services.arm.errors import DescriptionError, nearest_name
 from services.robot_import.xacro_files import SUFFIX, expanded, outermost
 
 BESIDE = 2  # innermost folders, whose meshes are the file's own without a package
+DEPTH = 4  # folders below a package in which its configuration may be
+PACKAGE = "package.xml"  # of ROS
 UP = 6  # folders above the URDF in which its package may be
 MOST_NAMED = 3  # files of one name
 ENCODING = re.compile(rb"<\?xml[^>]*?\bencoding\s*=\s*[\"']([A-Za-z0-9._-]+)")
+SEMANTIC = ".srdf"  # in the name of an SRDF, also of one in xacro
 LONGEST_DECLARATION = 200  # [B]
 UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
@@ -29,6 +32,20 @@ class RobotSource:
     root: Path
     text: str
     is_expanded: bool = False
+
+    def beside(self, *endings: str) -> list[Path]:
+        """The files with these endings of the same package, or of a MoveIt package beside it, from near to far."""
+        folders = [self.urdf.absolute().parent, self.root.absolute()]
+        if (self.root / PACKAGE).is_file():
+            folders += sorted(each.parent for each in self.root.absolute().parent.glob(f"*moveit*/{PACKAGE}"))
+        found: dict[Path, int] = {}
+        for folder in folders:
+            is_package = folder != self.urdf.absolute().parent or (folder / PACKAGE).is_file()
+            for depth in range(DEPTH if is_package else BESIDE):
+                for path in sorted(folder.glob("*/" * depth + "*")):
+                    if path.is_file() and path.name.lower().endswith(endings):
+                        found.setdefault(path, len(found))
+        return list(found)
 
     @property
     def label(self) -> str:
@@ -44,14 +61,27 @@ class RobotSource:
         alike = [path for path in _files(self.root) if path.name.lower() in (name.lower(), unquote(name).lower())]
         return alike[0] if len(alike) == 1 else None
 
+    def in_another_format(self, reference: str) -> Path | None:
+        """The only mesh file that differs from the one meant in its ending alone; None where there is none, or more."""
+        wanted = unquote(Path(reference.replace("\\", "/")).stem).lower()
+        alike = [path for path in _files(self.root) if _is_mesh(path) and path.stem.lower() == wanted]
+        return alike[0] if len(alike) == 1 else None
+
     def near(self, reference: str) -> str:
         """A hint at the file with the most similar name; or at those of the same one, of which any could be meant."""
-        name, meshes = Path(reference).name, [path for path in _files(self.root) if _is_mesh(path)]
-        same = [str(path.relative_to(self.root)) for path in meshes if path.name.lower() == name.lower()]
-        if same:
-            more = f" and {len(same) - MOST_NAMED} more" if len(same) > MOST_NAMED else ""
-            return f", and {len(same)} have that name: {', '.join(same[:MOST_NAMED])}{more}"
-        return suggestion(name, [path.name for path in meshes])
+        name = Path(unquote(reference.replace("\\", "/"))).name
+        meshes = [path for path in _files(self.root) if _is_mesh(path)]
+        for is_name in (True, False):
+            wanted = name.lower() if is_name else Path(name).stem.lower()
+            alike = [path for path in meshes if (path.name if is_name else path.stem).lower() == wanted]
+            same = [str(path.relative_to(self.root)) for path in alike]
+            if same:
+                more = f" and {len(same) - MOST_NAMED} more" if len(same) > MOST_NAMED else ""
+                return f", and {len(same)} have that name: {', '.join(same[:MOST_NAMED])}{more}"
+        near = nearest_name(name, [path.name for path in meshes])
+        if near:
+            return f'; did you mean "{near}"?'
+        return "" if meshes else f"; there is no mesh below {self.root}"
 
     def _candidates(self, reference: str) -> Iterator[Path]:
         scheme, _, rest = reference.rpartition("://")
@@ -91,7 +121,7 @@ def _root_of(urdf: Path) -> Path:
     """The folder of the export that holds the file: the nearest that is a package, or has meshes beside or above the
     file; else the file's own. All of it is looked through, so a person's home with a folder of meshes is none."""
     above = _above(urdf)
-    packages = (folder for folder in above if (folder / "package.xml").is_file())
+    packages = (folder for folder in above if (folder / PACKAGE).is_file())
     near = (folder for folder in above[:BESIDE] if (folder / "meshes").is_dir())
     return next(packages, None) or next(near, urdf.parent)
 
@@ -110,8 +140,10 @@ def _urdf_in(folder: Path) -> Path:
 
 
 def _is_robot(path: Path) -> bool:
-    """True if it is a robot's own file, and not one with macros for others."""
+    """True if it is a robot's own file, and neither one with macros for others nor an SRDF."""
     text = path.read_text(encoding="utf-8", errors="replace")
+    if SEMANTIC in path.name.lower() or ("<link" not in text and re.search(r"<(group|disable_collisions)\b", text)):
+        return False
     return re.search(r"<robot\b[^>]*\bname\s*=", text) is not None and ("<link" in text or "<xacro:" in text)
 
 
@@ -160,7 +192,7 @@ def _package_folders(package: str, above: tuple[Path, ...]) -> Iterator[Path]:
 def _package_name(folder: Path) -> str:
     """Of the package.xml there; "" where there is none."""
     try:
-        return ET.parse(folder / "package.xml").getroot().findtext("name", "").strip()
+        return ET.parse(folder / PACKAGE).getroot().findtext("name", "").strip()
     except (OSError, ET.ParseError):
         return ""
 

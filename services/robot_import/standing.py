@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from services.arm.device.device_config import MAX_COUNTS
-from services.arm.errors import DescriptionError
+from services.arm.errors import suggestion
 from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
 from services.arm.model.virtual_drive import driven_joints
 from services.robot_import.joint_mending import stand_at
@@ -19,9 +19,8 @@ WHEEL = "wheel"  # in the name of a joint or its link
 
 
 def ask_who_stands(mended: Mended, tool: str, questions: Questions) -> None:
-    """Makes the joints that do not carry `tool` fixed near 0 where a person wants them to stand still; raises
-    `DescriptionError` where more are left than a device drives.
-    """
+    """Makes the joints that do not carry `tool` fixed near 0 where a person wants them to stand still, and those that
+    are more than a device drives."""
     model = mended.model
     driven = driven_joints(model)
     aside = _aside(model, driven, tool)
@@ -38,10 +37,48 @@ def ask_who_stands(mended: Mended, tool: str, questions: Questions) -> None:
         else:
             _say(mended, aside, tool, DRIVEN)
     if len(driven) > MOST:
-        can_stand = 0 < len([joint for joint in driven if joint not in aside]) <= MOST
-        first = _few([joint.name for joint in driven])
-        remedy = 'say "yes" to others_stand_still' if can_stand else f'give some of {first} type="fixed" in the source'
-        raise DescriptionError(f"it has {len(driven)} joints to drive, and a device drives {MOST}: {remedy}")
+        _ask_which_are_driven(mended, driven, tool, questions)
+
+
+def _ask_which_are_driven(mended: Mended, driven: list[UrdfJoint], tool: str, questions: Questions) -> None:
+    """Of more joints than a device drives: by default those that carry the tool, and what the last of them carries."""
+    chain = {joint.name for joint in _chain(mended.model, driven, tool)}
+    usual = [joint.name for joint in driven if joint.name in chain]
+    question = f"which of its {len(driven)} joints, {MOST} at the most, does its device drive? the others stand still"
+    names = questions.ask("driven_joints", question, " ".join(usual), lambda text: _names(text, driven))
+    held = [joint for joint in driven if joint.name not in names]
+    stand_at(mended, zero_state(held))
+    message = f"{len(driven)} joints move, and a device drives {MOST}: {_few([joint.name for joint in held])} of them"
+    message += " stands still" if len(held) == 1 else " stand still"
+    remedy = "at 0 or the nearest limit; `driven_joints` in --answers names those that move"
+    element = next(each for each in mended.xml.root.findall("joint") if each.get("name") == held[0].name)
+    mended.warn(element, f'joint "{held[0].name}"', message, remedy)
+
+
+def _chain(model: UrdfModel, driven: list[UrdfJoint], tool: str) -> list[UrdfJoint]:
+    """The joints nearest to the tool of those that carry it, then others of the tool, as many as a device drives."""
+    above = {joint.child: joint for joint in model.joints}
+    path: list[UrdfJoint] = []
+    link = tool
+    while link in above and above[link] not in path:
+        path.append(above[link])
+        link = above[link].parent
+    carrying = [joint for joint in path if joint in driven][:MOST]
+    if not carrying:
+        return driven[:MOST]
+    carried = [each for each in driven if each not in path and _is_behind(each.parent, carrying[0].child, above)]
+    return [*carrying, *carried][:MOST]
+
+
+def _names(text: str, driven: list[UrdfJoint]) -> list[str]:
+    """Raises ValueError."""
+    names, known = text.replace(",", " ").split(), [joint.name for joint in driven]
+    strange = [name for name in names if name not in known]
+    if strange:
+        raise ValueError(f'"{strange[0]}" is no joint that moves{suggestion(strange[0], known)}')
+    if not 0 < len(set(names)) <= MOST:
+        raise ValueError(f"name 1 to {MOST} joints")
+    return names
 
 
 def _aside(model: UrdfModel, driven: list[UrdfJoint], tool: str) -> list[UrdfJoint]:

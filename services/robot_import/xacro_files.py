@@ -40,10 +40,11 @@ def expanded(path: Path, root: Path, arguments: Mapping[str, str], find: Callabl
 def _said(failed: Failed) -> str:
     undefined = UNDEFINED.search(failed.text)
     if undefined:
-        return f"its xacro argument {undefined[1]} has no default: give `gemelo import` --xacro {undefined[1]}:=VALUE"
+        name, commands = undefined[1], "`gemelo import` or `gemelo check`"
+        return f"its xacro argument {name} has no default: give {commands} --xacro {name}:=VALUE"
     if failed.kind == "RecursionError":
         return "its macros or values are nested too deep for xacro: one of them holds itself"
-    return f"xacro cannot expand it: {failed}"
+    return f"xacro cannot expand it: {failed.text or failed.kind}"
 
 
 def outermost(files: Iterable[Path]) -> list[Path]:

@@ -88,7 +88,7 @@ def test_fit_says_how_far_it_is_and_what_it_could_not_meet(folder: Path, capfd: 
     assert progress.startswith('link "antebrazo_link" (1 of 1), 2036 triangles: 2 shapes after ')
     assert warning.startswith('warning: link "antebrazo_link": ')
     assert "is within 0.5 mm of its mesh, not 95 %" in warning
-    assert "give --most 4 or --within " in warning
+    assert "give `gemelo collision fit` --most 4 or --within " in warning
 
 
 def test_fit_says_what_it_cannot_do(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:

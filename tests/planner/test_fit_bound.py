@@ -270,4 +270,8 @@ def test_what_cannot_be_met_is_said_with_the_figure_the_place_and_what_would_do(
     said = beyond_bound(fit, 1)
     said_of = r'link "forearm": (89|9[01]) % of the surface of its 1 shapes is within 5 mm of its mesh, not 95 %: '
     assert re.match(said_of, said)
-    assert re.search(r"\(-?\d, -?\d, -?90\) mm stands 3[1-5]\.\d mm beyond it: give --most 2 or --within \d+mm$", said)
+    assert re.search(
+        r"\(-?\d, -?\d, -?90\) mm stands 3[1-5]\.\d mm beyond it: "
+        r"give `gemelo collision fit` --most 2 or --within \d+mm$",
+        said,
+    )

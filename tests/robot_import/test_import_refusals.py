@@ -72,10 +72,10 @@ def test_check_of_a_bare_urdf_and_of_its_folder_says_what_import_mends(
         said = capsys.readouterr().out
         assert "its mass is 0 kg: it is a mere frame -> <inertial> left out" in said
         assert f"{given}: all is well" in said
-    assert run(["check", str(solidworks(tmp_path / "sw").source)]) is ExitCode.FAILED
+    assert run(["check", str(solidworks(tmp_path / "sw").source)]) is ExitCode.OK
     said = capsys.readouterr().out
-    assert "its velocity limit is 0 -> give a value above 0" in said
-    assert "leave no travel" in said
+    assert "its limits lack sense (lower 0, upper 0, velocity 0, effort 0) -> lower=" in said
+    assert "by default: correct it in robot.urdf" in said
 
 
 def test_a_folder_without_a_robot_or_with_several_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -44,6 +44,7 @@ def drawn(folder: Path, unit: float, moment: float = 0.002, shape: str = "") -> 
     tube = f'<cylinder radius="{text(0.02)}" length="{text(0.2)}"/>'
     ball = f'<sphere radius="{text(0.01)}"/>'
     slide = f'<limit lower="0" upper="{text(0.15)}" effort="9" velocity="{text(0.1)}"/>'
+    led = slide.replace(f'upper="{text(0.15)}"', f'upper="{text(0.35)}"')
     follower = f'<mimic joint="slide" multiplier="2" offset="{text(0.01)}"/>'
     crank = f'<mimic joint="slide" multiplier="{3.0 / unit:g}" offset="0.5"/>'
     file = write(
@@ -51,7 +52,7 @@ def drawn(folder: Path, unit: float, moment: float = 0.002, shape: str = "") -> 
         part("base", box), part("one", tube), part("two", box), part("three", ball), part("four", ball),
         joint("turn", "base", "one", z=0.23 * unit),
         joint("slide", "one", "two", "0 0 1", "prismatic", slide, 0.3 * unit),
-        joint("jaw", "two", "three", "0 0 1", "prismatic", slide + follower, 0.2 * unit),
+        joint("jaw", "two", "three", "0 0 1", "prismatic", led + follower, 0.2 * unit),
         joint("crank", "two", "four", rest=LIMIT + crank, z=0.25 * unit),
     )  # fmt: skip
     found = mend(find_source(file))

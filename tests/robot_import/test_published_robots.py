@@ -177,7 +177,7 @@ def test_a_robot_without_a_joint_that_moves_is_refused(tmp_path: Path, capsys: p
     box = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
     path = write(tmp_path / "robot.urdf", "robot", f'<link name="base">{box}</link>')
     assert run(["import", str(path), "--yes", "--output", str(tmp_path / "urdf")]) is ExitCode.FAILED
-    assert "no joint that moves" in capsys.readouterr().err
+    assert "robot.urdf, line 2: robot: it has no joint that moves" in capsys.readouterr().out
 
 
 def test_a_robot_without_any_shape_or_length_is_refused_by_import_and_check(

@@ -77,14 +77,20 @@ def test_nothing_is_asked_of_an_arm_with_a_gripper(tmp_path: Path):
     assert len(driven(found)) == 7
 
 
-def test_more_joints_than_a_device_drives_are_refused_before_anything_is_computed(tmp_path: Path):
-    with pytest.raises(
-        DescriptionError,
-        match="10 joints to drive, and a device drives 8: give some of long_j1, long_j2, long_j3 and 7 more type",
-    ):
-        asked(robot(tmp_path, *arm("long", 9)), "long_9")
-    with pytest.raises(DescriptionError, match='say "yes" to others_stand_still'):
-        asked(robot(tmp_path, *arm("left", 5), *arm("right", 5)), "left_5", {"others_stand_still": "no"})
+def test_of_more_joints_than_a_device_drives_those_nearest_to_the_tool_are_driven(tmp_path: Path):
+    long = robot(tmp_path, *arm("long", 9))
+    asked(long, "long_9")
+    assert driven(long) == [f"long_j{number}" for number in range(2, 10)]
+    both = robot(tmp_path, *arm("left", 5), *arm("right", 5))
+    asked(both, "left_5", {"others_stand_still": "no"})
+    assert driven(both) == [*(f"left_j{number}" for number in range(1, 6)), "left_jaw"]
+    chosen = robot(tmp_path, *arm("long", 9))
+    asked(chosen, "long_9", {"driven_joints": "long_j1 long_j2"})
+    assert driven(chosen) == ["long_j1", "long_j2"]
+    with pytest.raises(DescriptionError, match=r"driven_joints = .*name 1 to 8 joints"):
+        asked(
+            robot(tmp_path, *arm("long", 9)), "long_9", {"driven_joints": " ".join(f"long_j{n}" for n in range(1, 10))}
+        )
 
 
 @pytest.mark.parametrize("rpy", ["0.3 0.2 1", "0.3 1.5707963267949 1"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 # Tuning constants: chosen, where a line does not say measured or standard.
 IN_MILLIMETRES = 5.0  # longest side in the file's unit from which on a link's mesh is not in metres
 SMALLEST = 0.002  # [m] of its longest side
+MOST_TRIANGLES = 500_000  # of a file: beyond it a viewer is slow, and shapes are fitted for minutes
 FLAT = 1e-3  # thickness as a share of the longest side below which a mesh bounds no volume
 LIGHTEST, HEAVIEST = 15.0, 20_000.0  # [kg/m^3] light foam, tungsten: no part of an arm is beyond
 COLLADA_UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([0-9.eE+-]+)")
@@ -30,13 +31,17 @@ MILLIMETRE_REMEDY = 'write scale="0.001 0.001 0.001"'
 
 @dataclass(frozen=True)
 class MeshFacts:
-    """What a file holds, in its own unit: its longest and its shortest side, its volume, inertia of density 1."""
+    """What a file holds, in its own unit: its longest and its shortest side, its volume, inertia of density 1, the
+    corners of the box along its axes, and how many triangles."""
 
     longest: float
     thickness: float
     volume: float
     center: tuple[float, ...]  # (3,) of volume
     inertia: tuple[float, ...]  # (9,) of the volume with density 1, about `center`
+    low: tuple[float, ...]  # (3,)
+    high: tuple[float, ...]  # (3,)
+    triangles: int
 
     @property
     def is_flat(self) -> bool:
@@ -98,20 +103,21 @@ def _read_facts(file: Path) -> MeshFacts | str:
     except ImportError as problem:
         return f"there is no reader for {file.suffix}: {problem}"
     except Exception as problem:  # whatever its many readers raise for a damaged file
-        return f"it cannot be read: {type(problem).__name__}: {problem}"
+        return f"it cannot be read: {problem or 'it is damaged'}"
     if not len(mesh.faces):
         return "it holds no triangle"
     used = np.asarray(mesh.vertices, dtype=float)[np.unique(mesh.faces)]
     if not np.isfinite(used).all():
         return "a corner of it is not finite"
     longest = float(np.ptp(used, axis=0).max())
+    box = tuple(used.min(axis=0).tolist()), tuple(used.max(axis=0).tolist()), len(mesh.faces)
     try:
         mesh.merge_vertices(merge_tex=True, merge_norm=True)  # for the volume: exporters write every corner thrice
         whole = mesh if mesh.is_watertight else mesh.convex_hull
         volume, center, inertia = abs(float(whole.volume)), tuple(whole.center_mass), whole.moment_inertia
     except Exception:  # the hull of what is flat, by qhull
-        return MeshFacts(longest, 0.0, 0.0, (0.0,) * 3, (0.0,) * 9)
-    return MeshFacts(longest, _thickness(used), volume, center, tuple(np.ravel(inertia)))
+        return MeshFacts(longest, 0.0, 0.0, (0.0,) * 3, (0.0,) * 9, *box)
+    return MeshFacts(longest, _thickness(used), volume, center, tuple(np.ravel(inertia)), *box)
 
 
 def _is_pointer(file: Path) -> bool:
@@ -128,15 +134,17 @@ def _thickness(points: np.ndarray) -> float:
     return float(np.ptp(points @ across.T, axis=0).min())
 
 
-def check_meshes(model: UrdfModel, file: str, facts: Facts) -> list[Finding]:
-    """Every mesh once a link; `facts` gives None for what is no mesh or not there, which others say."""
+def check_meshes(model: UrdfModel, file: str, facts: Facts, sized: Container[str] = ()) -> list[Finding]:
+    """Every mesh once a link; `facts` gives None for what is no mesh or not there, which others say, as they do of the
+    size of the meshes `sized`."""
     findings: list[Finding] = []
     for link in model.links:
         seen: set[str | None] = set()
         for geometry in (*link.visuals, *link.collisions):
             if geometry.mesh is not None and geometry.mesh not in seen:
                 seen.add(geometry.mesh)
-                findings += _mesh(geometry, facts(geometry), f'link "{link.name}"', file)
+                found = _mesh(geometry, facts(geometry), f'link "{link.name}"', file)
+                findings += [each for each in found if geometry.mesh not in sized or each.remedy != MILLIMETRE_REMEDY]
         findings += _density(link, file, facts)
     return findings
 

@@ -7,16 +7,20 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from services.arm.checks.findings import Finding, error, warning
 from services.arm.checks.units import LARGEST_GYRATION, check_units, gyration
-from services.arm.errors import suggestion
+from services.arm.errors import nearest_name, suggestion
+from services.arm.model.description import ROUNDING
 from services.arm.model.urdf import NO_SHAPE, Geometry, Inertial, JointKind, Limit, UrdfJoint, UrdfLink, UrdfModel
 from services.arm.model.xml_reader import XmlFault
 
+UNTOUCHED = "can be seen but not touched: it has no <collision>"
 COLLISION_REMEDY = "add a box or a cylinder, or let `gemelo collision fit --meshes` fit some"
+MESHES = (".stl", ".obj", ".dae", ".glb", ".gltf", ".ply")
 SHAPES = ("box", "cylinder", "sphere", "mesh")
 MOST_TRAVEL = {JointKind.REVOLUTE: 4.01 * math.tau, JointKind.PRISMATIC: 5.0}  # [rad] or [m]
 LEAST_TURN = 0.99 * math.tau  # [rad] of a continuous joint: limits of a whole turn say nothing
@@ -24,6 +28,16 @@ MOST_VELOCITY = {JointKind.REVOLUTE: 50.0, JointKind.CONTINUOUS: 50.0, JointKind
 FRAME_REMEDY = "leave <inertial> out where the link is a mere frame, else give a mass above 0"
 LEADER_REMEDY = "name the joint that has the motor in <mimic>"
 PLACEHOLDER_EFFORTS = (100.0, 300.0, 1000.0)  # what exporters write when nobody thought about it
+
+
+class FollowerRange(NamedTuple):
+    """[rad] or [m] where a follower is led, its own limits, and the limits of its leader that keep within them."""
+
+    low: float
+    high: float
+    lower: float
+    upper: float
+    narrow: tuple[float, float] | None
 
 
 def check_urdf(model: UrdfModel, path: Path, has_meshes: bool = True) -> list[Finding]:
@@ -137,7 +151,34 @@ def _mimic(joint: UrdfJoint, model: UrdfModel, file: str) -> list[Finding]:
         how = "is fixed" if leader.kind is JointKind.FIXED else "follows another itself"
         how = "is this very joint" if name == joint.name else how
         return [error(file, subject, f'mimics "{name}", which {how}', LEADER_REMEDY, joint.line)]
-    return []
+    reach = follower_range(joint, leader)
+    if reach is None:
+        return []
+    message = f'follows "{name}" from {reach.low:.6g} to {reach.high:.6g}, beyond its own limits'
+    message += f" {reach.lower:g} to {reach.upper:g}"
+    if reach.narrow is None:
+        remedy = f'correct its <limit> or <mimic>: within it "{name}" has no travel'
+        return [error(file, subject, message, remedy, joint.line)]
+    remedy = f'narrow the limits of "{name}" to {reach.narrow[0]:.6g} and {reach.narrow[1]:.6g}, or correct <mimic>'
+    return [warning(file, subject, message, remedy, joint.line)]
+
+
+def follower_range(joint: UrdfJoint, leader: UrdfJoint) -> FollowerRange | None:
+    """Where `leader` takes its follower beyond the follower's own limits; None where it does not, or they have none."""
+    mimic, own, led = joint.mimic, joint.limit, leader.limit
+    if mimic is None or own is None or led is None or not own.lower < own.upper or not led.lower < led.upper:
+        return None
+    if JointKind.CONTINUOUS in (joint.kind, leader.kind) or JointKind.FIXED in (joint.kind, leader.kind):
+        return None
+    low, high = sorted(mimic.multiplier * end + mimic.offset for end in (led.lower, led.upper))
+    if low >= own.lower - ROUNDING and high <= own.upper + ROUNDING:
+        return None
+    narrow = None
+    if mimic.multiplier:
+        first, last = sorted((end - mimic.offset) / mimic.multiplier for end in (own.lower, own.upper))
+        first, last = max(first, led.lower), min(last, led.upper)
+        narrow = (first, last) if first < last else None
+    return FollowerRange(low, high, own.lower, own.upper, narrow)
 
 
 def _link(link: UrdfLink, path: Path, has_meshes: bool) -> list[Finding]:
@@ -148,8 +189,7 @@ def _link(link: UrdfLink, path: Path, has_meshes: bool) -> list[Finding]:
             if has_meshes or geometry.mesh is None:
                 findings += _geometry(geometry, role, subject, path)
     if has_meshes and link.visuals and not link.collisions:
-        message = "can be seen but not touched: it has no <collision>"
-        findings.append(warning(path.name, subject, message, COLLISION_REMEDY, link.line))
+        findings.append(warning(path.name, subject, UNTOUCHED, COLLISION_REMEDY, link.line))
     return findings
 
 
@@ -165,10 +205,19 @@ def _geometry(geometry: Geometry, role: str, subject: str, path: Path) -> list[F
     if geometry.mesh.startswith("package://"):
         return [_package(geometry.mesh, subject, path, geometry.line)]
     if not (path.parent / geometry.mesh.removeprefix("file://")).is_file():
-        near = suggestion(geometry.mesh, [str(p.relative_to(path.parent)) for p in path.parent.glob("**/*.*")])
-        message = f'mesh "{geometry.mesh}" is not there{near}'
+        message = f'mesh "{geometry.mesh}" is not there{_near_mesh(geometry.mesh, path.parent)}'
         return [error(path.name, subject, message, "put the file there", geometry.line)]
     return []
+
+
+def _near_mesh(reference: str, folder: Path) -> str:
+    """A hint at the file that may be meant: one that differs in folder or ending alone, else one of a like name."""
+    files = [each for each in folder.glob("**/*") if each.suffix.lower() in MESHES]
+    same = [each for each in files if each.stem.lower() == Path(reference).stem.lower()]
+    if same:
+        return f'; did you mean "{same[0].relative_to(folder)}"?'
+    near = nearest_name(Path(reference).name, [each.name for each in files])
+    return next((f'; did you mean "{each.relative_to(folder)}"?' for each in files if each.name == near), "")
 
 
 def _package(reference: str, subject: str, path: Path, line: int) -> Finding:

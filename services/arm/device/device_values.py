@@ -8,8 +8,8 @@ from fractions import Fraction
 
 from schemas.device_config import UNUSED
 from services.arm.errors import DescriptionError
+from services.arm.model.virtual_drive import MAX_NAME
 
-MAX_NAME = 31  # bytes, the firmware's
 NAME = re.compile(rf"[A-Za-z0-9_-]{{1,{MAX_NAME}}}")
 
 

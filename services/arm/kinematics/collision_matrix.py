@@ -14,6 +14,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from services.arm.kinematics.drawn_links import DrawnLinks
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.kinematics.link_distances import LinkDistances
 from services.arm.kinematics.self_collisions import LinkPair
@@ -29,6 +30,8 @@ SEARCHES = 4  # from the nearest samples of a pair
 STEPS = 60
 SHRINK = 0.9
 LOOKS = 40  # samples of a pair that are looked at on either side, where that settles it
+HINGE = 0.002  # [m] by which the distance of two parts of one hinge may change
+DEEPEST = 4  # samples in which a pair that is always near is looked at as it is drawn
 SAYING = 2.0  # [s] between two words of how far it is
 
 
@@ -49,6 +52,7 @@ class LinkPairData:
     reason: DisabledReason | None
     nearest: float
     farthest: float
+    is_doubtful: bool = False  # always near, and yet it comes to touch: a person may excuse it
 
 
 def _tell_nobody(_: str) -> None:
@@ -63,7 +67,8 @@ def collision_matrix(
 ) -> list[LinkPairData]:
     """Every pair of links that have collision shapes; the same arm gives the same matrix. `tell` hears of progress.
 
-    Links that can touch and are never farther apart than `always_within` [m], else the clearance, are always near.
+    Links that can touch and are never farther apart than `always_within` [m], else the clearance, are always near:
+    unless what they look like is apart in some samples and touches in the deepest ones, which is doubtful.
     """
     began = time.monotonic()
     kinematics = Kinematics(arm)
@@ -71,10 +76,11 @@ def collision_matrix(
     configurations = _configurations(arm, samples, random)
     links = LinkDistances(arm, kinematics.model, kinematics.configuration, configurations)
     tell(f"{len(configurations)} configurations sampled after {time.monotonic() - began:.1f} s")
+    drawn = DrawnLinks(arm, kinematics.model, kinematics.configuration)
     within = arm.clearance if always_within is None else always_within
     found, said = [], time.monotonic()
     for number in range(len(links.pairs)):
-        found.append(_pair_data(arm, links, number, configurations, random, within))
+        found.append(_pair_data(arm, links, number, configurations, random, within, drawn))
         if time.monotonic() - said > SAYING:
             tell(f"{number + 1} of {len(links.pairs)} pairs of links after {time.monotonic() - began:.1f} s")
             said = time.monotonic()
@@ -88,6 +94,7 @@ def _pair_data(
     configurations: Array,
     random: np.random.Generator,
     within: float,
+    drawn: DrawnLinks,
 ) -> LinkPairData:
     pair, never_below = links.pairs[number], arm.clearance + SPARE
     is_settled = are_adjacent(arm, *pair) or are_rigid_links(arm, *pair)
@@ -99,7 +106,16 @@ def _pair_data(
     if are_rigid_links(arm, *pair):
         return LinkPairData(pair, DisabledReason.RIGID, nearest, farthest)
     if farthest <= within and nearest <= never_below:
-        return LinkPairData(pair, DisabledReason.ALWAYS, nearest, farthest)
+        seen = _nearest_samples(links, number, configurations, -math.inf)
+        nearest = min(seen.values())
+        is_doubtful = farthest - nearest > HINGE and nearest <= 0.0 < farthest
+        if is_doubtful:
+            deepest = sorted(seen, key=lambda sample: (seen[sample], sample))[:DEEPEST]
+            outer = np.argsort(-links.bounds[:, number, 1], kind="stable")[:LOOKS].tolist()
+            outer = sorted(outer, key=lambda sample: -links.distance(pair, configurations[sample]))[:DEEPEST]
+            is_doubtful = drawn.come_to_touch(pair, configurations[deepest], configurations[outer])
+        reason = None if is_doubtful else DisabledReason.ALWAYS
+        return LinkPairData(pair, reason, nearest, farthest, is_doubtful)
     if nearest > never_below:
         starts = configurations[sorted(seen, key=lambda sample: (seen[sample], sample))[:SEARCHES]]
         nearest = min(nearest, *(_nearest_from(arm, links, pair, start, random) for start in starts))

@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from hashlib import sha256
 from pathlib import Path
 
 from services.arm.errors import DescriptionError
 from services.arm.model.urdf import JointKind, Limit, UrdfJoint, UrdfModel
 
+MAX_NAME = 31  # bytes of a device, the firmware's
+MARK = 4  # letters that tell two names apart which are cut
 VIRTUAL_DRIVER = "virtual"  # the name of the generated [[driver]]
 NO_MOTORS = "no motors: to plan and look at only"
 TO_DRIVE = "for a real arm write [device], a [[driver]] and a [joint.motor] for every joint"
@@ -59,7 +62,15 @@ def with_virtual_drive(data: Table, model: UrdfModel) -> Table:
     order = [*named, *(name for name in moving if name not in named)]
     joints = [_joint(named.get(name, {}), name, moving.get(str(name)), number) for number, name in enumerate(order, 1)]
     driver = {"name": VIRTUAL_DRIVER, "step_high_us": 1.0, "step_low_us": 1.0, "dir_setup_us": 1.0}
-    return {**data, "device": {"name": data.get("name")}, "driver": [driver], "joint": joints}
+    return {**data, "device": {"name": device_name(str(data.get("name")))}, "driver": [driver], "joint": joints}
+
+
+def device_name(robot: str) -> str:
+    """The name of a robot's device: the robot's own, cut where the firmware does not keep so many letters."""
+    if len(robot.encode()) <= MAX_NAME:
+        return robot
+    mark = sha256(robot.encode()).hexdigest()[:MARK]  # another robot may begin with the same letters
+    return f"{robot[: MAX_NAME - MARK - 1]}_{mark}"
 
 
 def driven_joints(model: UrdfModel) -> list[UrdfJoint]:

@@ -1,0 +1,95 @@
+"""The pairs of links of a new robot's folder that need no check, sampled in a process of its own.
+
+`python -m services.robot_import.pairs ROBOT_FOLDER METRES` prints each pair as JSON, one a line; links that are never
+farther apart than METRES are always near.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import msgspec
+
+from services.arm.checks.findings import Finding, error, warning
+from services.arm.errors import DescriptionError
+from services.arm.kinematics.collision_matrix import LinkPairData, collision_matrix
+from services.arm.model.description import ArmDescription, load_arm
+from services.arm.model.srdf_edit import with_pairs
+from services.robot_import.mended import Mended
+from services.robot_import.questions import yes_or_no
+from services.robot_import.semantics import OF_SRDF
+
+# Of the steps in processes of their own: with matrices of three columns the threads of BLAS cost a fourth more CPU.
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
+MODULE = "services.robot_import.pairs"
+MOST_NAMED = 3  # pairs of an SRDF that can touch
+BY_PERSON = "User"  # the reason of a pair that a person has excused
+
+
+def sampled_pairs(folder: Path, within: float | None) -> list[LinkPairData]:
+    """Of the robot in `folder`; links never farther apart than `within` [m], else its clearance, are always near.
+    Raises `DescriptionError`."""
+    metres = load_arm(folder).clearance if within is None else within
+    command = [sys.executable, "-m", MODULE, str(folder), repr(metres)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False, env={**ONE_THREAD, **os.environ})
+    if done.returncode:
+        raise DescriptionError(f"the pairs of links could not be sampled: {done.stdout.strip() or 'see above'}")
+    return [msgspec.json.decode(line, type=LinkPairData) for line in done.stdout.splitlines()]
+
+
+def write_pairs(arm: ArmDescription, pairs: Sequence[LinkPairData], mended: Mended) -> Iterator[Finding]:
+    """Writes those that need no check into robot.srdf, with those that the owner's SRDF excuses and a person excuses;
+    yields what can touch of them, and as errors what is asked where nobody is there."""
+    file = arm.srdf_path.name
+    wanted = {each.pair: str(each.reason) for each in pairs if each.reason is not None}
+    given = mended.semantics.pairs if mended.semantics is not None else {}
+    owners = {pair: f"{OF_SRDF}{reason or 'no reason'}" for pair, reason in given.items()}
+    found = {tuple(sorted(each.pair)): each for each in pairs}
+    touching = [found[pair] for pair in owners if pair in found and found[pair].reason is None]
+    wanted |= {pair: reason for pair, reason in owners.items() if pair not in map(_sorted, wanted) and pair in found}
+    for each in touching[:MOST_NAMED]:
+        more = f", as {len(touching) - MOST_NAMED} more" if len(touching) > MOST_NAMED else ""
+        message = f"the SRDF excuses it, and it comes as near as {1000.0 * each.nearest:.1f} mm{more}"
+        yield warning(file, _name(each), message, "not checked, as the SRDF says: remove it there where it may touch")
+    for each in pairs:
+        if each.is_doubtful and _sorted(each.pair) not in owners:
+            first, second = each.pair
+            key = f"excuse.{first}.{second}"
+            near = f"{1000.0 * each.nearest:.1f} to {1000.0 * each.farthest:.1f} mm"
+            message = f"they are always near ({near}) and come to touch as they are drawn: parts of one hinge, or not?"
+            said = mended.questions.ask_without_default(key, f"{_name(each)}: {message} excuse them?", yes_or_no)
+            if said is None:
+                remedy = f'write "{key}" = "yes" into a file for `gemelo import --answers`, or "no" to have it checked'
+                yield error(mended.source.label, _name(each), message, remedy)
+            elif said:
+                wanted[each.pair] = BY_PERSON
+    text = arm.srdf_path.read_text(encoding="utf-8")
+    arm.srdf_path.write_text(with_pairs(text, wanted), encoding="utf-8")
+
+
+def _sorted(pair: tuple[str, str]) -> tuple[str, str]:
+    first, second = sorted(pair)
+    return first, second
+
+
+def _name(each: LinkPairData) -> str:
+    return f"pair {' and '.join(each.pair)}"
+
+
+def main() -> int:
+    """0, or 1 with what is wrong on stderr."""
+    try:
+        for each in collision_matrix(load_arm(Path(sys.argv[1])), always_within=float(sys.argv[2])):
+            print(msgspec.json.encode(each).decode())
+    except ValueError as problem:
+        print(f"gemelo: {problem}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
