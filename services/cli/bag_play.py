@@ -75,6 +75,7 @@ def run(options: Options) -> ExitCode:
     """Plays a recording to its end, or until Ctrl-C."""
     with one_sentence():
         reader = RecordingReader(options.file)
+        reader.require_own()
         robot = recorded_robot(reader)
         name = options.name or f"{robot or 'robot'}-replay"
         require_name(name)

@@ -22,6 +22,7 @@ class NothingToExport(ValueError):
 def export(file: Path, form: str, patterns: Sequence[str], output: Path | None) -> Iterator[Written]:
     """Writes the topics that match, all without patterns; raises `BadRecording`, `NothingToExport`, OSError."""
     reader = RecordingReader(file)
+    reader.require_own()
     topics = chosen(topics_in(reader), patterns)
     series = series_of(reader, topics)
     yield from FORMS[form](reader, series, output or file.with_suffix(SUFFIXES.get(form, "")))

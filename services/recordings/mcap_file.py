@@ -19,13 +19,13 @@ from schemas.system import NodeRecord
 from schemas.topics import Topic
 from services.recordings import foxglove
 from services.recordings.channels import MESSAGE_ENCODING, SCHEMA_ENCODING, Channel, Entry, channel_of
+from services.recordings.foreign import PROFILE
 from services.runtime.process.own_files import created
 
 # [B] uncompressed; more than the batch of one write (measured: 110 kB), so that each becomes one chunk: the writer
 # keeps 2 kB of index for every chunk until the file ends.
 CHUNK_SIZE = 1024 * 1024
-PROFILE = "gemelo"
-METADATA, ROBOT, DEPLOYMENT = "gemelo", "robot", "deployment"  # the names of our metadata records
+ROBOT, DEPLOYMENT = "robot", "deployment"  # the names of our metadata records, beside METADATA
 CLOCKS = "clocks"  # of another one: by node, whose stamps it writes and how far its clock is from the recorder's
 
 _encode = msgspec.json.Encoder(enc_hook=repr).encode  # repr: msgpack's own extensions in a user's messages

@@ -9,7 +9,8 @@ from pathlib import Path
 import msgspec
 
 from schemas.deployment import Deployment
-from services.recordings.mcap_file import DEPLOYMENT, METADATA
+from services.recordings.foreign import METADATA
+from services.recordings.mcap_file import DEPLOYMENT
 
 PACKAGES = {  # by the name in the record
     "gemelo": "gemelo", "mcap": "mcap", "zenoh": "eclipse-zenoh", "msgspec": "msgspec", "numpy": "numpy",

@@ -9,19 +9,23 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from os import SEEK_END
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
 import msgspec
 from mcap.exceptions import McapError
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
+
+from services.recordings.foreign import METADATA, PROFILE, kind_of, sentence_of
 
 S = TypeVar("S", bound=msgspec.Struct)
 
 MAGIC = b"\x89MCAP0\r\n"
 UNREADABLE = (McapError, struct.error, ValueError, EOFError, OSError, KeyError, IndexError, MemoryError)
+LOOKED_AT = 1000  # messages; chosen: a program that records several topics has said each of them by then
 NO_SCHEMA = Schema(id=0, name="", encoding="", data=b"")
 LARGEST_RECORD = 256 * 1024 * 1024  # [B] a length above it is of a damaged file
 
@@ -67,6 +71,7 @@ class RecordingReader:
     channels: dict[int, Channel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
     damage: Damage = field(default_factory=Damage)
+    profile: str = ""  # of its header
 
     def __post_init__(self) -> None:
         self.path = Path(self.path)
@@ -85,6 +90,13 @@ class RecordingReader:
         self.damage = Damage()
         with self.path.open("rb") as file:
             yield from self._records(file)
+
+    def require_own(self) -> None:
+        """Raises `BadRecording` with what a recording of another program is, and what to do with it."""
+        encodings = {row.channel.message_encoding for row in islice(self.rows(), LOOKED_AT)}
+        if encodings and self.profile != PROFILE and METADATA not in self.metadata:
+            said = sentence_of(encodings, sorted({each.topic for each in self.channels.values()}))
+            raise BadRecording(f'"{self.path}" {said}; `gemelo bag info {self.path}` lists it')
 
     def read_metadata(self) -> dict[str, dict[str, str]]:
         """Versions, deployment and the robot's files: those that come before the first hundred messages at least."""
@@ -126,6 +138,8 @@ class RecordingReader:
     def _unpacked(self, record: Any) -> Iterator[Any]:
         for each in self._chunk(record) if isinstance(record, Chunk) else (record,):
             match each:
+                case Header():
+                    self.profile = each.profile
                 case Channel():
                     self.channels[each.id] = each
                 case Schema():
@@ -152,6 +166,8 @@ class RecordingReader:
 
 def require_recording(path: Path) -> None:
     """Raises `BadRecording` with one sentence where `path` is no MCAP."""
+    if path.is_dir() and (kind := kind_of(path)):
+        raise BadRecording(f'"{path}" {kind}')
     if path.is_dir():
         raise BadRecording(f'"{path}" is a folder: name one file in it{_newest(path)}')
     if not path.exists():
@@ -163,6 +179,8 @@ def require_recording(path: Path) -> None:
         raise BadRecording(f'"{path}" cannot be read: {error.strerror or error}') from error
     if not begin:
         raise BadRecording(f'"{path}" is empty: it was cut off before anything was written; nothing can be saved of it')
+    if begin != MAGIC and (kind := kind_of(path)):
+        raise BadRecording(f'"{path}" {kind}')
     if begin != MAGIC:
         raise BadRecording(
             f'"{path}" is no MCAP recording: it begins with {begin!r}; recordings are the files that end with .mcap'

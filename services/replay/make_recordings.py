@@ -22,7 +22,8 @@ from mcap.writer import CompressionType, Writer
 
 import gemelo
 from schemas.topics import Topic
-from services.recordings.mcap_file import DEPLOYMENT, METADATA, PROFILE
+from services.recordings.foreign import METADATA, PROFILE
+from services.recordings.mcap_file import DEPLOYMENT
 from services.recordings.reader import RecordingReader
 from services.replay.main import SERVICES, Replayed, replay, text_of
 from services.runtime.deployment import project_root

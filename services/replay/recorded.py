@@ -19,7 +19,8 @@ from schemas.text_file import read_text
 from schemas.topics import Topic, scene_mesh
 from services.arm.model.description import ArmDescription, load_arm
 from services.recordings.channels import schema_of
-from services.recordings.mcap_file import DEPLOYMENT, METADATA, ROBOT
+from services.recordings.foreign import METADATA
+from services.recordings.mcap_file import DEPLOYMENT, ROBOT
 from services.recordings.reader import RecordingReader, Row
 from services.recordings.table import described
 from services.runtime.deployment import project_root
@@ -75,6 +76,7 @@ class Recorded:
 
     def __post_init__(self) -> None:
         self._reader = RecordingReader(self.path)
+        self._reader.require_own()
         wanted = {topic.key: topic for topic in self.topics}
         last = 0
         for row in self._reader.rows():

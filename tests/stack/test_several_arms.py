@@ -12,7 +12,7 @@ import pytest
 
 import gemelo as api
 from schemas.actions import GoalStatusCode
-from services.recordings.mcap_file import METADATA
+from services.recordings.foreign import METADATA
 from services.recordings.reader import RecordingReader
 from services.runtime.robots import robots_on
 from services.runtime.started import deployment_of_arm
