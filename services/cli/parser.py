@@ -18,7 +18,8 @@ from services.cli.errors import ExitCode, nearest
 Options = argparse.Namespace
 Choices = Mapping[str, Iterable[str]]  # words that may follow, by the arguments so far (joined by a blank)
 ALIKE = 0.7  # of difflib's 1: a slip or another ending; chosen
-_NEGATIVE_NUMBER = re.compile(r"^-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:[A-Za-z°%][A-Za-z0-9/^²]*)?$")
+_COMMA = re.compile(r"\s*([-+]?\d*),(\d+)((?:[eE][-+]?\d+)?\s*(?:[A-Za-z°%][A-Za-z0-9/^²]*)?)\s*")
+_NEGATIVE_NUMBER = re.compile(r"^-(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?(?:[A-Za-z°%][A-Za-z0-9/^²]*)?$")
 
 
 class Command(NamedTuple):
@@ -151,8 +152,20 @@ def positive_integer(text: str) -> int:
     return value
 
 
+def comma_hint(text: str) -> str:
+    """What a number with a comma was likely meant to be, as a question; empty for a text without one."""
+    found = _COMMA.fullmatch(text)
+    if found is None:
+        return ""
+    before, after, rest = found.groups()
+    whole = f" or {before}{after}{rest}" if len(after) == 3 and before.lstrip("+-") not in ("", "0") else ""
+    return f"the decimal sign is a point: did you mean {before if before[-1:].isdigit() else before + '0'}.{after}{rest}{whole}?"
+
+
 def positive_number(text: str) -> float:
     """An argument's type: a finite number above 0, in the unit that the option names."""
+    if hint := comma_hint(text):
+        raise argparse.ArgumentTypeError(f'"{text}": {hint}')
     value = float(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not above 0 and finite")
@@ -164,7 +177,8 @@ def finite_number(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f'"{text}" is not a number: directions and quaternions have no unit') from None
+        said = comma_hint(text) or "directions and quaternions have no unit"
+        raise argparse.ArgumentTypeError(f'"{text}" is not a number: {said}') from None
     if not abs(value) < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not finite")
     return value

@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol
 
 import gemelo
 from services.cli.errors import CommandError, unknown, usage
+from services.cli.parser import comma_hint
 
 DEGREE = gemelo.deg(1.0)
 MILLIMETRE = gemelo.mm(1.0)
@@ -45,6 +46,7 @@ SPEED = Quantity("a speed", {"m/s": 1.0, "mm/s": MILLIMETRE}, "m/s")
 ACCELERATION = Quantity("an acceleration", {"m/s2": 1.0, "mm/s2": MILLIMETRE}, "m/s2")
 TIME = Quantity("a time", {"s": 1.0, "ms": 0.001}, "s")
 SHARE = Quantity("a share", {"%": 0.01})
+FAR = {"m": 10.0, "m/s": 10.0}  # chosen as in gemelo.targets: what is more, without a unit, was meant in millimetres
 QUANTITIES = (ANGLE, ANGULAR_SPEED, LENGTH, SPEED, ACCELERATION, TIME, SHARE)
 POSITION_OF = {"rad": ANGLE, "m": LENGTH}  # of a joint, by its SI unit
 SPEED_OF = {"rad": ANGULAR_SPEED, "m": SPEED}
@@ -66,6 +68,8 @@ def parse_quantity(text: str, quantity: Quantity, owner: str = "") -> float:
     """`text` in the SI unit of `quantity`; raises `CommandError` naming `owner`, the units and the readings."""
     lead = f"{owner}: " if owner else ""
     match = _VALUE.fullmatch(text)
+    if match is None and (hint := comma_hint(text)):
+        raise usage(f'{lead}"{text}" is not {quantity.noun}: {hint}')
     if match is None:
         raise usage(f'{lead}"{text}" is not {quantity.noun}: write a number and a unit, {quantity.choice}')
     number, suffix = match.groups()
@@ -77,9 +81,18 @@ def parse_quantity(text: str, quantity: Quantity, owner: str = "") -> float:
         said = text.strip() if known else f'"{suffix}" is not a unit: {text.strip()}'
         raise usage(f"{lead}{said} must be in {quantity.choice}")
     value = float(number) * quantity.units[unit]
+    if suffix is None and unit in FAR and math.isfinite(value) and abs(value) > FAR[unit]:
+        most = f"{FAR[unit]:g} {unit}"
+        raise usage(f"{lead}{number} without a unit is in {unit}, and more than {most}: {_smaller(number, unit)}?")
     if not math.isfinite(value):
         raise usage(f"{lead}{text} is not finite")
     return value
+
+
+def _smaller(number: str, unit: str) -> str:
+    """What was likely meant by a number of metres, or metres a second, that no arm has."""
+    centimetres = f" or {0.01 * float(number):g} for {number} cm" if unit == "m" and abs(float(number)) < 100.0 else ""
+    return f"did you mean {number}m{unit}{centimetres}"
 
 
 def _readings(number: str, quantity: Quantity) -> str:

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.cli.errors import CommandError, ExitCode
-from services.cli.units import ANGLE, LENGTH, parse_joints, parse_quantity, show
+from services.cli.main import run
+from services.cli.units import ANGLE, FAR, LENGTH, SHARE, SPEED, parse_joints, parse_quantity, show
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,10 @@ def test_millimetres_become_metres(millimetres):
 @given(numbers, st.sampled_from([("rad", ANGLE), ("m", LENGTH), ("", LENGTH)]))
 def test_si_units_and_bare_lengths_are_taken_as_they_are(number, suffix_and_quantity):
     suffix, quantity = suffix_and_quantity
+    if not suffix and abs(number) > FAR["m"]:  # which was meant in millimetres
+        with pytest.raises(CommandError, match="did you mean"):
+            parse_quantity(f"{number!r}", quantity)
+        return
     assert parse_quantity(f"{number!r}{suffix}", quantity) == number
 
 
@@ -80,3 +85,51 @@ def test_an_unknown_joint_is_answered_with_the_nearest():
 def test_what_is_no_assignment_is_refused(given_, reason):
     with pytest.raises(CommandError, match=reason):
         parse_joints(given_, JOINTS)
+
+
+@pytest.mark.parametrize(
+    ("text", "quantity", "said"),
+    [
+        ("250", LENGTH, "250 without a unit is in m, and more than 10 m: did you mean 250mm?"),
+        ("-150", LENGTH, "did you mean -150mm?"),
+        ("25", LENGTH, "did you mean 25mm or 0.25 for 25 cm?"),
+        ("250", SPEED, "250 without a unit is in m/s, and more than 10 m/s: did you mean 250mm/s?"),
+        ("0,25", LENGTH, '"0,25" is not a length: the decimal sign is a point: did you mean 0.25?'),
+        ("-,5", LENGTH, "did you mean -0.5?"),
+        ("0,250", LENGTH, "did you mean 0.250?"),
+        ("1,250mm", LENGTH, "did you mean 1.250mm or 1250mm?"),
+        ("30,5deg", ANGLE, '"30,5deg" is not an angle: the decimal sign is a point: did you mean 30.5deg?'),
+        ("12,5%", SHARE, "did you mean 12.5%?"),
+    ],
+)
+def test_a_number_that_was_likely_meant_otherwise_is_refused_with_the_likely_meaning(text, quantity, said):
+    with pytest.raises(CommandError) as refused:
+        parse_quantity(text, quantity)
+    assert said in str(refused.value)
+
+
+def test_what_is_far_with_its_unit_and_what_is_near_without_are_taken():
+    assert parse_quantity("250m", LENGTH) == 250.0
+    assert parse_quantity("9.5", LENGTH) == 9.5
+    assert parse_quantity("250mm", LENGTH) == 0.25
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["move", "--to", "250", "150", "100"], "did you mean 250mm?"),
+        (["move", "--to", "0,25", "0.15", "0.1"], "did you mean 0.25?"),
+        (["move", "--to", "0.2", "-0,15", "0.1"], "did you mean -0.15?"),
+        (["ik", "--to", "250", "150", "100"], "did you mean 250mm?"),
+        (["move", "--to", "0.2", "0.1", "0.1", "--along", "0,5", "0", "1"], "did you mean 0.5?"),
+        (["move", "--joints", "brazo_joint=30,5deg"], "did you mean 30.5deg?"),
+        (["move", "--joints", "efector_joint=40"], "did you mean 40mm"),
+    ],
+)
+def test_a_command_line_offers_the_likely_meaning(words, said, capsys):
+    try:
+        code = run(["--simulate", *words])
+    except SystemExit as ended:
+        code = ended.code
+    assert code == ExitCode.USAGE
+    assert said in capsys.readouterr().err
