@@ -18,7 +18,7 @@ from schemas.topics import camera_detections, camera_image, camera_info, camera_
 from services.arm.cell.cell_file import Cell, deployed_cell
 from services.arm.errors import DescriptionError
 from services.cli.cells import cell_of
-from services.cli.errors import CommandError, ExitCode, unknown, usage
+from services.cli.errors import CommandError, ExitCode, require_folder, unknown, usage
 from services.cli.output import print_coloured
 from services.cli.parser import Choices, Options, Parser, json_option
 from services.cli.session import CommandSession, connect, load_robot
@@ -95,7 +95,7 @@ def run_view(options: Options) -> ExitCode:
     if name not in cell.camera_names:
         raise unknown("camera", name, cell.camera_names)
     if options.save:
-        _require_folder(Path(options.save))
+        require_folder(Path(options.save).parent, f"--save {options.save}")
     with connect(robot) as session:
         while True:
             _show(_seen(session, name, needs_image=True), name, options.save)
@@ -249,11 +249,6 @@ def _listed(cell: Cell, devices: list[Plugged], seen: dict[str, CameraReport]) -
         for camera in cell.cameras
     ]
     return {"devices": devices, "cameras": cameras}
-
-
-def _require_folder(path: Path) -> None:
-    if not path.parent.is_dir():
-        raise usage(f"--save {path}: there is no folder {path.parent}")
 
 
 def _name_of(device: Path) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from services.cli.errors import ExitCode, usage
+from services.cli.errors import ExitCode, require_folder, usage
 from services.cli.parser import Options, Parser
 from services.cli.units import LENGTH, parse_quantity
 from services.vision.boards import ChessBoard, Scale, TagBoard
@@ -34,6 +34,7 @@ def run_print(options: Options) -> ExitCode:
     board: ChessBoard | TagBoard = CHESS_BOARD if options.board == CHESS else TAG_BOARD
     use = "gemelo camera calibrate" if options.board == CHESS else "gemelo camera mount"
     path = Path(options.to or f"board_{options.board}.pdf")
+    require_folder(path.parent, f"--to {path}")
     try:
         path.write_bytes(page_of(board.squares(), board.size, f"for {use}; keep it flat", options.page))
     except (OSError, ValueError) as error:

@@ -17,11 +17,13 @@ from services.cli.parser import Options, Parser, positive_integer
 from services.cli.session import connect, load_robot
 from services.vision.boards import ChessBoard, Sighting
 from services.vision.calibration.lens import FEWEST_SHOTS, LensFit, fit_lens
+from services.vision.other_boards import other_board, remedy
 from services.vision.tags import GreyImage
 
 MOST_SHOTS = 40
 ANOTHER = 0.06  # of the image's width: how far the board's points must be from where every other shot has them
 STEADY = 1.0  # [px] between two images: a board that moves more is blurred
+LOOK_AROUND = 20  # images without the board from one look for another to the next
 
 
 def add_options(parser: Parser) -> None:
@@ -39,7 +41,7 @@ def run(options: Options) -> ExitCode:
     with ExitStack() as stack:
         if options.images:
             images = from_folder(Path(options.images), camera.record.size)
-            shots = [found for image in images if (found := board.find(image)) is not None]
+            shots = found_in(images, board)
         else:
             session = stack.enter_context(connect(load_robot()))
             print("hold the board into the image, flat, at different places, tilted by 30 degrees (Ctrl-C: enough)")
@@ -61,13 +63,44 @@ def run(options: Options) -> ExitCode:
     return ExitCode.OK
 
 
+def found_in(images: Iterator[GreyImage], board: ChessBoard) -> list[Sighting]:
+    """The sightings in images of which the board is seen; says once of each other board that is seen."""
+    shots, strangers = [], Strangers(board)
+    for image in images:
+        found = board.find(image)
+        if found is None:
+            strangers.look(image)
+        else:
+            shots.append(found)
+    return shots
+
+
+class Strangers:
+    """Says what an image shows in the place of the board, each thing once."""
+
+    def __init__(self, board: ChessBoard) -> None:
+        self._board = board
+        self._said: set[str] = set()
+
+    def look(self, image: GreyImage) -> None:
+        """Takes some tenths of a second."""
+        other = other_board(image, self._board)
+        if other and other not in self._said:
+            self._said.add(other)
+            print(f"the image shows {other}, and not the board of this command: {remedy(self._board)}", flush=True)
+
+
 def take(images: Iterator[GreyImage], board: ChessBoard, width: int, height: int, most: int) -> list[Sighting]:
     """Shots that stand still and differ, until the lens is accepted and nothing is advised; at most `most`."""
     kept: list[Sighting] = []
     before: Sighting | None = None
+    strangers, missed = Strangers(board), 0
     try:
         for image in images:
             found = board.find(image)
+            missed = missed + 1 if found is None else 0
+            if missed % LOOK_AROUND == 1:
+                strangers.look(image)
             is_steady = found is not None and before is not None and _apart(found, before) < STEADY
             before = found
             if found is None or not is_steady or any(_apart(found, other) < ANOTHER * width for other in kept):

@@ -19,7 +19,7 @@ from schemas.topics import JOINT_STATES, camera_image, camera_info
 from services.arm.cell.camera_file import CAMERA_FILE, write_measured
 from services.arm.cell.cell_file import Cell
 from services.cli.cells import cell_of
-from services.cli.errors import CommandError, unknown, usage
+from services.cli.errors import CommandError, require_folder, unknown, usage
 from services.cli.session import CommandSession, load_robot
 from services.vision.rigid import Array, to_transform
 from services.vision.tags import GreyImage
@@ -132,6 +132,7 @@ class Eye:
 
 def from_folder(path: Path, size: tuple[int, int]) -> Iterator[GreyImage]:
     """The images of a folder by name; raises `CommandError` for one that is none, or of another size [px]."""
+    require_folder(path, f"--images {path}")
     files = sorted(each for each in path.glob("*") if each.suffix.lower() in SUFFIXES)
     if not files:
         raise usage(f"--images {path}: there is no image in that folder ({', '.join(SUFFIXES)})")

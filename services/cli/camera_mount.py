@@ -24,6 +24,7 @@ from services.vision.boards import Sighting
 from services.vision.calibration.shots import one_of
 from services.vision.calibration.touches import FEWEST_TOUCHES, TouchFit, fit_touches, spread_points
 from services.vision.camera_model import CameraModel, model_of
+from services.vision.other_boards import other_board, remedy
 from services.vision.rigid import Array
 
 if TYPE_CHECKING:
@@ -66,8 +67,10 @@ def run(options: Options) -> ExitCode:
     _ask("now lead the arm out of the image")
     with connect(robot) as session:
         model = model_of(info_of(session, camera.name))
-        images = zip(range(IMAGES), from_bus(session, camera.name), strict=False)
-        found = [board.find(image, model) for _, image in images]
+        images = [image for _, image in zip(range(IMAGES), from_bus(session, camera.name), strict=False)]
+        found = [board.find(image, model) for image in images]
+        if not any(found) and (other := other_board(images[-1], board) if images else ""):
+            raise CommandError(f"the image shows {other}, and not the board of this command: {remedy(board)}")
     fit = _fit(points[chosen], touched, found, model)
     for index in fit.outliers:
         off = 1e3 * fit.errors[index]

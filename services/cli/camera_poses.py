@@ -31,6 +31,7 @@ from services.vision.calibration.poses import Belief, Chosen, choose_poses
 from services.vision.calibration.reprojection import BoardView, Carrier
 from services.vision.calibration.shots import one_of, without_hidden
 from services.vision.camera_model import model_of
+from services.vision.other_boards import other_board, remedy
 from services.vision.rigid import Array, from_transform, rigid, to_transform
 
 if TYPE_CHECKING:
@@ -256,7 +257,11 @@ def drive(arm: Arm, eye: Eye, task: Task, poses: Sequence[Array]) -> tuple[list[
 def _look(eye: Eye, task: Task) -> Sighting:
     """The board as it is seen from here; ValueError where it is not."""
     model = model_of(eye.info)
-    seen = one_of([task.board.find(image, model) for image in eye.images(IMAGES)], task.fewest)
+    images = list(eye.images(IMAGES))
+    found = [task.board.find(image, model) for image in images]
+    if not any(found) and (other := other_board(images[-1], task.board) if images else ""):
+        raise ValueError(f"the image shows {other}, and not the board of this command ({remedy(task.board)}),")
+    seen = one_of(found, task.fewest)
     return without_hidden(seen, model)
 
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from enum import IntEnum
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -34,6 +35,17 @@ class CommandError(Exception):
 def usage(message: str) -> CommandError:
     """The error of a command line that cannot be understood; exit code 2."""
     return CommandError(message, ExitCode.USAGE)
+
+
+def require_folder(path: Path, owner: str) -> None:
+    """Raises `CommandError` where `path` is no folder, with the one beside it that is most alike."""
+    if path.is_dir():
+        return
+    if path.exists():
+        raise usage(f"{owner}: {path} is no folder")
+    beside = [each.name for each in path.parent.iterdir() if each.is_dir()] if path.parent.is_dir() else []
+    guess = nearest(path.name, beside)
+    raise usage(f"{owner}: there is no folder {path}" + (f": did you mean {path.parent / guess}?" if guess else ""))
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:

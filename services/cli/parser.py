@@ -159,7 +159,8 @@ def comma_hint(text: str) -> str:
         return ""
     before, after, rest = found.groups()
     whole = f" or {before}{after}{rest}" if len(after) == 3 and before.lstrip("+-") not in ("", "0") else ""
-    return f"the decimal sign is a point: did you mean {before if before[-1:].isdigit() else before + '0'}.{after}{rest}{whole}?"
+    units = before if before[-1:].isdigit() else f"{before}0"
+    return f"the decimal sign is a point: did you mean {units}.{after}{rest}{whole}?"
 
 
 def positive_number(text: str) -> float:

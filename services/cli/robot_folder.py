@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from schemas.text_file import read_text
-from services.cli.errors import CommandError, ExitCode, usage
+from services.cli.errors import CommandError, ExitCode, require_folder, usage
 from services.cli.import_robot import add_xacro
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.text_table import table
@@ -138,6 +138,7 @@ def shapes(folder: Path, within: float | None, most: int, links: Sequence[str], 
 
 
 def _fitted(folder: Path, *options: str) -> ExitCode:
+    require_folder(folder, str(folder))
     ended = subprocess.run([sys.executable, "-m", FIT, *options, "--", str(folder)], check=False)
     return ExitCode.OK if ended.returncode == 0 else ExitCode.FAILED
 
@@ -146,6 +147,8 @@ def print_matrix(folder: Path, write: bool, always_within: float | None) -> Exit
     """Prints the pairs that sampling finds and the changes of the SRDF; changes it if `write`. `always_within` [m]."""
     from services.arm.kinematics.collision_matrix import collision_matrix  # slow to load: coal
     from services.arm.model.description import load_arm
+
+    require_folder(folder, str(folder))
     from services.arm.model.srdf_edit import with_pairs
 
     try:

@@ -152,3 +152,38 @@ def test_the_picture_on_a_terminal_has_two_points_a_character() -> None:
     assert all(line.count("▀") == 32 for line in lines)
     assert "38;2;255;0;0" in lines[0]
     assert "38;2;255;0;0" not in lines[-1]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["camera", "calibrate", "--images", "{}/shot"], ["camera", "print", "chess", "--to", "{}/shot/board.pdf"],
+        ["camera", "view", "--save", "{}/shot/table.jpg"], ["collision", "fit", "{}/shot"],
+        ["collision", "matrix", "{}/shot"],
+    ],
+)  # fmt: skip
+def test_a_folder_that_is_not_there_is_said_with_the_one_that_is(words, tmp_path, cell, devices, capsys) -> None:
+    (tmp_path / "shots").mkdir()
+    assert run([word.format(tmp_path) for word in words]) is ExitCode.USAGE
+    said = capsys.readouterr().err
+    assert f"there is no folder {tmp_path}/shot: did you mean {tmp_path}/shots?" in said
+    (tmp_path / "shot").write_text("")
+    assert run([word.format(tmp_path) for word in words]) is ExitCode.USAGE
+    assert "is no folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("board", ["a chessboard without tags", "tags of DICT_4X4_50"])
+def test_shots_of_another_board_are_said_to_be_that(board, tmp_path, cell, devices, capsys) -> None:
+    shot = np.full((480, 640), 255, np.uint8)
+    if board.startswith("tags"):
+        dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+        shot[100:200, 100:200] = cv2.aruco.generateImageMarker(dictionary, 3, 100)
+    else:
+        squares = np.add.outer(np.arange(6), np.arange(8)) % 2
+        shot[60:360, 100:500] = np.kron(squares, np.ones((50, 50))) * 255
+    for number in range(2):
+        cv2.imwrite(str(tmp_path / f"{number}.png"), shot)
+    assert run(["camera", "calibrate", "--images", str(tmp_path)]) is ExitCode.FAILED
+    said = capsys.readouterr().out
+    assert said.count(f"the image shows {board}") == 1
+    assert "print `gemelo camera print chess`" in said
