@@ -1,4 +1,4 @@
-"""What an image shows in the place of a board of ours: another board, by the name that a person knows it by."""
+"""Another board in the place of ours: what an image shows, by the name that a person knows it by."""
 
 from __future__ import annotations
 
