@@ -1,4 +1,4 @@
-"""Whatever fails inside a handler of a service: who asked is answered, the service goes on, and its state is as before.
+"""Failures inside the handlers of services: who asked is answered, the service goes on, and its state is as before.
 
 Every handler of every service of the simulated twin, cameras included, is made to fail: where it begins, and at each
 message that it encodes.
