@@ -62,6 +62,7 @@ PartOf={target}
 [Service]
 Type=oneshot
 RemainAfterExit=yes
+TimeoutStartSec=30
 ExecStart=/usr/sbin/nft -f {file}
 ExecStop=/usr/sbin/nft delete table inet gemelo
 
