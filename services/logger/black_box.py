@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from schemas.message import Message
+from schemas.message import Message, encode
 from schemas.scene import PlanningScene
 from schemas.topics import Delivery, Topic
 from services.logger.core import is_past_mesh
@@ -29,12 +29,14 @@ from services.recordings.incidents import (
 from services.recordings.mcap_file import McapFile
 from services.recordings.reader import BadRecording, RecordingReader
 from services.recordings.view_layout import layout_metadata, layout_of
+from services.runtime.bus.wire import MAX_PAYLOAD_OF
 from services.runtime.process.own_files import own_folder
 
 SECOND = 1_000_000_000  # [ns]
 AFTERWARDS = 3 * SECOND  # [ns] that are waited for what follows an incident
 APART = 10 * SECOND  # [ns] between two files at least: what happens in between is in the second one
 TOGETHER = SECOND  # [ns] in which the gateway says what happened after it has aborted the goal for it
+MOST_BYTES = 64_000_000  # of messages that may be large; chosen: two plans of the most points, or a hundred usual ones
 MOST = 100_000  # messages: 60 s of an arm in motion are some 30,000
 
 
@@ -45,6 +47,8 @@ class BlackBox:
     seconds: float = 60.0
     _watch: IncidentWatch = field(default_factory=IncidentWatch, init=False)
     _entries: deque[Entry] = field(default_factory=lambda: deque(maxlen=MOST), init=False)
+    _sizes: deque[int] = field(default_factory=deque, init=False)  # [bytes] of each, 0 of what cannot be large
+    _size: int = field(default=0, init=False)  # [bytes] of all
     _latched: dict[tuple[str, str], Entry] = field(default_factory=dict, init=False)  # that have left `_entries`
     _pending: Trigger | None = field(default=None, init=False)
     _due: int = field(default=0, init=False)  # [ns] when the pending one is told
@@ -52,9 +56,12 @@ class BlackBox:
 
     def on_message(self, topic: Topic[Any], message: Message, now: int) -> None:
         """Keeps one message that came at `now` [ns] UNIX."""
-        if len(self._entries) == MOST:
+        size = _size_of(message)
+        while self._entries and (len(self._entries) == MOST or (size and self._size + size > MOST_BYTES)):
             self._forget_oldest()
         self._entries.append(Entry(topic, message, now))
+        self._sizes.append(size)
+        self._size += size
         self._take(self._watch.on_message(topic, message, now))
 
     @property
@@ -95,11 +102,17 @@ class BlackBox:
 
     def _forget_oldest(self) -> None:
         entry = self._entries.popleft()
+        self._size -= self._sizes.popleft()
         if entry.topic.delivery is Delivery.LATCHED:
             self._latched[entry.topic.key, getattr(entry.message, "node", "")] = entry
         if isinstance(entry.message, PlanningScene):  # from here on it is the oldest scene of the minute
             scene = entry.message
             self._latched = {key: each for key, each in self._latched.items() if not is_past_mesh(key[0], scene)}
+
+
+def _size_of(message: Message) -> int:
+    """[bytes] of a message of a kind that may be large, 0 of any other."""
+    return len(encode(message)) if type(message).__name__ in MAX_PAYLOAD_OF else 0
 
 
 class BlackBoxWriter:

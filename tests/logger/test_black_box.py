@@ -54,7 +54,7 @@ from schemas.topics import (
     STOPPING_DISTANCE,
 )
 from services.arm.model.description import load_arm
-from services.logger.black_box import MOST, BlackBox, BlackBoxWriter
+from services.logger.black_box import MOST, MOST_BYTES, BlackBox, BlackBoxWriter
 from services.logger.incident_story import LONGEST, brief
 from services.recordings.incidents import Incident, IncidentKind, black_boxes, read_incident
 from services.recordings.reader import BadRecording
@@ -368,6 +368,18 @@ def test_its_memory_is_bounded(rig):
     ((_, entries),) = rig.saved
     assert len(entries) == MOST + 1
     assert entries[0].topic is DESCRIPTION
+
+
+def test_large_messages_push_out_the_oldest_before_they_fill_the_memory(rig):
+    large = DESCRIPTION.message(urdf="x" * (MOST_BYTES // 10))
+    for _ in range(25):
+        rig.say(DESCRIPTION, large)
+        rig.wait(1.0)
+    rig.state(DeviceMode.RUN)
+    rig.state(DeviceMode.FAULT, fault=DeviceFault.INTERNAL)
+    rig.wait(3.0)
+    ((_, entries),) = rig.saved
+    assert 9 <= sum(entry.topic is DESCRIPTION for entry in entries) <= 11
 
 
 def test_a_story_is_bounded_repeats_nothing_and_leaves_questions_out(rig):
