@@ -137,13 +137,13 @@ class Scene:
         at: Vector = ORIGIN,
         orientation: Vector = UPRIGHT,
         *,
-        scale: float = 1.0,
+        scale: float | None = None,
         frame: str = "",
         attach: bool = False,
         touch: Iterable[str] = (),
         padding: float = 0.0,
     ) -> None:
-        """The STL file `path`, `scale` metres to its unit (0.001 where it is drawn in mm); the rest as in `add_box`.
+        """The STL file `path`, `scale` metres to its unit (0.001 where it is in mm) [1]; the rest as in `add_box`.
 
         >>> arm.scene.add_mesh("vice", "tests/gemelo/wedge.stl", at=(0.0, 0.5, 0.0), scale=0.001)
         >>> arm.scene.remove("vice")

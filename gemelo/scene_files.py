@@ -14,13 +14,15 @@ from schemas.text_file import read_text
 from services.runtime.deployment import project_root
 
 LARGEST_MESH = 10.0  # [m]; what is larger was drawn in mm
+LARGEST_UNSAID = 3.0  # [m] of a mesh for which no scale is given: larger than what such arms reach
+OTHER_UNITS = "in mm, cm or inches, give scale=0.001, 0.01 or 0.0254; if it is so large, scale=1"
 
 
-def load_mesh(path: str | Path, scale: float = 1.0) -> MeshShape:
-    """The shape of an STL file, `scale` [m] to its unit: by its path in the project, else by its content.
+def load_mesh(path: str | Path, scale: float | None = None) -> MeshShape:
+    """The shape of an STL file, `scale` [m] to its unit, else in metres: by its path in the project, or by its content.
 
     A path inside the project is found by every process there. Raises `BadArgument` where the file cannot be read, or
-    would be longer than 10 m.
+    would be longer than 10 m; than 3 m where no scale is given, since it may be in another unit.
 
     >>> gemelo.load_mesh("tests/gemelo/wedge.stl", scale=0.001).scale
     (0.001, 0.001, 0.001)
@@ -32,14 +34,15 @@ def load_mesh(path: str | Path, scale: float = 1.0) -> MeshShape:
         content = file.read_bytes()
     except OSError as error:
         raise BadArgument(f'"{path}" cannot be read: {error.strerror}') from error
-    _require_size(file, content, number("scale", scale))
+    _require_size(file, content, None if scale is None else number("scale", scale))
+    metres = 1.0 if scale is None else scale
     inside = file.resolve()
     if inside.is_relative_to(project_root()):
-        return MeshShape(path=str(inside.relative_to(project_root())), scale=(scale,) * 3)
-    return MeshShape(data=content, scale=(scale,) * 3)
+        return MeshShape(path=str(inside.relative_to(project_root())), scale=(metres,) * 3)
+    return MeshShape(data=content, scale=(metres,) * 3)
 
 
-def _require_size(path: Path, content: bytes, scale: float) -> None:
+def _require_size(path: Path, content: bytes, scale: float | None) -> None:
     """Refuses what is far too large; what is no mesh at all the planner says."""
     from services.arm.stl import BadStl, read_stl  # numpy takes half of the time of `import gemelo`
 
@@ -47,9 +50,11 @@ def _require_size(path: Path, content: bytes, scale: float) -> None:
         vertices = read_stl(content).vertices
     except BadStl:
         return
-    longest = scale * float((vertices.max(axis=0) - vertices.min(axis=0)).max())
+    longest = (1.0 if scale is None else scale) * float((vertices.max(axis=0) - vertices.min(axis=0)).max())
     if longest > LARGEST_MESH:
         raise BadArgument(f'"{path}" would be {longest:.4g} m long', "if it is drawn in mm, give scale=0.001")
+    if scale is None and longest > LARGEST_UNSAID:
+        raise BadArgument(f'"{path}" would be {longest:.4g} m long', OTHER_UNITS)
 
 
 def write_scene(scene: PlanningScene, path: Path) -> None:

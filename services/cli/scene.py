@@ -54,7 +54,7 @@ def shape_options(parser: Parser) -> None:
     shape.add_argument("--cylinder", nargs=2, metavar=("RADIUS", "LENGTH"), help="along its z axis")
     shape.add_argument("--plane", action="store_true", help="all below its z = 0 is solid")
     shape.add_argument("--mesh", metavar="STL", help="an STL file")
-    parser.add_argument("--scale", type=positive_number, default=1.0, help="metres per unit of the STL file")
+    parser.add_argument("--scale", type=positive_number, default=None, help="metres per unit of the STL file [1]")
 
 
 def place_options(parser: Parser, required: bool = False) -> None:

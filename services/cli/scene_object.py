@@ -43,12 +43,12 @@ def shape_of(options: Options) -> Shape:
     return PlaneShape()
 
 
-def _mesh_of(path: str, scale: float) -> MeshShape:
+def _mesh_of(path: str, scale: float | None) -> MeshShape:
     """The mesh of an STL file, `scale` [m] to its unit; raises `CommandError` where it cannot be."""
     try:
         return gemelo.load_mesh(path, scale)
     except gemelo.BadArgument as error:
-        remedy = ": if it is drawn in mm, give --scale 0.001" if error.remedy else ""
+        remedy = f": {error.remedy.replace('scale=', '--scale ')}" if error.remedy else ""
         raise usage(f"{error.reason}{remedy}") from error
 
 

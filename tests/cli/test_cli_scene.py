@@ -122,6 +122,17 @@ def test_a_mesh_in_millimetres_is_noticed_and_its_scale_is_listed(scene, tmp_pat
     assert f"mesh of {path.stat().st_size} bytes, scale 0.001" in capsys.readouterr().out
 
 
+def test_a_mesh_that_may_be_in_centimetres_is_asked_for(scene, tmp_path, capsys):
+    path = tmp_path / "plate.stl"
+    path.write_text(TRIANGLE.replace("1", "8"))
+    assert said(f"scene add plate --mesh {path}") is ExitCode.USAGE
+    wanted = "would be 8 m long: in mm, cm or inches, give --scale 0.001, 0.01 or 0.0254; if it is so large, --scale 1"
+    assert wanted in capsys.readouterr().err
+    for scale in ("0.01", "1"):
+        assert said(f"scene add plate --mesh {path} --scale {scale}") is ExitCode.OK
+        assert scene().objects[0].shape.scale == (float(scale),) * 3
+
+
 def test_an_object_is_carried_moved_and_let_go(scene):
     said("scene add cup --sphere 20mm --at 0.3 0 0.1")
     assert said("scene attach cup efector_link --touch antebrazo_link brazo_link") is ExitCode.OK

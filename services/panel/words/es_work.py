@@ -76,6 +76,8 @@ _SCENE: dict[str, str] = {
     'object "{name}": mesh {path} cannot be read: {error}': "«{name}»: la malla {path} no se puede leer ({error}).",
     '"{path}" would be {size} m long: if it is drawn in mm, give scale=0.001': "«{path}» mediría {size} m: si está "
     "dibujado en mm, elija mm.",
+    '"{path}" would be {size} m long: in mm, cm or inches, give scale=0.001, 0.01 or 0.0254; if it is so large, '
+    "scale=1": "«{path}» mediría {size} m: elija su unidad.",
     '"{path}" would be {size} m long': "«{path}» mediría {size} m.",
     'there is no file "{path}"': "No hay un archivo «{path}».",
     '"{path}" cannot be read: {error}': "«{path}» no se puede leer ({error}).",
