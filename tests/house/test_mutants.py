@@ -1,4 +1,4 @@
-"""What `tests.house.mutants` draws: the same for the same seed, as many of each room, and each is another program."""
+"""The mutations that `tests.house.mutants` draws: the same for a seed, as many of each room, each another program."""
 
 from __future__ import annotations
 

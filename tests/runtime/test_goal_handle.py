@@ -1,4 +1,4 @@
-"""What a goal's client asks of its server: each thing once, until there is an answer."""
+"""The requests of a goal's client to its server: each is sent once, until there is an answer."""
 
 from __future__ import annotations
 

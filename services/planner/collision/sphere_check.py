@@ -159,7 +159,7 @@ class CountedInPython(threading.Event):
 
 @where_built(CountedInPython)
 def counted_time(seconds_per_question: float) -> CountedTime:
-    """From 0 on; the native planner's search counts its own questions too, where that is built."""
+    """A time [s] that begins at 0, and goes on by `seconds_per_question` with each question, of the native search too."""
     return compiled.CancelFlag(seconds_per_question)
 
 
