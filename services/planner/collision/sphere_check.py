@@ -159,7 +159,7 @@ class CountedInPython(threading.Event):
 
 @where_built(CountedInPython)
 def counted_time(seconds_per_question: float) -> CountedTime:
-    """A time [s] that begins at 0, and goes on by `seconds_per_question` with each question, of the native search too."""
+    """A time [s] from 0 on, of `seconds_per_question` for each question, those of the native search among them."""
     return compiled.CancelFlag(seconds_per_question)
 
 
