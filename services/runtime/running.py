@@ -46,8 +46,8 @@ def find_deployment(robot: str = "", environ: Mapping[str, str] | None = None, *
     base, named = _as_chosen(robot, environ)
     nodes = running_robots(base.router) if ask else {}
     name = named or _meant([each for each in nodes if GATEWAY in nodes[each]] or nodes, base, environ)
-    if name not in nodes:
-        return base
+    if name not in nodes or (environ.get(CONFIG) and named == robot_name(base)):
+        return base  # a deployment that was named says its own files, as on another host or for another user
     info = ask_files(base.router, name, nodes[name])
     return _of_robot(base, name) if info is None else with_files(base, info, environ)
 

@@ -119,6 +119,19 @@ def test_a_robot_that_is_named_is_never_exchanged_for_the_one_that_runs(router, 
     assert "has no rm1, but parol6" in capsys.readouterr().err
 
 
+def test_a_deployment_that_is_named_says_its_own_folders_and_cell(router, tmp_path, monkeypatch):
+    """As of a person on a host of a site, who may not write where its services do."""
+    own = tmp_path / "own.toml"
+    own.write_text(
+        f'robot = "urdf/rm1"\ncell = "{CELL_FILE}"\n[router]\nport = {router.port}\n'
+        f'[paths]\nrun = "{tmp_path}/mine"\nout = "{tmp_path}/mine"\n'
+    )
+    monkeypatch.setenv("GEMELO_CONFIG", str(own))
+    with twin(router, "rm1", deployed(router, ROOT / "urdf/rm1")):
+        found = load_robot().deployment
+    assert (found.paths.run, found.paths.out, found.cell) == (f"{tmp_path}/mine", f"{tmp_path}/mine", str(CELL_FILE))
+
+
 def test_a_robot_whose_folder_is_elsewhere_is_named_by_its_name(router, tmp_path, monkeypatch):
     folder = tmp_path / "left arm"
     shutil.copytree(ROOT / "urdf/rm1", folder)
