@@ -143,7 +143,7 @@ def test_check_and_import_find_the_same(
             source, output = ALL[name](folder, Random(number)), folder / "urdf"
             checked = run(["check", str(source)])
             said = capsys.readouterr().out
-            imported = run(["import", str(source), "--yes", "--name", "arm", "--output", str(output)])
+            imported = run(["import", str(source), "--yes", "--output", str(output)])
             found = findings(capsys.readouterr().out, output / "arm")
             assert found == findings(said.replace(str(source), str(output / "arm")), output / "arm")
             assert checked is imported
