@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -13,14 +14,18 @@ import pytest
 
 import gemelo
 from schemas import system
+from schemas.topics import camera_truth
 from services.runtime.endpoints import parameter_request, parameters_request
 from services.stack.stack import Stack
 from tests.simulated import put_right
 
 READY = 60.0  # [s] in which a process that a test has killed is there again
+CAMERA = "overhead"  # of the sample cell
+LAID_BACK = 1e-3  # [m] by which a thing that nobody has carried may differ from where it lay
 LETS_GO = 6.0  # [s] in which control, motions and processes of a client that has just ended are over
 
 Values = dict[tuple[str, str], system.ParameterValue]
+Places = dict[str, tuple[float, ...]]  # [m] of things in the base frame
 
 
 class Before(NamedTuple):
@@ -38,8 +43,13 @@ class Reset:
         self._stack = stack
         self._arm = self._connected()
         self._parameters: Values = {}
+        self._truth = self._arm.node.latest(camera_truth(CAMERA)) if "camera" in stack.processes else None
+        self._laid: Places = {}
         try:
             self._put_right()
+            if self._truth is not None:
+                assert self._becomes(lambda: bool(self._places()), READY), f"nothing on {camera_truth(CAMERA).key}"
+                self._laid = self._places()
             self._parameters = self._read_parameters()
         except BaseException:
             self.close()
@@ -50,7 +60,11 @@ class Reset:
         self._arm.close()
 
     def before(self) -> Before:
-        """Leads the arm home; to be given to `after`."""
+        """Leads the arm home, with the cell's things where they lay; to be given to `after`."""
+        if not self._lie_there():
+            self._stack.kill("camera")  # a virtual one that starts anew has them where the cell file says
+            assert self._becomes(self._lie_there, READY), f"things are not back: {self._places()}, not {self._laid}"
+            self._stack.wait_ready(READY)
         self._stand(self._arm.states["home"])
         return Before(
             frozenset(each.pid for each in psutil.Process().children()),
@@ -143,6 +157,14 @@ class Reset:
         """Without a word: armed, referenced, at full speed, with an empty scene."""
         self._stack.wait_ready(READY)
         put_right(self._arm)
+
+    def _places(self) -> Places:
+        newest = self._truth.message if self._truth is not None else None
+        return {each.name: tuple(each.base_from_thing.translation) for each in newest.items} if newest else {}
+
+    def _lie_there(self) -> bool:
+        there = self._places()
+        return all(math.dist(there.get(name, (math.inf,) * 3), at) < LAID_BACK for name, at in self._laid.items())
 
     def _stand(self, where: dict[str, float]) -> None:
         arm = self._arm
