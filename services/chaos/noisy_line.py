@@ -95,7 +95,7 @@ class NoisyLine:
 
 
 def spoiled(data: bytes, random: Random, losing: float, garbling: float) -> bytes:
-    """A piece after the line: with the chance `losing` without a run of its bytes, with `garbling` one bit changed."""
+    """A piece after the line: the share `losing` of pieces loses some bytes, the share `garbling` has a bit changed."""
     changed = bytearray(data)
     if changed and random.random() < losing:
         place = random.randrange(len(changed))

@@ -1,4 +1,4 @@
-"""Whether the router still knows a session that takes itself for connected.
+"""Watch over a session that takes itself for connected: does the router still know it?
 
 After a stand of the machine, in which both ends give a link up in the same instant, a session sometimes comes back with
 a link that lives and is nothing to the router: it hears nobody, nobody hears it, and nothing tells it so (Zenoh
@@ -36,6 +36,11 @@ class Recognition:
         self._round += 1
         self._is_asking, self._since, self._is_denied = False, None, False
         self._unserved_since = None
+
+    @property
+    def is_certain(self) -> bool:
+        """True once the router has shown that it knows the session, and the one for urgent keys: it may forget both."""
+        return self._was_known and self._was_served
 
     def ask(self, session: zenoh.Session, token: str) -> None:
         """Asks for `token`, which this session has declared, unless a question is under way."""
