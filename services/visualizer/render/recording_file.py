@@ -5,7 +5,9 @@ Rerun's writer ends at the first write that fails, and what it has written by th
 
 from __future__ import annotations
 
+import ctypes
 import itertools
+import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -17,6 +19,7 @@ from services.runtime.process.unwritten import RETRY
 from services.visualizer.render.sink import APPLICATION, Sink
 
 TO_FLUSH = 1.0  # [s] for the disk to take what waits; chosen: one that is slower has failed
+ROOM = 1_000_000  # [bytes] that a disk must take before a file is begun; chosen: more than the first second
 FLUSHED = 5.0  # [s] between two looks whether the writer lives; chosen: what a full disk costs of the past
 
 
@@ -50,14 +53,17 @@ class RecordingFile:
 
     def _open(self) -> bool:
         path = self._free_path() if self._has_begun else self._path
-        stream = rr.RecordingStream(APPLICATION, recording_id=self._recording_id)
+        stream: rr.RecordingStream | None = None
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
+            require_room(path.parent)
             make_own(path)
+            stream = rr.RecordingStream(APPLICATION, recording_id=self._recording_id)
             stream.save(str(path))
             sink = self._make_sink(stream)
             stream.flush(timeout_sec=TO_FLUSH)
         except (OSError, RuntimeError) as error:
+            keep_for_ever(stream)
             if self._has_begun:
                 with suppress(OSError):
                     path.unlink(missing_ok=True)
@@ -73,6 +79,7 @@ class RecordingFile:
             self._stream.flush(timeout_sec=TO_FLUSH)
         except RuntimeError as error:
             self.problem = f"the recording ends, and goes on in a file beside it as soon as its disk takes one: {error}"
+            keep_for_ever(self._stream)
             self._stream, self.sink = None, None
             return False
         return True
@@ -81,3 +88,19 @@ class RecordingFile:
         """`twin-2.rrd` beside `twin.rrd`, or the next that is not there."""
         numbered = (self._path.with_stem(f"{self._path.stem}-{number}") for number in itertools.count(2))
         return next(path for path in numbered if not path.exists())
+
+
+def require_room(folder: Path) -> None:
+    """Raises OSError where `folder` does not take `ROOM` bytes now."""
+    with tempfile.TemporaryFile(dir=folder) as file:
+        file.write(bytes(ROOM))
+        file.flush()
+
+
+def keep_for_ever(stream: rr.RecordingStream | None) -> None:
+    """Never frees a stream whose writer has ended: that may wait without end for a word of the writer (Rerun 0.41).
+
+    There are few of them, as each had `ROOM` before.
+    """
+    if stream is not None:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(stream))
