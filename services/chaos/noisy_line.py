@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import select
 import threading
+import time
 import tty
 from contextlib import suppress
 from pathlib import Path
@@ -27,6 +28,7 @@ class NoisyLine:
         self._path, self._random = path, Random(seed)
         self._board = os.open(os.readlink(path), os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         self._near, self._far = -1, -1
+        self._turns = 0
         self._lock = threading.Lock()
         self._wake, self._asleep = os.pipe()
         self.plug()
@@ -59,6 +61,9 @@ class NoisyLine:
                 if end >= 0:
                     os.close(end)
             self._near, self._far = -1, -1
+        turns = self._turns
+        while self._thread.is_alive() and self._turns == turns:  # a `select` that waits for a port keeps it open
+            time.sleep(0.005)
 
     def heal(self) -> None:
         """Everything passes as it should again."""
@@ -76,6 +81,7 @@ class NoisyLine:
     def _run(self) -> None:
         poll = 0.05  # [s] until an unplugged port that is plugged in again is read
         while True:
+            self._turns += 1
             near = self._near
             ends = [self._board, self._wake, *([near] if near >= 0 else [])]
             with suppress(OSError, ValueError):  # unplugged meanwhile

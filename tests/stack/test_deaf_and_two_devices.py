@@ -49,7 +49,11 @@ class DevicesWay:
         with suppress(OSError):
             while True:
                 device, _ = self._server.accept()
-                broker = socket.create_connection(("127.0.0.1", self._broker))
+                try:
+                    broker = socket.create_connection(("127.0.0.1", self._broker))
+                except OSError:  # it starts, or has ended
+                    device.close()
+                    continue
                 self._open += [device, broker]
                 threading.Thread(target=self._up, args=(device, broker), daemon=True).start()
                 threading.Thread(target=self._down, args=(broker, device), daemon=True).start()
