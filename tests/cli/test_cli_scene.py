@@ -23,6 +23,7 @@ from schemas.scene import (
     SceneObject,
     SphereShape,
 )
+from schemas.scene_meshes import mesh_digest
 from schemas.topics import JOINT_STATES, SCENE
 from services.cli import scene as scene_module
 from services.cli.errors import ExitCode
@@ -108,7 +109,9 @@ def test_every_shape_can_be_added_and_given_to_another(scene, words, shape):
 def test_a_mesh_outside_the_project_travels_by_its_content(scene, tmp_path):
     (tmp_path / "plate.stl").write_text(TRIANGLE)
     assert said(f"scene add plate --mesh {tmp_path / 'plate.stl'} --scale 0.001") is ExitCode.OK
-    assert scene().objects[0].shape == MeshShape(data=TRIANGLE.encode(), scale=(0.001, 0.001, 0.001))
+    content = TRIANGLE.encode()
+    shape = MeshShape(digest=mesh_digest(content), size=len(content), scale=(0.001, 0.001, 0.001))
+    assert scene().objects[0].shape == shape
 
 
 def test_a_mesh_in_millimetres_is_noticed_and_its_scale_is_listed(scene, tmp_path, capsys):

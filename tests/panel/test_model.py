@@ -20,7 +20,7 @@ from gemelo.programs import AnyStep, Program, Repeat, RunStatus, StepPath, Wait
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceMode, DeviceState
 from services.arm.model.description import ArmDescription, load_arm
-from services.panel.model.availability import CHECKS, reasons
+from services.panel.model.availability import CHECKS
 from services.panel.model.goal import GoalSolver
 from services.panel.model.problems import Problem, problem_of
 from services.panel.model.teaching import deleted, inserted, shifted
@@ -89,18 +89,6 @@ def test_what_cannot_be_done_now_says_why():
     assert CHECKS["move"](replace(READY, mode=DeviceMode.ESTOP)) == ("in_fault", "ESTOP")
     assert CHECKS["reset"](READY) == ("no_fault", "")
     assert CHECKS["reset"](replace(READY, mode=DeviceMode.FAULT)) is None
-
-
-def test_execute_is_for_a_plan_that_is_there(rm1: ArmDescription):
-    """On an arm that only its description and the state of its device make."""
-    arm = SimpleNamespace(description=rm1, node=SimpleNamespace(address="panel"))
-    readings = SimpleNamespace(state=READY, status=None, control=None)
-    assert reasons(arm, readings, has_plan=False)["execute"] == ("nothing_planned", "")
-    assert reasons(arm, readings, has_plan=True)["execute"] is None
-    readings.state = replace(READY, armed=False)
-    assert reasons(arm, readings, has_plan=False)["execute"] == ("drivers_off", "")
-    for language in ("en", "es"):
-        assert Words(language).reason(("nothing_planned", "")) is not None
 
 
 @pytest.mark.parametrize(

@@ -15,17 +15,16 @@ OF_THE_HOLDER = ("move", "jog", "arm", "home", "reference", "reset", "resume", "
 FAULTY = (DeviceMode.FAULT, DeviceMode.ESTOP)
 
 
-def reasons(arm: gemelo.Arm, readings: Readings, *, has_plan: bool) -> dict[str, Reason]:
-    """By action: move, execute, jog, arm, disarm, home, reference, reset, hold, resume, output, grip, inject."""
+def reasons(arm: gemelo.Arm, readings: Readings) -> dict[str, Reason]:
+    """By action: move, jog, arm, disarm, home, reference, reset, hold, resume, output, grip, inject."""
     state = readings.state
     if state is None:
         gone: Reason = ("device_silent", "")
-        return dict.fromkeys((*CHECKS, "execute", "home", "inject"), gone)
+        return dict.fromkeys((*CHECKS, "home", "inject"), gone)
     found = {name: check(state) for name, check in CHECKS.items()}
     found["home"] = _home(arm, state)
     if (other := other_holder(arm, readings)) is not None:
         found |= dict.fromkeys(OF_THE_HOLDER, ("other_in_control", other))
-    found["execute"] = found["move"] or (None if has_plan else ("nothing_planned", ""))
     found["inject"] = None if readings.status is not None and readings.status.virtual else ("not_virtual", "")
     return found
 

@@ -73,9 +73,7 @@ class Page:
         is wanted."""
         if self.built != self.wanted:
             self._rebuild(self.wanted)
-        motions = self._operator.motions
-        has_plan = motions.plan is not None or motions.is_planning  # one that is made is executed when it is there
-        self.kit.refresh(reasons(self._operator.arm, readings, has_plan=has_plan))
+        self.kit.refresh(reasons(self._operator.arm, readings))
         is_held = readings.state is not None and readings.state.mode is DeviceMode.HOLD
         set_if_new(self.hold, "visible", not is_held)
         set_if_new(self.resume, "visible", is_held)

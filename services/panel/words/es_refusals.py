@@ -36,6 +36,11 @@ REFUSALS: dict[str, str] = {
     "«RRTConnect», que mira las formas exactas.",
     "clearance_own": "Se pide que queden {value} libres; lo más cercano que se puede pedir es {limit}.",
     # the search for a path
+    "points": "La trayectoria tiene {value} puntos, y se siguen {limit} como mucho: divida el camino "
+    "y planifique una parte tras otra.",
+    "points_unknown": "La meta no tiene ningún punto: dele uno al menos.",
+    "size": "El plan es demasiado grande para enviarlo: divida el camino y planifique una parte tras otra.",
+    "size_unknown": "El plan es demasiado grande para enviarlo: divida el camino y planifique una parte tras otra.",
     "allowed_time": "La planificación se detuvo a los {value}; se permitían {limit}: dele más tiempo, o elija una meta "
     "más cercana.",
     "allowed_time_unknown": "No se encontró un camino en el tiempo permitido: dele más tiempo, o elija una meta más "

@@ -32,6 +32,15 @@ _SCENE: dict[str, str] = {
     '"{name}" is a link of {robot}; give the object another name': "«{name}» es un eslabón de {robot}: elija otro "
     "nombre "
     "para el objeto.",
+    "the meshes of the scene have {size} bytes, more than {most}: simplify or remove some": "Las mallas de la escena "
+    "suman {size} bytes, más de {most}: simplifique o quite alguna.",
+    'object "{name}": nothing is known of its mesh {digest}; add it with its file': "No se conoce la malla de «{name}» "
+    "({digest}): añada el objeto con su archivo.",
+    "the scene is too large: {size}": "La escena es demasiado grande ({size}).",
+    'object "{name}": its mesh has {size} bytes, more than {most}; simplify it, or write it as a binary STL file': "La "
+    "malla de «{name}» tiene {size} bytes, más de {most}: simplifíquela, o guárdela como STL binario.",
+    "nothing heard of {topic} for {time} s: was the mesh removed meanwhile?": "No llega la malla ({topic}) desde hace "
+    "{time} s: ¿se quitó el objeto entretanto?",
     'the scene has two objects "{name}"; give one of them another name': "La escena tiene dos objetos «{name}»: "
     "cambie el "
     "nombre de uno.",
@@ -283,11 +292,15 @@ _SILENT: dict[str, str] = {
     "nothing heard of {key} for {time} s: is {server} running? `gemelo node list`": "No se oye {key} desde hace "
     "{time} s: "
     "¿está en marcha {server}?",
+    "the motion before was to stop, but did not say within {time} s that it rests": "El movimiento anterior debía "
+    "parar, y no dijo en {time} s que el brazo esté quieto.",
     "the arm was told to stop, but did not say within {time} s that it rests": "Se le dijo al brazo que parase, y no "
     "dijo "
     "en {time} s que esté quieto.",
     "this connection is closed: call gemelo.connect() anew": "La conexión se cerró: recargue la página.",
     "the connection has ended: {error}": "La conexión terminó ({error}): recargue la página.",
+    "{key}: {size} bytes, and {whose} are waiting already: at most {most}; ask again after their answers": "Esperan "
+    "demasiados datos a la vez, más de {most} bytes: pruebe de nuevo en un momento.",
     "{key}: {count} requests are waiting already": "Se piden demasiadas cosas a la vez: espere un momento.",
     "{key}: {count} requests are waiting already, all of this client": "Se piden demasiadas cosas a la vez: espere un "
     "momento.",

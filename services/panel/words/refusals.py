@@ -126,5 +126,6 @@ SHOWN: dict[str, Show] = {
     "pulse width": _per_cent,
     "device queue": _per_cent,
     "confidence": _per_cent,
+    "points": _plain,
     "tool limit": _plain,
 }

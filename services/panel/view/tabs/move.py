@@ -41,7 +41,7 @@ class MoveTab:
             named.on_update(lambda event: self._name(event))
         ask = self._operator.motions.ask
         kit.button(words("plan"), self._operator.plan, color="blue", first=ask)
-        kit.button(words("execute"), self._operator.execute, color="green", needs="execute")
+        self.execute = kit.button(words("execute"), self._operator.execute, color="gray", needs="move")
         kit.button(words("plan_and_execute"), self._operator.plan_and_execute, color="green", needs="move", first=ask)
         kit.reasons(move=words("execute"))
         self.plan = kit.line()
@@ -71,6 +71,7 @@ class MoveTab:
         self.tool.show(goal)
         self._show_problem()
         self._show_live()
+        set_if_new(self.execute, "color", "green" if motions.plan is not None or motions.is_planning else "gray")
         if motions.version != self._plan_version or motions.is_moving or motions.is_planning:
             self._plan_version = motions.version
             set_if_new(self.plan, "content", self._plan_text())
