@@ -26,7 +26,7 @@ class Planner:
         self._tell: Callable[[JogStatus], None] = lambda status: None
         self.clock = SimpleNamespace(monotonic=lambda: self.now)
         publisher = SimpleNamespace(put=self.said.append)
-        self.node = SimpleNamespace(name="me", now=lambda: 0, publisher=lambda topic: publisher)
+        self.node = SimpleNamespace(name="me", address="me", now=lambda: 0, publisher=lambda topic: publisher)
 
     def latest(self, topic: object, on_news: Callable[[JogStatus], None]) -> None:
         self._tell = on_news

@@ -70,7 +70,7 @@ def is_led_by_its_page(person: Person, arm: gemelo.Arm) -> None:
     until(lambda: degrees(arm.joints[joint]), lambda at: abs(at - goal) < 0.06)
     person.reads("Arrived")
     assert max(abs(error) for error in arm.step_errors.values()) <= 0.5 + 1e-9
-    person.types("Speed [%]", 20)
+    person.types("Speed [%]", 5)
     person.types(f"{joint} [°]", beyond)
     person.press("Plan and execute")
     until(lambda: degrees(arm.joints[joint]), lambda at: at > goal + 1.0)
