@@ -12,6 +12,7 @@ from pathlib import Path
 
 from mcap.reader import make_reader
 
+from schemas.topics import STATISTICS
 from services.cli.errors import ExitCode
 from services.visualizer.program.rerun_program import rerun_binary
 from tests.runtime.support import until
@@ -60,6 +61,10 @@ def stop_in_a_move(stack, operator):
 
 
 def test_a_killed_planner_and_an_emergency_stop_are_told_afterwards(stack, operator, tmp_path):
+    nodes = list[str]()
+    subscription = operator.node.subscribe(STATISTICS, lambda statistics: nodes.append(statistics.node))
+    assert operator.wait_for(lambda: nodes.count("planner") > 1, 20.0), "what nobody has heard cannot be missed"
+    subscription.close()
     began = time.time_ns()
     stack.kill("planner")
     lost = next_box(stack, began)
@@ -96,7 +101,12 @@ def test_a_killed_planner_and_an_emergency_stop_are_told_afterwards(stack, opera
 
 
 def test_the_six_lines_of_the_readme_say_what_happened(stack, operator, tmp_path):
-    """Ledger, black boxes and replay, as they are printed there, on a stack whose arm has just been stopped."""
+    """Ledger, black boxes and replay, as they are printed there, on a stack whose arm has just been stopped.
+
+    In a recording of its own: strays of other tests are in the one before.
+    """
+    stack.kill("logger", signal.SIGTERM)
+    stack.wait_ready(20.0)
     stop_in_a_move(stack, operator)
     gemelo(stack, "device", "press", "release")
     gemelo(stack, "reset")
