@@ -105,8 +105,9 @@ def test_the_six_lines_of_the_readme_say_what_happened(stack, operator, tmp_path
 
     In a recording of its own: strays of other tests are in the one before.
     """
-    stack.kill("logger", signal.SIGTERM)
-    stack.wait_ready(20.0)
+    before = stack.kill("logger", signal.SIGTERM)
+    assert until(lambda: stack.pid("logger") not in (0, before), 20.0)
+    assert until(lambda: stack.is_ready("logger"), 20.0)
     stop_in_a_move(stack, operator)
     gemelo(stack, "device", "press", "release")
     gemelo(stack, "reset")
