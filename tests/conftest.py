@@ -27,6 +27,7 @@ pytest_plugins = [
     "tests.cost",
     "tests.left_out",
     "tests.stacks.counts",
+    "tests.stacks.groups",
     "tests.stacks.shared",
     "tests.stacks.browser",
     "pytester",

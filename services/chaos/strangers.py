@@ -15,10 +15,12 @@ from schemas.deployment import RouterSection
 from schemas.topics import ACTIONS, CAMERA_TOPICS, TOPICS, Delivery
 from services.mqtt.client import stop_loop
 from services.runtime.actions.keys import feedback_topic, status_topic
+from services.runtime.bus.branches import is_of_many
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.zenoh_bus import ZenohBus
 
 KEPT = 200  # frames of the wire that can be said again
+STRANGER = "stranger"  # its name where each node has a key of its own
 
 
 class WireStranger:
@@ -87,7 +89,8 @@ class BusStranger:
     def noise(self, random: Random) -> None:
         """Random bytes on every key, under its own schema's name or another."""
         for key, schema, delivery in self._keys:
-            publication = self._bus.publish(key, random.choice((schema, "", "Nonsense")), delivery)
+            writer = STRANGER if is_of_many(key) else ""  # elsewhere it is not even signed
+            publication = self._bus.publish(key, random.choice((schema, "", "Nonsense")), delivery, writer)
             publication.put(random.randbytes(random.randrange(300)))
             publication.close()
 

@@ -70,7 +70,7 @@ class Stack:
         processes: Sequence[str] | None = None,
         environment: Mapping[str, str] | None = None,
         command: Sequence[str] | None = None,
-        ready_timeout: float = 60.0,
+        ready_timeout: float = 120.0,
     ) -> None:
         self.root = project_root()
         self.folder = Path(tempfile.mkdtemp(prefix="gemelo-"))

@@ -23,7 +23,7 @@ from tests.optional import need
 
 BROKERS = ("embedded", "mosquitto")
 VERSIONS = {"3.1.1": mqtt.MQTTv311, "5": mqtt.MQTTv5}
-PATIENCE = 10.0  # [s]
+PATIENCE = 60.0  # [s]
 FOR_EVER = 0xFFFFFFFF  # a session's expiry interval of MQTT 5
 
 
@@ -69,12 +69,12 @@ class RunningBroker:
         """Ends it if it still runs; all that it has printed."""
         if self.popen.poll() is None:
             self.popen.terminate()
-        self.popen.wait(timeout=10)
+        self.popen.wait(timeout=60.0)
         return self.output
 
     def restart(self, kill: bool = False) -> None:
         self.popen.kill() if kill else self.popen.terminate()
-        self.popen.wait(timeout=10)
+        self.popen.wait(timeout=60.0)
         wait_until(lambda: not self.ready.exists())
         self.start()
         self.wait_ready()

@@ -30,12 +30,12 @@ def echo_times(port, count=50):
     client.connect("127.0.0.1", port)
     client.loop_start()
     client.subscribe("echo", qos=1)
-    subscribed.get(timeout=5)
+    subscribed.get(timeout=60.0)
     times = []
     for _ in range(count):
         sent = time.perf_counter()
         client.publish("echo", b"x" * 500, qos=1)
-        times.append(arrived.get(timeout=5) - sent)
+        times.append(arrived.get(timeout=60.0) - sent)
     client.disconnect()
     client.loop_stop()
     return times
@@ -64,7 +64,7 @@ def test_a_signal_ends_it_at_once_with_zero_and_takes_its_readiness_back(tmp_pat
     Client(running.port).connected()
     started = time.monotonic()
     running.popen.send_signal(number)
-    assert running.popen.wait(timeout=10) == 0, running.output
+    assert running.popen.wait(timeout=60.0) == 0, running.output
     assert time.monotonic() - started < 3.0
     wait_until(lambda: not running.ready.exists())
 
@@ -96,7 +96,7 @@ def test_a_taken_port_is_named_with_its_holder_and_the_setting(tmp_path, name):
         other.listen()
         port = other.getsockname()[1]
         running = RunningBroker(name, tmp_path, port)
-        assert running.popen.wait(timeout=10) == 1
+        assert running.popen.wait(timeout=60.0) == 1
     assert f"port {port} on 127.0.0.1 is taken" in running.output
     assert f"(pid {os.getpid()})" in running.output
     assert "GEMELO_MQTT_PORT" in running.output

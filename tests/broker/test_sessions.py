@@ -19,7 +19,7 @@ def test_a_newer_connection_ends_the_older_one_of_its_client_id_and_hears(broker
     older.subscribe(topic)
     newer = join(broker, f"device-{version}")
     newer.subscribe(topic)
-    code = older.ends.get(timeout=5.0)
+    code = older.ends.get(timeout=60.0)
     assert code != 0
     if (broker.name, version) == ("embedded", "5"):  # mosquitto 2.0.11 hangs up without the word
         assert code == TAKEN_OVER
@@ -53,9 +53,9 @@ def test_a_device_hears_again_after_another_client_had_its_id_for_a_while(broker
     sender = join(broker)
     device = join(broker, f"gemelo-device-{version}", comes_back=True, topics=(topic,))
     other = join(broker, f"gemelo-device-{version}")
-    device.ends.get(timeout=5.0)
+    device.ends.get(timeout=60.0)
     device.connected()
-    other.ends.get(timeout=5.0)
+    other.ends.get(timeout=60.0)
     assert device.hears(sender, topic)
 
 
@@ -98,10 +98,10 @@ def test_a_late_subscriber_gets_what_was_retained_last_until_it_is_taken_back(br
         writer.publish(topic, payload, retain=True)
     late = join(broker)
     late.subscribe(topic)
-    message = late.messages.get(timeout=5.0)
+    message = late.messages.get(timeout=60.0)
     assert (message.payload, message.retain) == (b"second", True)
     writer.publish(topic, "third", retain=True)
-    message = late.messages.get(timeout=5.0)
+    message = late.messages.get(timeout=60.0)
     assert (message.payload, message.retain) == (b"third", False)  # to whom was there it is news
     writer.publish(topic, "", retain=True)
     assert late.next() == (topic, "")

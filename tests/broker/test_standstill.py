@@ -73,13 +73,13 @@ def test_one_that_stands_still_is_silent_and_one_that_goes_on_beats_again(
     assert heard(systemd, LATE) == []
     assert ready.stat().st_mtime == before
     broker.send_signal(signal.SIGCONT)
-    assert until(lambda: ready.stat().st_mtime > before, 5.0)
+    assert until(lambda: ready.stat().st_mtime > before, 60.0)
     assert ALIVE.encode() in heard(systemd, 1.5)
 
 
 def test_being_asked_every_second_is_not_logged(broker: subprocess.Popen[str], systemd: socket.socket) -> None:
     assert heard(systemd, 4.5).count(ALIVE.encode()) >= 3
     broker.terminate()
-    output = broker.communicate(timeout=10)[0]
+    output = broker.communicate(timeout=60.0)[0]
     warned = "should not be run as root" in output
     assert len(output.splitlines()) == 1 + warned, output

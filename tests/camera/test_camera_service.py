@@ -77,7 +77,7 @@ def running(deployment: Deployment) -> Iterator[tuple[Node, Node]]:
             yield node, listener
         finally:
             node.stop()
-            thread.join(5.0)
+            thread.join(60.0)
             assert not thread.is_alive()
 
 

@@ -307,7 +307,7 @@ def test_a_slow_reader_gets_the_newest_image_only_and_is_woken_once(
     assert woken.acquire(timeout=5.0)
     first = reader.take()
     begun = time.time_ns()
-    deadline = time.monotonic() + 5.0
+    deadline = time.monotonic() + 60.0
     assert woken.acquire(timeout=5.0)
     while reader.frame is None or reader.frame.stamp < begun + 50 * MS:  # five images and more
         assert time.monotonic() < deadline
@@ -319,7 +319,7 @@ def test_a_slow_reader_gets_the_newest_image_only_and_is_woken_once(
 
 def next_of(reader: ImageReader, woken: threading.Semaphore, kind: type) -> object:
     """Takes until something of that kind has come."""
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 60.0
     while time.monotonic() < deadline:
         woken.acquire(timeout=1.0)
         found = [event for event in reader.take() if isinstance(event, kind)]

@@ -109,7 +109,7 @@ def test_a_client_with_the_id_of_another_takes_its_connection(tmp_path: Path) ->
     broker = RunningBroker("embedded", tmp_path).wait_ready()
     first = Client(broker.port, "gemelo-device-rm1-0123", "5").connected()
     twin = TwinClient(broker.port, "gemelo-device-rm1-0123", comes_back=False)
-    assert first.ends.get(timeout=5.0) != 0
+    assert first.ends.get(timeout=60.0) != 0
     first.close()
     twin.close()
     broker.stop()

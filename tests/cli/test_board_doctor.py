@@ -66,7 +66,7 @@ def port(request):
     board = threading.Thread(target=answer)
     board.start()
     yield os.ttyname(slave)
-    board.join(5.0)
+    board.join(60.0)
     os.close(slave)
     os.close(master)
 

@@ -569,7 +569,7 @@ def asking(deployment, network, question) -> Iterator[None]:
         thread.start()
         yield
         done.set()
-        thread.join(5.0)
+        thread.join(60.0)
 
 
 def test_a_request_is_watched_with_its_question_and_its_answer(session, stack, deployment, network, capsys):

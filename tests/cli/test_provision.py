@@ -62,7 +62,7 @@ def line():
     board = Board(master)
     yield board, os.ttyname(slave)
     os.close(slave)
-    board.thread.join(5.0)
+    board.thread.join(60.0)
     os.close(master)
 
 

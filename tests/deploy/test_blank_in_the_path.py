@@ -14,6 +14,7 @@ from services.runtime.deployment import project_root
 from services.stack.several_arms import words
 from services.stack.stack import free_ports
 from tests.deploy.test_paths_in_words import tracked
+from tests.optional import need
 
 ROOT = project_root()
 FOLDER = "mi proyecto ñ"
@@ -55,6 +56,7 @@ def test_the_firmware_core_is_built_there(folder):
 
 def test_the_motion_core_is_compiled_there_by_commands_whose_paths_are_whole(folder):
     """By a compiler that only looks at the sources it is given: the whole build is that of the folder's setup."""
+    need("headers")
     copied(folder, "services/planner/native")
     compiler = folder / "looking"
     compiler.write_text(

@@ -64,7 +64,7 @@ def running(deployment: Deployment, network: MemoryNetwork | None = None) -> Ite
             yield camera
         finally:
             node.stop()
-            thread.join(10.0)
+            thread.join(60.0)
 
 
 def picture(arm: ArmDescription, cell: Cell) -> tuple[bytes, CameraInfo]:

@@ -25,7 +25,7 @@ from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame,
 from tests.optional import need
 
 ROOT = Path(__file__).resolve().parents[2]
-PATIENCE = 10.0  # [s]
+PATIENCE = 60.0  # [s]
 NOT_ARMED = 17
 
 

@@ -126,10 +126,10 @@ def test_what_the_acl_denies_is_said_with_its_topic(section):
     link = DeviceLink(device_access(section, "rm1"), "other", b"gone", inbox)
     link.start()
     try:
-        said = inbox.get(timeout=10.0)
+        said = inbox.get(timeout=60.0)
         if isinstance(said, Connected):
             link.publish("state", b"x")
-            said = inbox.get(timeout=10.0)
+            said = inbox.get(timeout=60.0)
     finally:
         link.break_off()
     assert isinstance(said, (Denied, Disconnected))
@@ -143,13 +143,13 @@ def test_two_devices_of_one_name_do_not_end_each_others_connections(section):
             inboxes.append(queue.SimpleQueue())
             links.append(DeviceLink(told(section), "rm1", b"gone", inboxes[-1]))
             links[-1].start()
-            assert isinstance(inboxes[-1].get(timeout=10.0), Connected)
+            assert isinstance(inboxes[-1].get(timeout=60.0), Connected)
         gateway = MqttClient(gateway_access(section), "one-command")
         gateway.connect("127.0.0.1", section.port)
         gateway.loop_start()
         gateway.publish(topic("rm1", "cmd"), b"\0\0\x03", qos=1, retain=True)  # for whoever has yet to subscribe
         for inbox in inboxes:  # nothing was lost before it
-            assert isinstance(inbox.get(timeout=10.0), MqttMessage)
+            assert isinstance(inbox.get(timeout=60.0), MqttMessage)
         gateway.publish(topic("rm1", "cmd"), b"", qos=1, retain=True).wait_for_publish(10.0)
         gateway.disconnect()
         gateway.loop_stop()

@@ -108,7 +108,7 @@ class UpdateBed:
         """Switches it off."""
         if self._thread is not None:
             self.inbox.put(ShutdownRequested())
-            self._thread.join(10.0)
+            self._thread.join(60.0)
             assert not self._thread.is_alive()
             self._thread = None
 

@@ -89,7 +89,7 @@ def person(lab: DeafLab) -> gemelo.Arm:
     """Connected, once the device is ready."""
     arm = lab.arm("ana-1")
     status = arm.node.latest(DEVICE_STATUS)
-    assert until(lambda: status.message is not None and status.message.online, 10.0)
+    assert until(lambda: status.message is not None and status.message.online, 60.0)
     return arm
 
 

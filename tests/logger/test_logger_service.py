@@ -98,14 +98,14 @@ def running(deployment, network, **parameters):
             yield node
         finally:
             node.stop()
-            thread.join(5.0)
+            thread.join(60.0)
             assert not thread.is_alive()
 
 
 HANGS = 60.0  # [s] in which processes start, write and end, unless they hang
 
 
-def wait_for(is_done, timeout=10.0):
+def wait_for(is_done, timeout=60.0):
     deadline = time.monotonic() + timeout
     while not is_done():
         assert time.monotonic() < deadline
@@ -172,7 +172,7 @@ def spinning(node):
         yield node
     finally:
         node.stop()
-        thread.join(5.0)
+        thread.join(60.0)
 
 
 def heard(node, key):
@@ -332,7 +332,7 @@ def test_a_disk_that_refuses_is_not_ready_until_it_is_mended(deployment, tmp_pat
         (tmp_path / "out").unlink()
         wait_for(lambda: node.is_ready)
         node.stop()
-        thread.join(5.0)
+        thread.join(60.0)
 
 
 @contextmanager

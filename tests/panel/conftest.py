@@ -26,8 +26,8 @@ def twin(panel_stack: Stack) -> Iterator[Stack]:
 @pytest.fixture
 def arm(twin: Stack) -> Iterator[gemelo.Arm]:
     """Referenced, armed, at rest in "home", at full speed, with an empty scene."""
-    twin.wait_ready(30.0)
-    with gemelo.connect(timeout=10.0) as connected:
+    twin.wait_ready(120.0)
+    with gemelo.connect(timeout=60.0) as connected:
         make_ready(connected)
         connected.move(named="home")
         yield connected
@@ -36,7 +36,7 @@ def arm(twin: Stack) -> Iterator[gemelo.Arm]:
 @pytest.fixture(scope="module")
 def served(twin: Stack) -> Iterator[Served]:
     """The page in this process, where a file's `twin` has none."""
-    twin.wait_ready(30.0)
+    twin.wait_ready(120.0)
     with served_page() as served:
         yield served
 

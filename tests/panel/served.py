@@ -84,7 +84,7 @@ class Served:
 def served_page() -> Iterator[Served]:
     """The page of the deployment that the environment names."""
     deployment = load_deployment()
-    with gemelo.connect(name="page", timeout=10.0) as connected:
+    with gemelo.connect(name="page", timeout=60.0) as connected:
         panel, stop = Panel(connected, deployment, logging.getLogger("page")), ShutdownRequest()
         thread = threading.Thread(target=panel.run, args=(stop,), daemon=True)
         thread.start()
@@ -96,7 +96,7 @@ def served_page() -> Iterator[Served]:
                 yield served
         finally:
             stop.set()
-            thread.join(5.0)
+            thread.join(60.0)
             panel.close()
 
 

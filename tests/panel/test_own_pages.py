@@ -45,14 +45,14 @@ def test_a_page_of_another_site_is_refused(address: str, origin: str) -> None:
 def test_its_own_page_and_a_program_are_served(address: str, origin: str | None) -> None:
     with connect(f"ws://{address}", origin=origin and origin.format(address=address), subprotocols=PROTOCOL) as page:
         assert page.recv(timeout=10.0)
-    with urllib.request.urlopen(f"http://{address}", timeout=10.0) as answer:
+    with urllib.request.urlopen(f"http://{address}", timeout=60.0) as answer:
         assert answer.status == 200
 
 
 def test_a_name_that_somebody_else_points_here_is_refused(address: str) -> None:
     request = urllib.request.Request(f"http://{address}", headers={"Host": "rebound.example:8088"})
     with pytest.raises(HTTPError, match="403"):
-        urllib.request.urlopen(request, timeout=10.0)
+        urllib.request.urlopen(request, timeout=60.0)
 
 
 @pytest.mark.parametrize("host", ["localhost:8088", "[::1]:8088", "192.168.1.7:8088", "lab-pc:8088", "LAB-PC"])

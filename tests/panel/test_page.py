@@ -141,7 +141,7 @@ def _led_to_25(person: Person, arm: gemelo.Arm) -> float:
     for value in (24, 25):
         person.types(f"{ARM} [°]", value)
     with suppress(AssertionError):
-        until(lambda: degrees(arm.joints[ARM]), lambda now: abs(now - 25.0) < 0.2, 10.0)
+        until(lambda: degrees(arm.joints[ARM]), lambda now: abs(now - 25.0) < 0.2, 60.0)
     return degrees(arm.joints[ARM])
 
 
@@ -192,7 +192,7 @@ def _pictured(person: Person, folder: Path) -> list[Path]:
     """The pictures of points soon after one more; a page that does not draw in time remembers without one."""
     person.press("Overwrite with this pose")
     with suppress(AssertionError):
-        until(lambda: list(folder.glob("*.jpg")), bool, 10.0)
+        until(lambda: list(folder.glob("*.jpg")), bool, 60.0)
     return list(folder.glob("*.jpg"))
 
 
@@ -257,7 +257,7 @@ def test_a_planner_that_is_killed_is_named_and_planning_goes_on_when_it_is_back(
     twin.kill("planner")
     person.press("Plan")
     person.reads("planner")
-    twin.wait_ready(30.0)
+    twin.wait_ready(120.0)
     person.press("Plan and execute")
     arrives(arm, ARM, 20.0)
 

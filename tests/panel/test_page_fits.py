@@ -30,7 +30,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MemoryPage]:
         thread.start()
         yield page
         stop.set()
-        thread.join(5.0)
+        thread.join(60.0)
 
 
 @pytest.mark.parametrize(("width", "height", "language"), [(1280, 720, "en"), (768, 1024, "es")])

@@ -27,7 +27,7 @@ def test_the_page_goes_on_when_a_process_is_killed_in_the_middle_of_its_move(
         until(lambda: abs(arm.velocities[ARM]), lambda speed: speed > 0.1, said=lambda: browser.texts)
         twin.kill(victim)
         until(lambda: victim in twin.pids(), bool)
-        twin.wait_ready(30.0)
+        twin.wait_ready(120.0)
         until(lambda: arm.velocities[ARM], lambda speed: speed == 0.0)
         make_ready(arm)
         browser.slide(ARM, -20.0)

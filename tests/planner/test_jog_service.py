@@ -16,7 +16,7 @@ from services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner
 
 TURN = JogCommand(name=("brazo_joint",), velocity=(0.3,))
-PATIENCE = 20.0  # [s]
+PATIENCE = 60.0  # [s]
 
 
 class Follower:

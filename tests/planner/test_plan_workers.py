@@ -273,7 +273,7 @@ def test_nothing_is_left_of_a_planner_that_is_killed_while_it_plans():
         assert planner.stdout.readline() == b"planned\n"
         (orphan,) = planning_processes(planner.pid)
         os.kill(planner.pid, signal.SIGKILL)
-        assert psutil.wait_procs([orphan], timeout=10.0)[1] == []
+        assert psutil.wait_procs([orphan], timeout=60.0)[1] == []
 
 
 @pytest.mark.full

@@ -334,7 +334,7 @@ def test_a_person_is_asked_before_a_xacro_file_is_expanded(
     assert run(["import", str(path), "--yes", "--output", str(tmp_path / "urdf")]) is not ExitCode.OK
     said = capsys.readouterr()
     assert "which is a program" not in said.out
-    assert "XacroException: expanded" in said.err
+    assert "xacro cannot expand it: expanded" in said.err
 
 
 def test_the_process_has_namespaces_where_bwrap_is_installed(tmp_path: Path):

@@ -29,7 +29,7 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def until(is_true: Callable[[], object], timeout: float = 5.0) -> bool:
+def until(is_true: Callable[[], object], timeout: float = 60.0) -> bool:
     """Waits for something that other threads or processes do."""
     end = time.monotonic() + timeout
     while not is_true():
@@ -39,7 +39,7 @@ def until(is_true: Callable[[], object], timeout: float = 5.0) -> bool:
     return True
 
 
-def hear(node: Node, is_true: Callable[[], object], timeout: float = 5.0) -> bool:
+def hear(node: Node, is_true: Callable[[], object], timeout: float = 60.0) -> bool:
     """Handles the node's inbox until something has come."""
     end = time.monotonic() + timeout
     while not is_true():
@@ -76,7 +76,7 @@ class RouterProcess:
         if os.environ.get(ZENOHD):
             command = zenohd(self.port, self.folder, self.environ.get("GEMELO_ROUTER_CONFIGURATION", ""))
         self.process = subprocess.Popen(command, cwd=ROOT, env=self.environ, stderr=subprocess.PIPE, text=True)
-        assert until(lambda: router_answers("127.0.0.1", self.port), 10.0)
+        assert until(lambda: router_answers("127.0.0.1", self.port), 60.0)
 
     def kill(self) -> None:
         self.process.kill()
@@ -87,7 +87,7 @@ class RouterProcess:
         return self._reap()
 
     def _reap(self) -> int:
-        self.process.communicate(timeout=5.0)
+        self.process.communicate(timeout=60.0)
         return self.process.returncode
 
     @property
@@ -148,7 +148,7 @@ def spinning(node: Node, step: Callable[[int], object] = lambda now: None, rate:
         yield node
     finally:
         node.stop()
-        thread.join(timeout=3.0)
+        thread.join(timeout=60.0)
     assert not thread.is_alive(), "the loop did not stop"
     assert not failures, failures
 

@@ -88,7 +88,7 @@ def test_a_goal_gives_all_feedback_in_order_and_then_its_result(buses: Buses) ->
     with moving(buses):
         client = buses.node("client").action(FOLLOW)
         handle = client.send(goal_of(20), on_feedback=lambda feedback: seen.append(feedback.index))
-        outcome = handle.wait(3.0)
+        outcome = handle.wait(60.0)
     assert outcome.status is GoalStatusCode.SUCCEEDED
     assert outcome.result == Result(error_string="SUCCEEDED")
     assert seen == list(range(20, -1, -1))
@@ -131,15 +131,15 @@ def test_a_second_client_preempts_and_both_hear_their_own_end(buses: Buses) -> N
     with moving(buses):
         first = buses.node("first").action(FOLLOW).send(goal_of(10_000))
         second = buses.node("second").action(FOLLOW).send(goal_of(5))
-        assert first.wait(3.0).status is GoalStatusCode.PREEMPTED
-        assert second.wait(3.0).status is GoalStatusCode.SUCCEEDED
+        assert first.wait(60.0).status is GoalStatusCode.PREEMPTED
+        assert second.wait(60.0).status is GoalStatusCode.SUCCEEDED
 
 
 def test_another_client_can_cancel_everything(buses: Buses) -> None:
     with moving(buses):
         handle = buses.node("first").action(FOLLOW).send(goal_of(10_000))
         assert buses.node("second").action(FOLLOW).cancel_all() == (handle.goal_id,)
-        assert handle.wait(3.0).status is GoalStatusCode.CANCELED
+        assert handle.wait(60.0).status is GoalStatusCode.CANCELED
 
 
 def test_a_client_that_vanishes_does_not_stop_the_motion(buses: Buses) -> None:
@@ -176,7 +176,7 @@ def test_a_result_is_kept_for_who_asks_later(buses: Buses) -> None:
         time.sleep(0.3)
         answer = node.call(keys.result_request(FOLLOW), ResultRequest(goal_id=handle.goal_id))
         assert answer.status is GoalStatusCode.SUCCEEDED
-        assert handle.wait(1.0).status is GoalStatusCode.SUCCEEDED
+        assert handle.wait(60.0).status is GoalStatusCode.SUCCEEDED
         assert handle.wait(0.0).status is GoalStatusCode.SUCCEEDED
 
 
@@ -235,7 +235,7 @@ def test_a_client_that_was_busy_itself_does_not_give_up(buses: Buses, monkeypatc
         time.sleep(1.0)
         node.wait(0.05)
         assert not handle.is_over
-        assert handle.wait(5.0).status is GoalStatusCode.SUCCEEDED
+        assert handle.wait(60.0).status is GoalStatusCode.SUCCEEDED
 
 
 def test_a_node_that_spins_follows_its_goals_too(buses: Buses) -> None:
@@ -245,7 +245,7 @@ def test_a_node_that_spins_follows_its_goals_too(buses: Buses) -> None:
         with spinning(node):
             handle = client.send(goal_of(5))
             assert until(lambda: handle.outcome is not None)
-            assert handle.wait(1.0).status is GoalStatusCode.SUCCEEDED
+            assert handle.wait(60.0).status is GoalStatusCode.SUCCEEDED
 
 
 def test_goals_that_are_no_goals_are_refused_and_nothing_dies(buses: Buses) -> None:

@@ -73,7 +73,7 @@ def tokens(session: zenoh.Session, *keys: str) -> Iterator[None]:
 
 
 def seen(session: zenoh.Session, key: str = "@id/*/*/*") -> set[str]:
-    return {str(reply.ok.key_expr) for reply in session.liveliness().get(key, timeout=2.0) if reply.ok}
+    return {str(reply.ok.key_expr) for reply in session.liveliness().get(key, timeout=30.0) if reply.ok}
 
 
 def settle(one: zenoh.Session, principal: str, other: zenoh.Session) -> None:

@@ -154,7 +154,7 @@ def a_day_is_short(module: str, log: Path, **environ: str) -> Iterator[Path]:
             yield log
         finally:
             process.terminate()
-            process.wait(timeout=5.0)
+            process.wait(timeout=60.0)
 
 
 def test_a_router_that_runs_says_it_again(lock: Lock, tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ def test_a_late_reader_hears_what_is_new_and_nothing_old_whatever_its_clock_says
         stdin=subprocess.PIPE, stdout=subprocess.PIPE,
     ) as reader:  # fmt: skip
         threading.Thread(target=lambda: said.extend(iter(reader.stdout.readline, "")), daemon=True).start()
-        assert until(lambda: said.count("heartbeat\n") == 2, 10.0), said  # recovered by now
+        assert until(lambda: said.count("heartbeat\n") == 2, 60.0), said  # recovered by now
         (joined,) = (float(line.split()[1]) for line in said if line.startswith("joined"))
         assert abs(joined - time.time() - ahead) < 2.0, "the reader's clock is not shifted"
         events.put(b"new")

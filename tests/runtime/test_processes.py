@@ -54,7 +54,7 @@ def await_line(process: subprocess.Popen[str], wanted: str) -> None:
 def end(process: subprocess.Popen[str], number: int = signal.SIGTERM) -> tuple[int, str]:
     begin = time.monotonic()
     process.send_signal(number)
-    _, errors = process.communicate(timeout=10.0)
+    _, errors = process.communicate(timeout=60.0)
     assert time.monotonic() - begin < PROMPT
     return process.returncode, errors
 
@@ -347,7 +347,7 @@ def test_a_process_that_goes_on_beside_its_successor_ends_with_a_sentence(start:
     second = start(SPINNER)
     await_line(second, "spins")
     first.send_signal(signal.SIGCONT)
-    _, errors = first.communicate(timeout=10.0)
+    _, errors = first.communicate(timeout=60.0)
     assert first.returncode == 1
     assert f'another node named "spinner" has started since this one (process {second.pid} on ' in errors
     assert "Traceback" not in errors

@@ -38,11 +38,11 @@ class ForgettingRouter:
         self._is_listening = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
-        assert self._is_listening.wait(5.0)
+        assert self._is_listening.wait(60.0)
 
     def close(self) -> None:
         self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join(5.0)
+        self._thread.join(60.0)
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
@@ -123,7 +123,7 @@ class Spins:
 
     def __exit__(self, *error: object) -> None:
         self._node.stop()
-        self._thread.join(5.0)
+        self._thread.join(60.0)
 
     def _run(self) -> None:
         try:
@@ -135,9 +135,9 @@ class Spins:
 @pytest.mark.full
 def test_a_node_whose_session_the_router_has_forgotten_ends_with_a_sentence(way: ForgettingRouter, node: Node) -> None:
     with Spins(node) as spins:
-        assert until(is_known, 5.0)
+        assert until(is_known, 60.0)
         way.forgets = True
-        assert until(lambda: spins.error is not None, 10.0)
+        assert until(lambda: spins.error is not None, 60.0)
     assert isinstance(spins.error, BusError)
     assert "has not known this session for 1.5 s" in str(spins.error)
 
@@ -147,7 +147,7 @@ def test_a_node_that_the_router_knows_goes_on_for_longer_than_it_may_be_forgotte
     way: ForgettingRouter, node: Node
 ) -> None:
     with Spins(node) as spins:
-        assert until(is_known, 5.0)
+        assert until(is_known, 60.0)
         assert not until(lambda: spins.error is not None, 2.5 * SOON)
         assert node.is_connected
 

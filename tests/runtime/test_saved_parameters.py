@@ -58,7 +58,7 @@ def first_line(process: subprocess.Popen[str]) -> str:
 def end(process: subprocess.Popen[str], kill: bool = False) -> str:
     """Its errors."""
     (process.kill if kill else process.terminate)()
-    return process.communicate(timeout=10.0)[1]
+    return process.communicate(timeout=60.0)[1]
 
 
 def test_what_was_saved_outlives_the_process_and_what_was_only_set_does_not(start: Start, tmp_path, capsys):

@@ -136,7 +136,7 @@ def test_threads_take_turns(arm: gemelo.SimulatedArm) -> None:
     thread.start()
     arm.sim.sleep(0.5)
     arm.wait_for(lambda: bool(ended), 30.0)
-    thread.join(10.0)
+    thread.join(60.0)
     assert not thread.is_alive()
     assert ended
 

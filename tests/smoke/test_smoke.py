@@ -27,7 +27,7 @@ def test_an_arm_moves_stops_is_led_by_its_page_and_all_of_it_is_recorded(
 ) -> None:
     processes, environment = (*NEEDED, "logger", "panel"), {"GEMELO_ROBOT": f"urdf/{robot}"}
     with Stack(broker=BROKER, out=tmp_path, processes=processes, environment=environment) as stack:
-        with found_by_scripts(stack), gemelo.connect(timeout=10.0) as arm:
+        with found_by_scripts(stack), gemelo.connect(timeout=60.0) as arm:
             if not all(arm.device.state.referenced):
                 arm.reference()
             is_moved_and_stopped(arm)

@@ -25,7 +25,7 @@ def stack(rm1_stack):
 
 @pytest.fixture
 def operator(stack):
-    stack.wait_ready(20.0)
+    stack.wait_ready(120.0)
     person = Operator(stack)
     yield person
     person.close()
@@ -41,5 +41,5 @@ def twin(rm1_stack):
 @pytest.fixture
 def arm(twin):
     """At home, as a script has it."""
-    with gemelo.connect(timeout=10.0) as connected:
+    with gemelo.connect(timeout=60.0) as connected:
         yield connected

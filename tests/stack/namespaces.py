@@ -121,7 +121,7 @@ class Lab:
             server.send_signal(signal.SIGTERM)
         for server in self._servers:
             with contextlib.suppress(subprocess.TimeoutExpired):
-                server.wait(15.0)
+                server.wait(60.0)
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(server.pid, signal.SIGKILL)
 

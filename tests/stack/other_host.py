@@ -110,7 +110,7 @@ class OtherHost:
 
     def close(self) -> None:
         self.sshd.terminate()
-        self.sshd.wait(timeout=5.0)
+        self.sshd.wait(timeout=60.0)
 
     def _write_ssh(self) -> None:
         program = self.folder / "bin/ssh"

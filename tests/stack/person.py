@@ -66,7 +66,7 @@ class Operator:
     def plan(self, speed=1.0):
         """A trajectory to whichever of two poses is farther away."""
         self.seen.clear()
-        assert self.wait_for(lambda: self.seen, 5.0), "no joint states"
+        assert self.wait_for(lambda: self.seen, 60.0), "no joint states"
         here = self.seen[-1].position
         poses = [self.pose(share) for share in HERE_OR_THERE]
         there = max(poses, key=lambda pose: max(abs(a - b) for a, b in zip(pose, here, strict=True)))

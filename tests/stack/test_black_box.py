@@ -45,7 +45,7 @@ def next_box(stack, began: int) -> dict:
 def send_slowly(operator):
     plan = operator.plan(speed=0.6)
     handle = operator.send(plan)
-    assert operator.wait_for(lambda: handle.feedback is not None and handle.feedback.elapsed > 0.5, 10.0)
+    assert operator.wait_for(lambda: handle.feedback is not None and handle.feedback.elapsed > 0.5, 60.0)
     return handle
 
 
@@ -54,7 +54,7 @@ def stop_in_a_move(stack, operator):
     handle = send_slowly(operator)
     pressed = time.time_ns()
     gemelo(stack, "device", "press", "estop")
-    handle.wait(10.0)
+    handle.wait(60.0)
     stop = next_box(stack, pressed)
     assert stop["kind"] == "emergency stop"
     return handle, stop
@@ -63,14 +63,14 @@ def stop_in_a_move(stack, operator):
 def test_a_killed_planner_and_an_emergency_stop_are_told_afterwards(stack, operator, tmp_path):
     nodes = list[str]()
     subscription = operator.node.subscribe(STATISTICS, lambda statistics: nodes.append(statistics.node))
-    assert operator.wait_for(lambda: nodes.count("planner") > 1, 20.0), "what nobody has heard cannot be missed"
+    assert operator.wait_for(lambda: nodes.count("planner") > 1, 60.0), "what nobody has heard cannot be missed"
     subscription.close()
     began = time.time_ns()
     stack.kill("planner")
     lost = next_box(stack, began)
     assert lost["kind"] == "service lost"
     assert "planner" in lost["sentence"]
-    stack.wait_ready(20.0)
+    stack.wait_ready(120.0)
 
     handle, stop = stop_in_a_move(stack, operator)
     assert f"s into goal {handle.goal_id[:8]}" in stop["sentence"]

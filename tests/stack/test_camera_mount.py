@@ -67,7 +67,7 @@ def cell(tmp_path_factory):
 def stack(cell, tmp_path_factory):
     environment = {"GEMELO_ROBOT": str(PAROL6), "GEMELO_CELL": str(cell)}
     with Stack(out=tmp_path_factory.mktemp("out"), processes=PROCESSES, environment=environment) as running:
-        running.wait_ready(30.0)
+        running.wait_ready(120.0)
         yield running
 
 

@@ -76,7 +76,7 @@ def test_what_starts_a_stack_of_its_own_leaves_no_process_when_it_is_terminated(
             running.terminate()
             said = running.communicate(timeout=60.0)[1]
             assert "its stack has been stopped" in said
-            assert not psutil.wait_procs(started, timeout=10.0)[1]
+            assert not psutil.wait_procs(started, timeout=60.0)[1]
         finally:
             running.kill()
 

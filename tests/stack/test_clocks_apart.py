@@ -70,7 +70,7 @@ def test_a_thing_is_seen_after_the_arm_has_come_to_rest_and_carried_to_its_place
             places = [item.base_from_thing.translation for item in items if item.name == "red_block"]
             return any(math.dist(place[:2], BIN) < FLOOR["rm1"] + 0.5e-3 for place in places)
 
-        assert arm.wait_for(is_there, 5.0)
+        assert arm.wait_for(is_there, 60.0)
 
 
 def test_moves_jogs_and_stops_are_as_ever_and_a_script_sees_what_was_measured_after_its_move(stack):

@@ -34,7 +34,7 @@ def test_a_changed_robot_file_moves_nothing_until_it_is_pushed(stack, own_arm):
     robot.write_text(robot.read_text().replace("max_speed_rpm = 15.0", "max_speed_rpm = 12.0", 1))
     stack.kill("stepper_gateway")
     stack.kill("planner")
-    stack.wait_ready(20.0, ("router", "broker", "virtual_esp32", "planner"))
+    stack.wait_ready(120.0, ("router", "broker", "virtual_esp32", "planner"))
     assert "NOT in force" in gemelo(stack, "device", "status")
     assert "gemelo device config --push" in gemelo(stack, "move", "--named", "ready", code=ExitCode.FAILED)
     assert "--yes" in gemelo(stack, "device", "config", "--push", code=ExitCode.USAGE)

@@ -95,7 +95,7 @@ class Site:
         return {" ".join(words): self.typed(*words)[1] for words in commands}
 
     def moves_again(self) -> None:
-        self.stack.wait_ready(30.0)
+        self.stack.wait_ready(120.0)
         operator = Operator(self.stack)
         try:
             outcome, _ = operator.move_again()
@@ -128,7 +128,7 @@ def test_what_is_sent_to_a_device_that_does_not_hear_ends_and_a_person_is_told_w
             assert code != 0, said
             assert SPEAKS in said, said
             assert "Traceback" not in said
-        with found_by_scripts(site.stack), gemelo.connect(timeout=10.0) as arm:
+        with found_by_scripts(site.stack), gemelo.connect(timeout=60.0) as arm:
             asked = time.monotonic()
             with pytest.raises((gemelo.Refused, gemelo.Aborted), match=SPEAKS):
                 arm.move(named="ready")

@@ -51,10 +51,10 @@ def test_a_client_that_is_killed_does_not_stop_its_move(stack, operator):
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    assert operator.wait_for(operator.is_moving, 10.0)
+    assert operator.wait_for(operator.is_moving, 60.0)
     client.kill()
     client.wait()
-    assert operator.wait_for(lambda: not operator.is_moving(), 20.0)
+    assert operator.wait_for(lambda: not operator.is_moving(), 60.0)
     assert operator.seen[-1].position[0] == pytest.approx(operator.pose(0.0)[0], abs=1 / joint.steps.per_unit)
 
 
@@ -65,7 +65,7 @@ def test_a_bystander_that_dies_does_not_disturb_the_move(stack, operator, name):
     assert outcome.status is GoalStatusCode.SUCCEEDED, outcome
     assert outcome.result.executed_steps == outcome.result.commanded_steps
     assert not jumps(operator.arm, operator.seen)
-    stack.wait_ready(15.0, [name])
+    stack.wait_ready(120.0, [name])
     again, done = operator.move_again()
     assert again.status is GoalStatusCode.SUCCEEDED
     assert done == []
@@ -75,7 +75,7 @@ def test_when_the_gateway_dies_the_arm_comes_to_rest_on_its_path_and_the_client_
     end, seconds, _ = kill_while_moving(stack, operator, "stepper_gateway")
     assert isinstance(end, ServerLost), end
     assert seconds < 5.0
-    stack.wait_ready(15.0, ["stepper_gateway"])
+    stack.wait_ready(120.0, ["stepper_gateway"])
     again, _ = operator.move_again()
     assert again.status is GoalStatusCode.SUCCEEDED
     assert not jumps(operator.arm, operator.seen)
@@ -88,23 +88,23 @@ def test_a_goal_that_was_heard_before_the_gateway_died_moves_nothing_when_it_is_
     operator.move_again()
     for _ in range(2):
         assert operator.move().status is GoalStatusCode.SUCCEEDED
-    assert operator.wait_for(lambda: len(heard) >= 3, 5.0)
+    assert operator.wait_for(lambda: len(heard) >= 3, 60.0)
     there, back = (decode(GoalRequest, bytes(each.question)) for each in heard[-2:])
     assert there.epoch == back.epoch != 0
     stack.kill("stepper_gateway")
-    stack.wait_ready(15.0, ["stepper_gateway"])
+    stack.wait_ready(120.0, ["stepper_gateway"])
     operator.free()
     operator.seen.clear()
     for goal in (there, back):
         again = operator.node.call(goal_request(FOLLOW_JOINT_TRAJECTORY), goal)
         assert (again.accepted, "stepper_gateway that was started anew since" in again.reason) == (False, True)
-    assert operator.wait_for(lambda: len(operator.seen) >= 50, 10.0)
+    assert operator.wait_for(lambda: len(operator.seen) >= 50, 60.0)
     assert len({state.position for state in operator.seen}) == 1
     epoch = operator.node.call(result_request(FOLLOW_JOINT_TRAJECTORY), ResultRequest()).epoch
     forged = operator.node.call(goal_request(FOLLOW_JOINT_TRAJECTORY), replace(there, epoch=epoch))
     assert forged.accepted, forged.reason
-    assert operator.wait_for(operator.is_moving, 10.0)
-    assert operator.wait_for(lambda: not operator.is_moving(), 20.0)
+    assert operator.wait_for(operator.is_moving, 60.0)
+    assert operator.wait_for(lambda: not operator.is_moving(), 60.0)
 
 
 def test_when_the_broker_dies_the_move_ends_with_a_reason_and_the_next_one_works(stack, operator):
@@ -116,7 +116,7 @@ def test_when_the_broker_dies_the_move_ends_with_a_reason_and_the_next_one_works
         assert end.result.error_string
     assert seconds < duration + BOUND
     assert not jumps(operator.arm, operator.seen)
-    stack.wait_ready(15.0)
+    stack.wait_ready(120.0)
     again, _ = operator.move_again()
     assert again.status is GoalStatusCode.SUCCEEDED
 
@@ -126,7 +126,7 @@ def test_when_the_router_dies_the_arm_finishes_its_path_and_the_client_learns_it
     assert isinstance(end, ServerLost) or end.status is GoalStatusCode.SUCCEEDED, end
     assert seconds < duration + BOUND
     assert not jumps(operator.arm, operator.seen)
-    stack.wait_ready(15.0)
+    stack.wait_ready(120.0)
     again, done = operator.move_again()
     assert again.status is GoalStatusCode.SUCCEEDED
     assert done == []
@@ -139,13 +139,13 @@ def test_a_device_that_reboots_while_moving_fails_the_move_and_must_be_reference
     assert end.result.error_code is FollowErrorCode.DEVICE_FAILED
     assert end.result.error_string
     assert seconds < 5.0
-    stack.wait_ready(15.0, ["virtual_esp32", "stepper_gateway"])
+    stack.wait_ready(120.0, ["virtual_esp32", "stepper_gateway"])
     again, done = operator.move_again()
     assert any(isinstance(each, ReferenceCommand) for each in done)
     assert again.status is GoalStatusCode.SUCCEEDED
 
 
 def test_after_all_of_it_every_process_is_ready_and_nothing_was_raised(stack):
-    stack.wait_ready(15.0)
+    stack.wait_ready(120.0)
     for name in stack.processes:
         assert "Traceback" not in stack.logs(name), f"{name}: {stack.logs(name)[-2000:]}"

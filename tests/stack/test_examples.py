@@ -63,7 +63,7 @@ class OnAnArm:
             try:
                 line = process.stdout.readline().rstrip("\n")
                 process.send_signal(signal.SIGTERM)
-                _, errors = process.communicate(timeout=10.0)
+                _, errors = process.communicate(timeout=60.0)
             finally:
                 process.kill()
         assert re.fullmatch(NODES[name], line), (line, errors)
@@ -79,7 +79,7 @@ class OnAnArm:
                 arm.move(named="home")
                 line = process.stdout.readline()
                 process.send_signal(signal.SIGTERM)
-                output, _ = process.communicate(timeout=10.0)
+                output, _ = process.communicate(timeout=60.0)
             finally:
                 process.kill()
         assert re.fullmatch(r"point \d+ of \d+, \d+\.\d\d of \d+\.\d\d s, error \d\.\d{5}\n", line)

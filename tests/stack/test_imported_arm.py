@@ -28,7 +28,7 @@ def test_an_imported_export_makes_its_first_move_on_a_generated_device(tmp_path,
         person = Operator(stack)
         try:
             for name in ("ready", "home"):
-                plan = person.node.call(PLAN, PlanRequest(goal=NamedGoal(name=name)), timeout=5.0)
+                plan = person.node.call(PLAN, PlanRequest(goal=NamedGoal(name=name)), timeout=60.0)
                 assert plan.code is PlanCode.SUCCESS, plan.refusal
                 outcome = person.follow.send(FollowJointTrajectoryGoal(trajectory=plan.trajectory)).wait(
                     plan.duration + 10.0

@@ -36,12 +36,12 @@ def errors(operator):
 
 def stand_at(operator, name):
     """The arm at a named state, and what is seen of it from then on."""
-    assert operator.wait_for(lambda: operator.seen and not operator.is_moving(), 5.0)
+    assert operator.wait_for(lambda: operator.seen and not operator.is_moving(), 60.0)
     plan = operator.node.call(PLAN, PlanRequest(goal=NamedGoal(name=name), allowed_time=5.0), timeout=15.0)
     assert plan.code is PlanCode.SUCCESS, plan.refusal
     assert operator.send(plan).wait(plan.duration + 10.0).status is GoalStatusCode.SUCCEEDED
     operator.seen.clear()
-    assert operator.wait_for(lambda: operator.seen and not operator.is_moving(), 5.0)
+    assert operator.wait_for(lambda: operator.seen and not operator.is_moving(), 60.0)
 
 
 def rest(operator, last):
@@ -115,9 +115,9 @@ def test_keys_during_a_planned_motion_are_refused_and_do_not_disturb_it(stack, o
     with Typist(stack, "jog", pause=operator.node.wait) as typist:
         plan = operator.plan(0.4)
         handle = operator.send(plan)
-        assert operator.wait_for(operator.is_moving, 10.0)
+        assert operator.wait_for(operator.is_moving, 60.0)
         typist.hold(UP, 0.6)
-        assert typist.until("refused: a goal is being carried out: cancel it first", 5.0), typist.shown
+        assert typist.until("refused: a goal is being carried out: cancel it first", 60.0), typist.shown
         outcome = handle.wait(plan.duration + 10.0)
         typist.type("x")
         assert typist.ended() == ExitCode.OK
@@ -154,7 +154,7 @@ def test_a_goal_that_begins_where_the_keys_have_led_takes_over_without_a_jump(st
         typist.type(UP)
         handle = operator.follow.send(FollowJointTrajectoryGoal(trajectory=plan.trajectory))
         typist.hold(UP, 1.0)
-        assert typist.until("a goal is being carried out", 5.0), typist.shown
+        assert typist.until("a goal is being carried out", 60.0), typist.shown
         outcome = handle.wait(plan.duration + 10.0)
         assert outcome.status is GoalStatusCode.SUCCEEDED, outcome.result.error_string
         typist.type("x")

@@ -16,7 +16,7 @@ from services.stack.stack import Stack
 from tests.stack.gemelo import COMMAND, gemelo
 
 PROCESSES = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher")
-LONGEST = 20.0  # [s]
+LONGEST = 60.0  # [s]
 
 
 @pytest.fixture

@@ -29,7 +29,7 @@ PATIENCE = 20.0  # [s]
 
 
 def show(operator, scene):
-    response = operator.node.call(SCENE_EDIT, SceneRequest(edit=SceneReplace(scene=scene)), timeout=5.0)
+    response = operator.node.call(SCENE_EDIT, SceneRequest(edit=SceneReplace(scene=scene)), timeout=60.0)
     assert response.accepted, response.reason
 
 
@@ -87,7 +87,7 @@ def test_a_planner_that_is_killed_while_it_plans_is_there_again_with_its_scene(s
         walled.node.call(PLAN, past_the_wall("cut off", allowed=60.0), timeout=30.0, on_tick=kill_once)
     assert time.monotonic() - killed[0] < PATIENCE
     assert workers
-    assert psutil.wait_procs(workers, timeout=5.0)[1] == []
+    assert psutil.wait_procs(workers, timeout=60.0)[1] == []
     stack.wait_ready(PATIENCE, ["planner"])
     progress.clear()
     ended = []
@@ -104,7 +104,7 @@ def test_a_planner_that_is_killed_while_it_plans_is_there_again_with_its_scene(s
 def test_a_plan_made_before_an_edit_is_refused_and_one_made_before_a_restart_is_not(stack, operator):
     early = operator.plan()
     ball = SceneObject(name="ball", shape=SphereShape(radius=0.01))
-    assert operator.node.call(SCENE_EDIT, SceneRequest(edit=SceneAdd(object=ball)), timeout=5.0).accepted
+    assert operator.node.call(SCENE_EDIT, SceneRequest(edit=SceneAdd(object=ball)), timeout=60.0).accepted
     with pytest.raises(
         GoalRefused, match=r"planned in scene version \d+, the scene is version \d+ now: plan again"
     ) as no:

@@ -22,11 +22,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         router = subprocess.Popen(zenohd(port, Path(folder)))
         try:
-            assert until(lambda: router_answers("127.0.0.1", port), 10.0), "zenohd does not answer"
+            assert until(lambda: router_answers("127.0.0.1", port), 60.0), "zenohd does not answer"
             move_through(port)
         finally:
             router.terminate()
-            router.wait(5.0)
+            router.wait(60.0)
 
 
 def move_through(port: int) -> None:

@@ -184,7 +184,7 @@ class Reset:
             patch.delenv("GEMELO_CONFIG", raising=False)
             for name, value in self._stack.deployment.items():
                 patch.setenv(name, value)
-            arm = gemelo.connect(name="reset", timeout=10.0)
+            arm = gemelo.connect(name="reset", timeout=60.0)
         arm.control.shares = False
         return arm
 

@@ -36,7 +36,7 @@ def listener(tmp_path: Path) -> Iterator[Node]:
             yield node
     finally:
         stop.set()
-        thread.join(5.0)
+        thread.join(60.0)
         assert not thread.is_alive()
 
 

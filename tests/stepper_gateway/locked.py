@@ -20,7 +20,7 @@ from services.stepper_gateway.links.mqtt import MqttLink
 from tests.optional import need
 from tests.stepper_gateway.processes import free_port
 
-PATIENCE = 10.0  # [s]
+PATIENCE = 60.0  # [s]
 
 
 class Mosquitto:

@@ -76,7 +76,7 @@ class Processes:
         if self.deployment.mqtt.broker is Broker.MOSQUITTO:
             need("mosquitto")
         self.start(BROKER)
-        end = time.monotonic() + 15.0
+        end = time.monotonic() + 60.0
         while time.monotonic() < end:
             with socket.socket() as probe:
                 if probe.connect_ex(("127.0.0.1", self.port)) == 0:
@@ -91,7 +91,7 @@ class Processes:
     def kill(self, module: str) -> None:
         process = self._running.pop(module)
         os.killpg(process.pid, signal.SIGKILL)  # its own group, with the broker's child
-        process.wait(timeout=10)
+        process.wait(timeout=60.0)
 
     def close(self) -> None:
         for module in list(self._running):

@@ -92,7 +92,7 @@ class MqttPeer:
         )
         client.connect("127.0.0.1", self._processes.port)
         client.loop_start()
-        assert subscribed.wait(5.0)
+        assert subscribed.wait(60.0)
         self._client = client
 
     def close(self) -> None:
@@ -175,7 +175,7 @@ class Bench:
         self.link = peer.link(self.woken.set)
         self.received: list[Received] = []
 
-    def until(self, is_true: Callable[[], bool], seconds: float = 10.0) -> bool:
+    def until(self, is_true: Callable[[], bool], seconds: float = 60.0) -> bool:
         end = time.monotonic() + seconds
         while not is_true():
             if time.monotonic() > end:
@@ -281,7 +281,7 @@ def test_a_port_that_cannot_be_had_says_why_and_what_to_do(board: SerialPeer, tm
         assert other.until(lambda: "another program holds" in other.link.reason)
     (tmp_path / "file").write_text("no port")
     with closing(SerialLink(str(tmp_path / "file"), 921_600, lambda: None)) as link:
-        end = time.monotonic() + 5.0
+        end = time.monotonic() + 60.0
         while "cannot be used" not in link.reason and time.monotonic() < end:
             time.sleep(0.05)
         assert "[serial] device" in link.reason

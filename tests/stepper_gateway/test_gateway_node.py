@@ -63,7 +63,7 @@ class Running:
         """For a participant that is no node."""
         return MemoryBus(self._network)
 
-    def until(self, is_true: Callable[[], bool], timeout: float = 10.0) -> None:
+    def until(self, is_true: Callable[[], bool], timeout: float = 60.0) -> None:
         end = time.monotonic() + timeout
         while not is_true():
             assert time.monotonic() < end
@@ -76,7 +76,7 @@ class Running:
 
     def close(self) -> None:
         self._stop.set()
-        self._thread.join(timeout=10.0)
+        self._thread.join(timeout=60.0)
         assert not self._thread.is_alive()
         self.client.close()
         self.planner.close()
@@ -111,7 +111,7 @@ def test_a_client_moves_cancels_streams_and_commands(running: Running) -> None:
     handle = action.send(FollowJointTrajectoryGoal(trajectory=move(running.here.position, (1.0, 1.0, 0.1))))
     running.client.wait(0.8)
     handle.cancel()
-    assert handle.wait(5.0).status == GoalStatusCode.CANCELED
+    assert handle.wait(60.0).status == GoalStatusCode.CANCELED
 
     for _ in range(20):
         running.client.publisher(JOINT_TARGETS).put(JointTargets(name=("brazo_joint",), position=(0.3,)))

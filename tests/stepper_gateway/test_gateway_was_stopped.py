@@ -132,5 +132,5 @@ def test_a_gateway_whose_place_was_taken_meanwhile_never_sends_again_and_ends(ri
     other.start()
     with pytest.raises(NodeNameTaken, match="has started since this one"):
         rig.node.spin(rig.shell.step)
-    other.join(5.0)
+    other.join(60.0)
     assert rig.link.since(thawed[0]) == []

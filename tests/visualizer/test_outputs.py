@@ -75,7 +75,7 @@ class Rig:
         self.slowest = max(self.slowest, time.monotonic() - began)
         return trouble
 
-    def step_until(self, is_done, timeout=12.0):
+    def step_until(self, is_done, timeout=60.0):
         deadline = time.monotonic() + timeout
         while not is_done():
             assert time.monotonic() < deadline, self.step()

@@ -59,6 +59,7 @@ def test_a_missing_recording_is_said(tmp_path):
 
 
 def test_a_broken_recording_is_said_with_the_viewers_words(tmp_path):
+    need("vulkan")
     (tmp_path / "broken.rrd").write_bytes(b"not a recording")
     with pytest.raises(RuntimeError, match=r"no picture of .*broken\.rrd"):
         save_screenshot(tmp_path / "broken.rrd", tmp_path / "view.png", timeout=4.0)

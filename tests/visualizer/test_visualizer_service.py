@@ -24,7 +24,7 @@ def deployment(tmp_path):
     return load_deployment(environ={"GEMELO_PATHS_RUN": str(tmp_path / "run"), "GEMELO_VIEWER_MODE": "none"})
 
 
-def wait_for(is_done, timeout=5.0):
+def wait_for(is_done, timeout=60.0):
     deadline = time.monotonic() + timeout
     while not is_done():
         assert time.monotonic() < deadline
@@ -57,7 +57,7 @@ def test_it_is_ready_when_it_knows_the_arm_and_records_what_the_arm_does(deploym
             time.sleep(0.01)
         time.sleep(0.2)
         node.stop()
-        thread.join(5.0)
+        thread.join(60.0)
         assert not thread.is_alive()
     printed = subprocess.run([rerun_binary(), "rrd", "print", recording], capture_output=True, text=True, check=True)
     assert f"/{entities.executed('brazo_joint')}" in printed.stdout

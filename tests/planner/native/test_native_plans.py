@@ -250,7 +250,7 @@ def test_another_thread_can_end_a_search_and_do_other_things_meanwhile():
     core.set_scene([])  # the search goes on in the scene that it began in
     assert searching.is_alive()
     cancel.set()
-    searching.join(timeout=5.0)
+    searching.join(timeout=60.0)
     assert not searching.is_alive()
     assert ended[0].reason is FailureReason.CANCELLED
     assert core.edge_free(start, goal)
