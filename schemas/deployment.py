@@ -106,7 +106,7 @@ class ViewerSection(DeploymentRecord, frozen=True, kw_only=True):
 class PanelSection(DeploymentRecord, frozen=True, kw_only=True):
     host: str = "127.0.0.1"
     port: int = 8088  # the operator's page
-    name: str = ""  # by which other machines open it, as "lab-pc.local"; addresses and the host's name count besides
+    name: str = ""  # by which other machines open it and the view; addresses and the host's own name count besides
     insecure: bool = False  # may listen beyond loopback: it has no TLS
 
 

@@ -1,6 +1,7 @@
 """`gemelo-viewer`: runs the Rerun viewer on loopback, and says where it is and whether it answers.
 
-The viewer is a child rather than this process itself because somebody has to keep the readiness file.
+The viewer is a child rather than this process itself because somebody has to keep the readiness file, and to look at
+what a browser asks for: the child listens on an address of its own, which only this process knows.
 """
 
 from __future__ import annotations
@@ -13,18 +14,23 @@ import sys
 import threading
 import time
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import IO, TextIO
 from urllib.parse import quote
 
+from msgspec.structs import replace
+
 from schemas.deployment import Deployment, ViewerMode, ViewerSection
 from services.runtime.deployment import DeploymentError, exposure, load_deployment, project_root
+from services.runtime.process.own_names import own_names
 from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.priority import step_behind
 from services.runtime.process.readiness import Readiness
 from services.runtime.process.unwritten import UnwrittenFiles
+from services.visualizer.program.host_check import HostCheck, unguessable_host
 from services.visualizer.program.rerun_program import rerun_binary, start, stop
+from services.visualizer.program.screenshot import free_port
 from services.visualizer.program.viewer_connection import ViewerConnection
 
 PERIOD = 0.5  # [s] between two looks at the child
@@ -76,10 +82,10 @@ def run(deployment: Deployment, memory: str, stopping: threading.Event) -> int:
         require_free(deployment.viewer.host, deployment.viewer.port, "viewer")
         if mode is ViewerMode.WEB:
             require_free(deployment.viewer.host, deployment.viewer.web_port, "viewer", "web_port")
-        code = _keep(deployment.viewer, mode, memory, readiness, stopping)
+        code = _keep(deployment, mode, memory, readiness, stopping)
         if code and mode is not deployment.viewer.mode and mode is ViewerMode.NATIVE and not stopping.is_set():
             say("viewer: no window could be opened; showing it in the browser instead")
-            return _keep(deployment.viewer, ViewerMode.WEB, memory, readiness, stopping)
+            return _keep(deployment, ViewerMode.WEB, memory, readiness, stopping)
         return code
     except (DeploymentError, PortTaken) as error:
         return _say_error(f"viewer: {error}")
@@ -101,21 +107,42 @@ def _idle(readiness: Readiness, stopping: threading.Event) -> int:
     return 0
 
 
-def _keep(viewer: ViewerSection, mode: ViewerMode, memory: str, readiness: Readiness, stopping: threading.Event) -> int:
+def hidden(viewer: ViewerSection) -> ViewerSection:
+    """Where the program itself listens."""
+    host = unguessable_host()
+    return replace(viewer, host=host, port=free_port(host), web_port=free_port(host))
+
+
+def host_check(deployment: Deployment, behind: ViewerSection, mode: ViewerMode) -> HostCheck:
+    """The ports of the deployment, in front of those where the program listens."""
+    viewer = deployment.viewer
+    ports = {(viewer.host, viewer.port): (behind.host, behind.port)}
+    if mode is ViewerMode.WEB:
+        ports[viewer.host, viewer.web_port] = (behind.host, behind.web_port)
+    return HostCheck(ports, own_names(viewer.host, deployment.panel.name))
+
+
+def _keep(
+    deployment: Deployment, mode: ViewerMode, memory: str, readiness: Readiness, stopping: threading.Event
+) -> int:
     """Run the viewer once. A native one that ends well was closed by its user; a web one never ends by itself."""
-    connection = ViewerConnection(viewer.host, viewer.port)
-    child = start(command(rerun_binary(), viewer, mode, memory), stderr=subprocess.PIPE)
-    threading.Thread(target=_relay, args=(child.stderr,), daemon=True, name="viewer's errors").start()
-    started = time.monotonic()
-    try:
+    behind = hidden(deployment.viewer)
+    connection = ViewerConnection(behind.host, behind.port)
+    started, is_open = time.monotonic(), False
+    with ExitStack() as ends:
+        ends.callback(connection.close)
+        child = start(command(rerun_binary(), behind, mode, memory), stderr=subprocess.PIPE)
+        ends.callback(stop, child)
+        threading.Thread(target=_relay, args=(child.stderr,), daemon=True, name="viewer's errors").start()
         while not stopping.wait(PERIOD):
             if child.poll() is not None:
                 return _ended(child, mode, time.monotonic() - started)
-            _beat(connection, readiness, address(viewer, mode))
-        return 0
-    finally:
-        connection.close()
-        stop(child)
+            is_new = connection.is_new(time.monotonic())
+            if is_new and not is_open:
+                ends.enter_context(host_check(deployment, behind, mode))
+                is_open = True
+            _beat(connection, is_new, readiness, address(deployment.viewer, mode))
+    return 0
 
 
 def _relay(errors: IO[bytes] | None) -> None:
@@ -125,8 +152,8 @@ def _relay(errors: IO[bytes] | None) -> None:
         say(CUT_OFF if "h2 protocol error" in text else text, sys.stderr)
 
 
-def _beat(connection: ViewerConnection, readiness: Readiness, where: str) -> None:
-    if connection.is_new(time.monotonic()):
+def _beat(connection: ViewerConnection, is_new: bool, readiness: Readiness, where: str) -> None:
+    if is_new:
         say(f"viewer: {where}")
         readiness.ready()
     elif connection.is_alive:

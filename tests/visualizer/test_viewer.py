@@ -1,5 +1,8 @@
 """The viewer as a process: ready when it answers, on loopback only, and gone when it is told to go."""
 
+import contextlib
+import http.client
+import ipaddress
 import os
 import re
 import signal
@@ -82,13 +85,9 @@ def test_it_gets_ready_listens_on_loopback_only_and_stops_without_orphans(viewer
     viewer.start()
     viewer.wait_until_ready()
     children = viewer.children()
-    listening = {
-        (each.laddr.ip, each.laddr.port)
-        for child in children
-        for each in child.net_connections("inet")
-        if each.status == psutil.CONN_LISTEN
-    }
-    assert listening == {("127.0.0.1", viewer.section.port), ("127.0.0.1", viewer.section.web_port)}
+    itself = psutil.Process(viewer.process.pid)
+    assert listening(itself) == {("127.0.0.1", viewer.section.port), ("127.0.0.1", viewer.section.web_port)}
+    assert all(ipaddress.ip_address(host).is_loopback for child in children for host, _ in listening(child))
     time.sleep(1.2)
     began = time.monotonic()
     viewer.process.send_signal(signal.SIGTERM)
@@ -99,6 +98,39 @@ def test_it_gets_ready_listens_on_loopback_only_and_stops_without_orphans(viewer
     assert gone(children)
     assert f"http://127.0.0.1:{viewer.section.web_port}/?url=" in output
     assert not (viewer.run / "viewer.ready").exists()
+
+
+def listening(process):
+    """The addresses that it listens on."""
+    found = process.net_connections("inet")
+    return {(each.laddr.ip, each.laddr.port) for each in found if each.status == psutil.CONN_LISTEN}
+
+
+def status(address, host, path="/", origin=None):
+    """The status of an answer, and the origin whose pages may read it."""
+    connection = http.client.HTTPConnection(*address, timeout=10.0)
+    headers = {"Host": host, "Content-Type": "application/grpc-web+proto", "X-Grpc-Web": "1"}
+    with contextlib.closing(connection):
+        connection.request("POST", path, b"", headers if origin is None else {**headers, "Origin": origin})
+        answer = connection.getresponse()
+        return answer.status, answer.getheader("Access-Control-Allow-Origin")
+
+
+def test_a_name_that_a_site_has_pointed_here_reads_nothing_of_the_twin(viewer):
+    """Rerun answers it, which is why its ports are not the program's own; a page of another name it leaves unread."""
+    viewer.start()
+    viewer.wait_until_ready()
+    data, page = ("127.0.0.1", viewer.section.port), ("127.0.0.1", viewer.section.web_port)
+    messages = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages"
+    own = [address for child in viewer.children() for address in listening(child)]
+    assert sorted(status(address, "rebound.example", messages)[0] for address in own) == [200, 404]  # data, page
+    assert status(data, "rebound.example", messages)[0] == 403
+    assert status(page, "rebound.example")[0] == 403
+    assert status(data, f"127.0.0.1:{viewer.section.port}", messages)[0] == 200
+    assert status(page, f"localhost:{viewer.section.web_port}")[0] == 200
+    own_page = f"http://127.0.0.1:{viewer.section.web_port}"
+    assert status(data, "127.0.0.1", messages, own_page) == (200, own_page)
+    assert status(data, "127.0.0.1", messages, "http://rebound.example:9090")[1] is None
 
 
 def stream_to(viewer):

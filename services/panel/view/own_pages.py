@@ -7,8 +7,6 @@ lets one show this page within its own, unless each answer says that it may not.
 from __future__ import annotations
 
 import asyncio
-import ipaddress
-import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http import HTTPStatus
@@ -22,6 +20,7 @@ from websockets.http11 import Request, Response
 
 from services.panel.view.broken_connections import BrokenConnections
 from services.panel.view.own_pace import PacedConnection
+from services.runtime.process.own_names import host_objection, own_names
 
 Handler = Callable[[ServerConnection, Request], Response | None]
 
@@ -71,40 +70,10 @@ def own_pages_only(host: str, broken: BrokenConnections, name: str = "") -> Iter
         server.serve = serve  # type: ignore[misc]
 
 
-def own_names(host: str, name: str = "") -> frozenset[str]:
-    """What this machine is called where somebody opens the page, with the `name` of the deployment; addresses are
-    understood besides. A name that ends with .local is anybody's who answers first, so it counts only as that `name`.
-    """
-    own = {"localhost", host.lower(), name.lower(), socket.gethostname().lower()}
-    return frozenset(
-        each for each in own if each and (not each.endswith(".local") or each in (name.lower(), host.lower()))
-    )
-
-
 def objection(host: str | None, origin: str | None, names: frozenset[str]) -> str:
     """Why a request for `host` (a Host header) from a page of `origin` (an Origin header) is refused; else empty."""
-    called = _name_of(f"//{host}") if host else ""
-    if not (called in names or _is_address(called)):  # a site's name may point at this machine
-        known = ", ".join(sorted(names))
-        return (
-            f'this is not "{called}": open the page by this machine\'s address or as {known}; '
-            "another name of its own stands in the deployment file, as [panel] name"
-        )
+    if reason := host_objection(host, names):
+        return reason
     if origin is not None and urlsplit(origin).netloc.lower() != (host or "").lower():
         return f"a page of {origin} may not lead the arm: open http://{host}"
     return ""
-
-
-def _name_of(address: str) -> str:
-    try:
-        return (urlsplit(address).hostname or "").lower()
-    except ValueError:
-        return ""
-
-
-def _is_address(name: str) -> bool:
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True

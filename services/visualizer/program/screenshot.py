@@ -103,8 +103,8 @@ def _settle(client: ViewerClient, deadline: float) -> None:
         time.sleep(0.25)
 
 
-def free_port() -> int:
-    """A port on loopback that is free now."""
+def free_port(host: str = LOOPBACK) -> int:
+    """A port that is free now on `host`, an address of IPv4's loopback."""
     with socket.socket() as probe:
-        probe.bind((LOOPBACK, 0))
+        probe.bind((host, 0))
         return int(probe.getsockname()[1])
