@@ -1,4 +1,4 @@
-"""Draws wiring.svg, the wiring of rm1, with the pins that urdf/rm1/robot.toml names: `python -m firmware.draw_wiring`.
+"""`python -m firmware.draw_wiring` draws wiring.svg: the wiring of rm1, with the pins of urdf/rm1/robot.toml.
 
 A net that is named in a flag is one wire wherever that flag stands.
 """

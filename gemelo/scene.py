@@ -170,7 +170,7 @@ class Scene:
         self.edit(SceneMove(name=name, pose=_pose(at, orientation), frame=frame))
 
     def resize(self, name: str, shape: Shape) -> None:
-        """Gives an object another shape: `schemas.scene.BoxShape(size=...)` and its kin, or `gemelo.load_mesh(...)`.
+        """Gives an object another shape: `schemas.scene.BoxShape(size=...)` and its kin, or `load_mesh(...)`.
 
         >>> from schemas.scene import SphereShape
         >>> arm.scene.add_sphere("ball", radius=0.03, at=(0.3, 0.25, 0.1))

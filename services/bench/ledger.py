@@ -1,7 +1,7 @@
 """The calibration of the step ledger: what it calls sure, against the shafts of motors of random weakness.
 
-`python -m services.bench.ledger --moves 10000` prints the table of docs/ledger.md; virtual time, the same for the same
-seed. Motors give a random share of the torque that robot.toml states, which the ledger does not know. After every move
+`python -m services.bench.ledger --moves 10000` prints the table of docs/ledger.md: virtual time, equal for equal
+seeds. Motors give a random share of the torque that robot.toml states, which the ledger does not know. After every move
 its confidence is compared with the truth: whether a shaft stands half a cycle of its field or more from its counter.
 Now and then the joints are verified: that tells the ledger what a homing would tell it.
 """

@@ -1,6 +1,6 @@
 """MQTT and bus traffic from processes of its own: a bare MQTT echo as a reference, and floods against a stop.
 
-`python -m services.bench.traffic echo --port ... --bytes-there ...` prints the round trips [ms] as JSON: QoS 1 there as
+`python -m services.bench.traffic echo --port ... --bytes-there ...` prints round trips [ms] as JSON: QoS 1 there as
 chunks are sent, QoS 0 back as they are acknowledged, TCP_NODELAY on both sides.
 `python -m services.bench.traffic flood WHAT --port PORT --robot NAME --rate 5000 --seconds 10` ends by itself.
 """

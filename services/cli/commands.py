@@ -1,4 +1,4 @@
-"""The table of commands: words, help, and functions (`module:function` in services.cli) that are loaded when used."""
+"""The table of commands: words, help, and functions (`module:function` in services.cli), loaded when used."""
 
 from __future__ import annotations
 

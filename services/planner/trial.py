@@ -1,6 +1,6 @@
 """The end of `gemelo check`: random configurations of a robot, and plans between the free ones.
 
-`python -m services.planner.trial ROBOT_FOLDER` prints its findings as JSON, one a line; none where plans succeed.
+`python -m services.planner.trial ROBOT_FOLDER` prints its findings as JSON, one a line; none if plans succeed.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The pairs of links of a new robot's folder that need no check, sampled in a process of its own.
 
-`python -m services.robot_import.pairs ROBOT_FOLDER METRES` prints each pair as JSON, one a line; links that are never
-farther apart than METRES are always near.
+`python -m services.robot_import.pairs ROBOT_FOLDER METRES` prints each pair as JSON, one a line; links
+that are never farther apart than METRES are always near.
 """
 
 from __future__ import annotations

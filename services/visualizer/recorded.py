@@ -1,4 +1,4 @@
-"""`python -m services.visualizer.recorded FILE`: a recording in the twin's own view; a black box at its incident.
+"""`python -m services.visualizer.recorded FILE`: a recording in the twin's view; a black box at its incident.
 
 What is drawn is made from the messages alone, by the same core that draws the living arm.
 """

@@ -46,8 +46,8 @@ class Playing:
         self.heard: list[int] = []
         self._keys, terminal = pty.openpty()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "services.cli.main", "bag", "play", str(bag), "--paused"], cwd=ROOT, env=environ,
-            stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            [sys.executable, "-m", "services.cli.main", "bag", "play", str(bag), "--paused"], cwd=ROOT,
+            env=environ, stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
         os.close(terminal)
         assert self.process.stdout is not None

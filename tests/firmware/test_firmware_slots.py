@@ -83,8 +83,8 @@ def test_where_no_slot_can_be_started_the_process_ends_with_one_sentence_and_a_r
         board.boot()
     assert remedy in str(error.value)
     ended = subprocess.run(
-        [sys.executable, "-m", "firmware.platform.host.main"], cwd=ROOT, capture_output=True, text=True, check=False,
-        timeout=60.0, env={**os.environ, "GEMELO_PATHS_RUN": str(tmp_path / "run")},
+        [sys.executable, "-m", "firmware.platform.host.main"], cwd=ROOT, capture_output=True, text=True,
+        check=False, timeout=60.0, env={**os.environ, "GEMELO_PATHS_RUN": str(tmp_path / "run")},
     )  # fmt: skip
     assert ended.returncode == 1
     said = ended.stdout + ended.stderr

@@ -260,8 +260,9 @@ def test_one_client_does_not_block_another(stack: Stack):
 
 def test_nothing_is_left_of_a_planner_that_is_killed_while_it_plans():
     code = (
-        "import time; from pathlib import Path; from schemas.planning import *; from schemas.joints import JointState;"
-        "from schemas.scene import PlanningScene; from services.planner.workers.workers import Workers;"
+        "import time; from pathlib import Path; from schemas.planning import *;"
+        "from schemas.joints import JointState; from schemas.scene import PlanningScene;"
+        "from services.planner.workers.workers import Workers;"
         f"scene = PlanningScene(); project = Path({str(PROJECT)!r});"
         "w = Workers(project / 'urdf/rm1', project, lambda: (None, 0.0), lambda: scene);"
         f"home = JointState(name={HOME.name!r}, position=(0.0, 0.0, 0.0));"

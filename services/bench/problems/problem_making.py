@@ -1,4 +1,4 @@
-"""Makes `problem_sets.json`: `python -m services.bench.problems.problem_making [arm/scene ...]`; all take many minutes.
+"""Makes `problem_sets.json`: `python -m services.bench.problems.problem_making [arm/scene ...]`, in many minutes.
 
 Pairs of random free configurations are drawn until enough have a known path. Pairs without one are left out: for rm1 a
 grid over all configurations decides whether a path exists, for parol6 searches of several seconds do. So a planner

@@ -182,7 +182,8 @@ def meshed(rm1_folder: Path, tmp_path: Path) -> ArmDescription:
 def test_another_process_finds_what_the_first_has_made(meshed: ArmDescription, made: list[int], folder: Path):
     program = (
         "import sys; from pathlib import Path; from services.arm.model.description import load_arm; "
-        "from services.planner.native.native_planner import NativePlanner; NativePlanner(load_arm(Path(sys.argv[1])))"
+        "from services.planner.native.native_planner import NativePlanner; "
+        "NativePlanner(load_arm(Path(sys.argv[1])))"
     )
     subprocess.run([sys.executable, "-c", program, str(meshed.folder)], check=True)
     there = set(folder.iterdir())
