@@ -33,6 +33,7 @@ from schemas.device import (
     InjectResponse,
     SensorReadings,
     ShaftPositions,
+    StopKind,
 )
 from schemas.frames import FrameTransforms, RobotDescription
 from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
@@ -105,6 +106,7 @@ class Request(Generic[Q_co, R_co]):
     about: str
     urgent: bool = False  # sent, read and handled before all that waits; equal ones that wait are handled once
     recorded: bool = True  # its server publishes each question with its answer
+    first: Q_co | None = None  # of an urgent one: this question is read and handled before all other urgent ones
 
 
 @dataclass(frozen=True)
@@ -257,6 +259,7 @@ DEVICE_STOP = Request(
     GATEWAY,
     "stop, hold or disarm, before anything else",
     urgent=True,
+    first=DeviceStopRequest(kind=StopKind.STOP),
 )
 DEVICE_CONFIGURE = Request(
     "device/configure", ConfigureRequest, ConfigureResponse, GATEWAY, "give the device its configuration anew"

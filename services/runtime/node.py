@@ -454,7 +454,7 @@ class Node:
         warn, rates = self.log.warning, self._rates
         tell = self.publisher(exchange_topic(request)).put if request.recorded else None
         if request.urgent:
-            server = UrgentServer(self._bus, self._loop.tasks.put_first, request, handler, warn, rates, tell)
+            server = UrgentServer(self._bus, self._loop.tasks, request, handler, warn, rates, tell)
         else:
             put = self._worker.put if worker else self._loop.tasks.put
             server = RequestServer(self._bus, put, request, handler, warn, rates, tell)

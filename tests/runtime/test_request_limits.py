@@ -189,7 +189,7 @@ def test_a_stop_above_the_rate_is_carried_out(buses: Buses) -> None:
     ask(client, DEVICE_STOP.key, DeviceStopRequest(), answers)
     assert until(lambda: len(answers) == 18)
     assert hear(server, lambda: len(answers) == 21 and len(handled) == 2)
-    assert handled == [StopKind.HOLD, StopKind.STOP]
+    assert handled == [StopKind.STOP, StopKind.HOLD]
     assert answers.count(UNREAD) == 18
 
 

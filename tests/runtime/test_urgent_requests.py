@@ -63,6 +63,62 @@ def test_an_urgent_request_is_handled_before_all_that_waits(buses: Buses) -> Non
     assert handled == ["stop"] + ["plan"] * MAX_WAITING_OF_A_CLIENT
 
 
+def test_a_stop_is_handled_before_all_urgent_requests_that_wait_holds_too(buses: Buses) -> None:
+    server, client = buses.node("gateway"), buses.open()
+    handled: list[str] = []
+    cancel = keys.cancel_request(FOLLOW)
+    server.serve(cancel, lambda asked: handled.append("cancel") or CancelResponse())
+    server.serve(DEVICE_STOP, lambda asked: handled.append(asked.kind) or DeviceCommandResponse(accepted=True))
+    assert client.wait_served(cancel.key, 1.0)
+    assert client.wait_served(DEVICE_STOP.key, 1.0)
+    answers: Answers = []
+    for number in range(MAX_WAITING_OF_A_CLIENT):
+        ask(client, cancel.key, CancelRequest(goal_id=str(number)), answers)
+    assert until(lambda: _received(server, cancel.key) == MAX_WAITING_OF_A_CLIENT)
+    for kind in (StopKind.HOLD, StopKind.DISARM):
+        ask(client, DEVICE_STOP.key, DeviceStopRequest(kind=kind), answers)
+    assert until(lambda: _received(server) == 2)
+    stopped: Answers = []
+    ask(client, DEVICE_STOP.key, DeviceStopRequest(), stopped)
+    assert until(lambda: _received(server) == 3)
+    assert hear(server, lambda: len(handled) == MAX_WAITING_OF_A_CLIENT + 3)
+    assert handled == ["stop"] + ["cancel"] * MAX_WAITING_OF_A_CLIENT + ["hold", "disarm"]
+    assert until(lambda: len(answers) + len(stopped) == len(handled))
+
+
+def test_a_stop_is_read_before_the_holds_that_have_arrived_before_it(router: RouterProcess) -> None:
+    server, client = (ZenohBus(router.deployment.router, "rm1") for _ in range(2))
+    is_released, has_arrived = threading.Event(), threading.Event()
+    read: list[bytes] = []
+
+    def read_slowly(query: Query) -> None:
+        read.append(query.arrival.payload)
+        is_released.wait(60.0)
+        query.drop()
+
+    def note(query: Query) -> None:
+        has_arrived.set()
+        query.drop()
+
+    hold, stop = (encode(DeviceStopRequest(kind=kind)) for kind in (StopKind.HOLD, StopKind.STOP))
+    try:
+        server.serve(DEVICE_STOP.key, read_slowly, True, lambda payload: payload == stop)
+        server.serve("after", note, True)
+        assert client.wait_served(DEVICE_STOP.key, 2.0)
+        assert client.wait_served("after", 2.0)
+        for payload in (*[hold] * 300, stop):
+            client.ask(DEVICE_STOP.key, DeviceStopRequest.__name__, payload, 60.0, lambda answer: None, True)
+        client.ask("after", "", b"", 60.0, lambda answer: None, True)  # on the same way, behind all of them
+        assert has_arrived.wait(10.0)
+        is_released.set()
+        assert until(lambda: len(read) == 301)
+    finally:
+        is_released.set()
+        for bus in (server, client):
+            bus.close()
+    assert read == [hold, stop] + [hold] * 299
+
+
 def test_equal_stops_that_wait_are_handled_once_and_all_answered(buses: Buses) -> None:
     server, client = buses.node("gateway"), buses.open()
     handled: list[StopKind] = []
@@ -79,8 +135,8 @@ def test_equal_stops_that_wait_are_handled_once_and_all_answered(buses: Buses) -
     assert all(answer is not None and answer.ok for answer in answers)
 
 
-def _received(server) -> int:
-    return sum(each.received for each in server.statistics() if each.key == DEVICE_STOP.key)
+def _received(server, key: str = DEVICE_STOP.key) -> int:
+    return sum(each.received for each in server.statistics() if each.key == key)
 
 
 class Unlimited(RequestRates):

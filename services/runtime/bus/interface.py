@@ -15,6 +15,13 @@ from services.runtime.clock import Clock
 
 ENCODING = "application/msgpack"  # the schema's name follows after a semicolon
 
+IsFirst = Callable[[bytes], bool]  # of the payload of a request
+
+
+def never(_payload: bytes) -> bool:
+    """No request is before another."""
+    return False
+
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
@@ -144,8 +151,11 @@ class Bus(Protocol):
         """
         ...
 
-    def serve(self, key: str, on_query: Callable[[Query], None], urgent: bool = False) -> Declaration:
-        """Requests under `key` come to `on_query`; of those that wait for it the oldest may be lost if not `urgent`."""
+    def serve(
+        self, key: str, on_query: Callable[[Query], None], urgent: bool = False, is_first: IsFirst = never
+    ) -> Declaration:
+        """Requests under `key` come to `on_query`; of those that wait for it the oldest may be lost if not `urgent`,
+        and if it is, those whose payload `is_first` come before the rest."""
         ...
 
     def wait_served(self, key: str, timeout: float) -> bool:

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable
 
 from schemas.topics import Delivery
-from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Declaration, Query
+from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Declaration, IsFirst, Query, never
 from services.runtime.bus.memory_network import (
     MemoryNetwork,
     MemoryPublication,
@@ -83,7 +83,10 @@ class MemoryBus:
         self._declared.append(subscription)
         return subscription
 
-    def serve(self, key: str, on_query: Callable[[Query], None], urgent: bool = False) -> MemoryQueryable:
+    def serve(
+        self, key: str, on_query: Callable[[Query], None], urgent: bool = False, is_first: IsFirst = never
+    ) -> MemoryQueryable:
+        """None waits here."""
         service = MemoryQueryable(self, key, on_query)
         with self.network.served:
             self.network.services[key] = service

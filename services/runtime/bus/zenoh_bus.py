@@ -36,7 +36,7 @@ from services.runtime.bus.branches import (
     written_under,
 )
 from services.runtime.bus.dead_links import end_dead_links
-from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Query
+from services.runtime.bus.interface import UNREAD, Arrival, BusReply, IsFirst, Query, never
 from services.runtime.bus.pace import Pace
 from services.runtime.bus.recognition import Recognition
 from services.runtime.bus.zenoh_config import client_config
@@ -221,11 +221,13 @@ class ZenohBus:
         sources = [reply.ok.source_info for reply in replies if reply.ok is not None]
         return {_epoch(source): source.source_sn for source in sources if source is not None}
 
-    def serve(self, key: str, on_query: Callable[[Query], None], urgent: bool = False) -> ZenohQueryable:
+    def serve(
+        self, key: str, on_query: Callable[[Query], None], urgent: bool = False, is_first: IsFirst = never
+    ) -> ZenohQueryable:
         if urgent and self._urgent_session is None:
             self._urgent_session = self._open()
         session = self._urgent_session if urgent and self._urgent_session else self._session
-        queryable = ZenohQueryable(session, key, on_query, urgent, is_verified=bool(self._common_name))
+        queryable = ZenohQueryable(session, key, on_query, urgent, bool(self._common_name), is_first)
         self._queryables.append(queryable)
         return queryable
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import threading
 import traceback
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cached_property
@@ -14,7 +15,7 @@ import zenoh
 from zenoh.handlers import FifoChannel, Handler, RingChannel
 
 from services.runtime.bus.branches import LOCAL, asker_at, served_under
-from services.runtime.bus.interface import ENCODING, Arrival
+from services.runtime.bus.interface import ENCODING, Arrival, IsFirst, never
 
 MAX_SECRET = 32  # [bytes] of what a session says of itself
 CLIENT_BYTES = 16  # of a client's name; chosen: as unguessable as the secret
@@ -77,15 +78,23 @@ class ZenohQueryable:
     """Hands the queries of one key to `on_query` in a thread of its own.
 
     Zenoh's thread, which brings the queries of all keys, only puts them into a channel: it never waits for Python, so
-    that a flood of one key does not delay the others. Of a full channel the oldest query is lost, unless it is urgent.
+    that a flood of one key does not delay the others. Of a full channel the oldest query is lost, unless it is urgent;
+    of urgent ones those that are first are read before all others that are there.
     """
 
     def __init__(
-        self, session: zenoh.Session, key: str, on_query: Callable[[ZenohQuery], None], urgent: bool, is_verified: bool
+        self,
+        session: zenoh.Session,
+        key: str,
+        on_query: Callable[[ZenohQuery], None],
+        urgent: bool,
+        is_verified: bool,
+        is_first: IsFirst = never,
     ) -> None:
         """`is_verified`: the router lets everyone ask as its own principal alone; else all are `local`."""
         self.key, self.is_urgent = key, urgent  # is_urgent: while it is declared
-        self._on_query, self._is_verified = on_query, is_verified
+        self._on_query, self._is_verified, self._is_first = on_query, is_verified, is_first
+        self._waiting: deque[zenoh.Query] = deque()  # that were taken from the channel and are not first
         channel: Any = FifoChannel(QUERIES) if urgent else RingChannel(QUERIES)
         self._queryable: Any = session.declare_queryable(served_under(key), channel, complete=True)
         self._thread = threading.Thread(target=self._run, args=(self._queryable.handler,), daemon=True, name=key)
@@ -103,10 +112,18 @@ class ZenohQueryable:
     def _run(self, queries: Handler[zenoh.Query]) -> None:
         with suppress(zenoh.ZError):  # the channel is closed
             while True:
-                query: zenoh.Query | None = queries.recv()
+                query: zenoh.Query | None = queries.try_recv() if self._waiting else queries.recv()
                 while query is not None:
-                    self._hand_over(query)
-                    query = queries.try_recv()
+                    self._take(query)
+                    query = queries.try_recv() if len(self._waiting) < QUERIES else None
+                if self._waiting:
+                    self._hand_over(self._waiting.popleft())
+
+    def _take(self, query: zenoh.Query) -> None:
+        if self._is_first is never or self._is_first(bytes(query.payload or b"")):
+            self._hand_over(query)
+        else:
+            self._waiting.append(query)
 
     def _hand_over(self, query: zenoh.Query) -> None:
         try:

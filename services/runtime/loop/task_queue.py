@@ -32,16 +32,17 @@ class Arrived:
 
 
 class TaskQueue:
-    """A FIFO queue of tasks for the event loop, and a second one with priority."""
+    """A FIFO queue of tasks for the event loop, one with priority, and one before both."""
 
     def __init__(self) -> None:
         self._tasks: SimpleQueue[Task] = SimpleQueue()
+        self._before_all: deque[Task] = deque()
         self._urgent: deque[Task] = deque()
         self.on_put: Task | None = None  # called after every `put`
 
     @property
     def is_empty(self) -> bool:
-        return not self._urgent and self._tasks.empty()
+        return not self._before_all and not self._urgent and self._tasks.empty()
 
     def put(self, task: Task) -> None:
         self._tasks.put(task)
@@ -53,12 +54,19 @@ class TaskQueue:
         self._urgent.append(task)
         self.wake()
 
+    def put_before_all(self, task: Task) -> None:
+        """`task` is taken before what `put_first` has brought too."""
+        self._before_all.append(task)
+        self.wake()
+
     def wake(self) -> None:
         """Lets `take` return; safe in a signal handler."""
         self.put(_nothing)
 
     def take(self, timeout: float) -> Task | None:
         """The next task, or None after `timeout` [s]."""
+        if self._before_all:
+            return self._before_all.popleft()
         if self._urgent:
             return self._urgent.popleft()
         try:

@@ -11,14 +11,14 @@ from typing import Any, Generic, Protocol, TypeVar
 import msgspec
 
 from schemas.actions import NIL
-from schemas.message import BadMessage, Message, encode
+from schemas.message import BadMessage, Message, decode, encode
 from schemas.system import Exchange, Failure, TopicStatistics
 from schemas.topics import Request
-from services.runtime.bus.interface import Arrival, Bus, Query
+from services.runtime.bus.interface import Arrival, Bus, Query, never
 from services.runtime.bus.wire import Encoded, TooLarge, encoded, from_arrival, schema_of, to_payload
 from services.runtime.clock import SYSTEM, Clock
 from services.runtime.errors import TOO_LARGE, RequestRefused
-from services.runtime.loop.task_queue import Task
+from services.runtime.loop.task_queue import Task, TaskQueue
 from services.runtime.requests.limits import OF_A_CLIENT, RequestRates, WaitingRequests
 from services.runtime.requests.overtaken import OvertakenRequests
 from services.runtime.topics import Warn
@@ -201,7 +201,8 @@ class RequestServer(Generic[Q, R]):
         self._received, self._refused, self._dropped, self._bad = 0, 0, 0, 0
         self._waiting = WaitingRequests(request.key)
         self._overtaken = OvertakenRequests(request.key)
-        self._declaration = bus.serve(request.key, self._on_query, request.urgent)
+        is_first = never if request.first is None else self._is_first
+        self._declaration = bus.serve(request.key, self._on_query, request.urgent, is_first)
 
     @property
     def statistics(self) -> TopicStatistics:
@@ -217,6 +218,13 @@ class RequestServer(Generic[Q, R]):
         Those are what has arrived, and what the clients in `asked` (see `Pending.asked`) have asked for before.
         """
         self._overtaken.stop(reason, asked, self._clock.monotonic())
+
+    def _is_first(self, payload: bytes) -> bool:
+        """True if this question is read before all others of its key."""
+        try:
+            return decode(self.request.request, payload) == self.request.first
+        except BadMessage:
+            return False
 
     def _on_query(self, query: Query) -> None:
         """Nothing of a request is read before its client may ask at all."""
@@ -281,7 +289,7 @@ class RequestServer(Generic[Q, R]):
 
 
 class UrgentServer(RequestServer[Q, R]):
-    """Answers the requests of one key before everything else that waits in the node.
+    """Answers the requests of one key before everything else that waits in the node, and `Request.first` before them.
 
     Requests are read where they arrive, and equal ones that wait are handled once, for all their callers: repeating
     one costs nothing. All are carried out. What a client asks above its rate gets no answer, and is carried out up to
@@ -291,19 +299,20 @@ class UrgentServer(RequestServer[Q, R]):
     def __init__(
         self,
         bus: Bus,
-        put: Callable[[Task], None],
+        tasks: TaskQueue,
         request: Request[Q, R],
         handler: Callable[[Q, Pending[R]], None],
         warn: Warn,
         rates: RequestRates,
         tell: Tell | None = None,
     ) -> None:
+        self._tasks = tasks
         self._groups: dict[Q, PendingGroup[R]] = {}
         self._unanswered = 0
         self._taken: dict[Q, float] = {}  # [s] monotonic, when it was handled last
         self._last: tuple[Arrival, Q] | None = None  # a request that repeats it need not be decoded again
         self._lock = threading.Lock()
-        super().__init__(bus, put, request, handler, warn, rates, tell)
+        super().__init__(bus, tasks.put_first, request, handler, warn, rates, tell)
 
     def _on_query(self, query: Query) -> None:
         arrival = query.arrival
@@ -344,7 +353,8 @@ class UrgentServer(RequestServer[Q, R]):
         is_repeated = self._clock.monotonic() - self._taken.get(question, -math.inf) < REPEAT
         if is_at_once or not is_repeated:
             group.is_queued = True
-            self._put(lambda: self._take_group(question))
+            put = self._tasks.put_before_all if question == self.request.first else self._tasks.put_first
+            put(lambda: self._take_group(question))
         elif group.is_new:
             group.is_new = False
             self._clock.later(REPEAT, lambda: self._queue_late(question, group))
