@@ -14,6 +14,7 @@ from schemas.device import DeviceCommandKind
 from schemas.robot import Dialect
 from services.arm.model.description import ArmDescription, heard_by_the_board
 from services.arm.motors.relative_moves import ramp_of
+from services.stepper_gateway.links.foreign import ra_messages
 from services.stepper_gateway.links.foreign.ra_device import RaDevice
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Moment
@@ -80,7 +81,9 @@ class SketchArm(GatewayDriver):
     def _exchange(self) -> None:
         monotonic = self.moment.monotonic
         while self._down and self._down[0][0] <= self.now:
-            self.sketch.receive(self._down.pop(0)[1])
+            _, message = self._down.pop(0)
+            self.sketch.receive(message)
+            self.device.hear(ra_messages.JOINTS, message, False, monotonic)  # the broker passes it to all
         for topic, payload in self.sketch.advance(self.now):
             if not self.is_cut:
                 self._up.append((self._arrival(self._up[-1][0] if self._up else 0.0), topic, payload))
@@ -93,6 +96,10 @@ class SketchArm(GatewayDriver):
                 self._down.append((self._arrival(self._down[-1][0] if self._down else 0.0), message))
         for kind, report in self.device.take():
             self.receive(kind, report)
+
+    def send_as_another(self, message: bytes) -> None:
+        """Another program sends it on ra/juntas."""
+        self._down.append((self._arrival(self._down[-1][0] if self._down else 0.0), message))
 
     def _arrival(self, after: float) -> float:
         return max(after, self.now + self._delay + self._rng.random() * self._jitter)

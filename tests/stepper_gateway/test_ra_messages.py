@@ -21,6 +21,7 @@ from services.stepper_gateway.links.foreign.ra_messages import (
     BadRaMessage,
     degrees,
     joints_message,
+    moves,
     read_sensors,
     read_states,
 )
@@ -132,3 +133,19 @@ def test_a_ratio_that_is_none_is_refused_by_name() -> None:
         ramp_of(msgspec.structs.replace(drive, sketch=SketchTable(steps_per_turn="18662,4")))
     other = ramp_of(msgspec.structs.replace(drive, sketch=SketchTable(steps_per_turn="18662", acceleration=3110.0)))
     assert (float(other.steps_per_turn), other.acceleration) == (18662.0, 3110.0)
+
+
+@pytest.mark.parametrize(
+    ("message", "is_move"),
+    [
+        (b'{"q1":0,"q2":0,"q3":0}', True),  # it ends the move under way
+        (b'{"q1":1,"q2":null,"q3":"2","modo":"viejo"}', True),  # for the sketch's library each is a number
+        (b'{"q1":1,"q2":2}', False),
+        (b'{"q1":1,"q2":2,"q3":3,"x":"' + b"x" * 256 + b'"}', False),  # longer than the sketch's buffer
+        (b"\xff", False),
+        (b"[" * 5000, False),
+        (b'["q1","q2","q3"]', False),
+    ],
+)
+def test_a_sketch_moves_by_what_names_every_joint(message: bytes, is_move: bool) -> None:
+    assert moves(message, [ramp_of(joint.drive) for joint in ra_arm().joints]) is is_move

@@ -135,6 +135,57 @@ def test_a_reconnection_in_a_move_ends_it_and_the_position_is_not_known_any_more
     assert "gemelo reference" in arm.goal(ra_move(HOME, (0.1, 0.0, 0.0)), "next").reason
 
 
+OLD_DRIVER = b'{"q1":2.5,"q2":0,"q3":0.0,"avanzar":0}'
+
+
+def test_another_program_on_ra_juntas_ends_the_move_and_nothing_moves_until_it_is_gone() -> None:
+    arm = SketchArm().referenced()
+    assert arm.goal(ra_move(HOME, (QUARTER, 0.0, 0.0))).accepted
+    arm.run(3.0)
+    arm.send_as_another(OLD_DRIVER)
+    status, _ = arm.finish()
+    assert status is GoalStatusCode.ABORTED
+    sent = len(arm.messages_sent)
+    for number in range(3):
+        arm.command(DeviceCommandKind.REFERENCE, number)
+        arm.run(1.0)
+        arm.send_as_another(OLD_DRIVER)
+        arm.run(0.5)
+        assert "gemelo reference" in arm.goal(ra_move(HOME, (0.1, 0.0, 0.0)), f"g{number}").reason
+    assert [each for each in arm.messages_sent[sent:] if b"q1" in each] == []
+    lost = [each.detail for each in arm.published["device/events"] if each.event == "position_lost"]
+    assert len(lost) == 4
+    assert "another program sends ra/juntas too" in lost[0]
+    assert '(1 so far: {"q1":2.5' in lost[0]
+    arm.command(DeviceCommandKind.REFERENCE, 99)
+    arm.run(1.0)
+    assert arm.goal(ra_move(HOME, (0.1, 0.0, 0.0)), "after").accepted
+    assert arm.finish("after")[0] is GoalStatusCode.SUCCEEDED
+
+
+@pytest.mark.parametrize("message", [b"", b"hola", b'{"avanzar":1}', b'{"q1":2.5,"q2":1}', b"[1,2,3]"])
+def test_what_no_sketch_moves_by_is_nobodys_move(message: bytes) -> None:
+    arm = SketchArm().referenced()
+    assert arm.goal(ra_move(HOME, (0.3, 0.0, 0.0))).accepted
+    arm.run(1.0)
+    arm.send_as_another(message)
+    assert arm.finish()[0] is GoalStatusCode.SUCCEEDED
+    assert settled(arm)
+    assert "position_lost" not in arm.events()
+
+
+def test_what_the_broker_sends_back_twice_is_still_our_own() -> None:
+    arm = SketchArm().referenced()
+    assert arm.goal(ra_move(HOME, (0.3, 0.0, 0.0))).accepted
+    assert arm.finish()[0] is GoalStatusCode.SUCCEEDED
+    for message in arm.messages_sent:
+        arm.device.hear("ra/juntas", message, False, arm.moment.monotonic)
+        arm.device.hear("ra/juntas", OLD_DRIVER, True, arm.moment.monotonic)  # retained: it was before our time
+    arm.run(1.0)
+    assert "position_lost" not in arm.events()
+    assert arm.goal(ra_move((0.3, 0.0, 0.0), HOME), "back").accepted
+
+
 def test_a_sketch_that_is_silent_at_rest_keeps_its_position() -> None:
     arm = SketchArm().referenced()
     assert arm.goal(ra_move(HOME, (0.1, 0.0, 0.0))).accepted

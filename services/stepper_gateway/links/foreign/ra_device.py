@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 
 import msgspec
@@ -17,6 +18,11 @@ from services.stepper_gateway.links.link import Kind
 NAME = "an AccelStepper sketch on ra/juntas"
 SILENCE = 10.0  # words of its telemetry that a sketch may miss before it counts as gone; chosen: QoS 0 loses some
 
+OWN = 64  # messages of ours that are known when the broker sends them back; chosen: those of a minute and more
+OTHER = (
+    "another program sends ra/juntas too, and the sketch has moved by it: where the arm is is not known. End that "
+    "program, then run `gemelo reference`"
+)
 COMPLAINTS = 1.0  # [s] between two about messages that cannot be read; chosen: the log stays readable
 
 
@@ -36,6 +42,8 @@ class RaDevice:
         self._estado: float | None = None
         self._bad, self._complained = 0, -1.0e9  # how many, and [s] when one was told of last
         self._reports: list[Report] = []
+        self._own: deque[bytes] = deque(maxlen=OWN)
+        self._others, self._told_others = 0, -1.0e9  # messages of another program, and [s] when they were told of last
 
     @property
     def sent(self) -> tuple[int, ...]:
@@ -53,9 +61,12 @@ class RaDevice:
             self._sender.rebase(placed)
 
     def hear(self, topic: str, payload: bytes, retained: bool, now: float) -> None:
-        """A message of the sketch at `now` [s]. One retained may be of a dead sketch; what is unreadable is told."""
+        """A message of the sketch, or to it, at `now` [s]. One retained may be of a dead sketch; what is unreadable is
+        told."""
         if retained:
             return
+        if topic == ra_messages.JOINTS:
+            return self._hear_joints(payload, now)
         read = ra_messages.read_states if topic == ra_messages.STATES else ra_messages.read_sensors
         try:
             values = read(payload).values
@@ -78,7 +89,9 @@ class RaDevice:
                 self._is_lost = False
                 detail = "the sketch was silent in a motion: where the arm is is not known"
                 self._say(Kind.EVENT, {"event": "position_lost", "t_us": 0, "detail": detail})
-        return self._messages(now)
+        messages = self._messages(now)
+        self._own.extend(messages)
+        return messages
 
     def take(self) -> list[Report]:
         """What the gateway is to hear; nothing while the sketch is silent."""
@@ -103,6 +116,22 @@ class RaDevice:
             self._said_output = output
             return [ra_messages.output_message(output)]
         return []
+
+    def _hear_joints(self, payload: bytes, now: float) -> None:
+        """What the broker has passed on to the sketch: by another's move nobody knows any more where the arm is."""
+        if payload in self._own or not ra_messages.moves(payload, self._ramps):
+            return
+        self._others += 1
+        if self._stand_in.is_referenced or self._stand_in.is_moving or not self._is_settled:
+            self._stand_in.start(self.sent, False, now)
+            self._sender = RaSender(self._ramps, self.sent, self._telemetry_time)
+            self._told_others = -1.0e9
+        if now - self._told_others >= COMPLAINTS:
+            self._told_others = now
+            event = {"event": "position_lost", "t_us": self._stand_in.device_us(now)}
+            self._say(
+                Kind.EVENT, {**event, "detail": f"{OTHER} ({self._others} so far: {payload.decode(errors='replace')})"}
+            )
 
     def _miss(self, now: float) -> None:
         """The sketch has fallen silent: a motion does not go on, and what it did of the last message is not known."""

@@ -1,4 +1,7 @@
-"""MQTT to a sketch: `ra/juntas` out, `ra/estados` and `ra/sensores` in, one fresh client per connection."""
+"""MQTT to a sketch: `ra/juntas` out, `ra/estados` and `ra/sensores` in, one fresh client per connection.
+
+`ra/juntas` is read too: what another program sends there moves the arm as well.
+"""
 
 from __future__ import annotations
 
@@ -89,7 +92,7 @@ class RaLink:
     def _on_connect(self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
         if is_failure(reason):
             return self._lose(refusal(code_of(reason), str(reason), self._access))
-        client.subscribe([(ra_messages.STATES, 0), (ra_messages.SENSORS, 0)])
+        client.subscribe([(ra_messages.STATES, 0), (ra_messages.SENSORS, 0), (ra_messages.JOINTS, 0)])
         assert isinstance(client, MqttClient)  # ours, see `_connection`
         self._client = client
         self._wake()

@@ -45,6 +45,17 @@ def joints_message(steps: Sequence[int], ramps: Sequence[Ramp], output: bool) ->
     return msgspec.json.encode({**moves, OUTPUT: int(output)})
 
 
+def moves(payload: bytes, ramps: Sequence[Ramp]) -> bool:
+    """True if a sketch moves by it, or ends the move under way: it names every joint, and takes for 0 what is none."""
+    if len(payload) > LARGEST:
+        return False
+    try:
+        found = msgspec.json.decode(payload)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return False
+    return isinstance(found, dict) and all(ramp.name in found for ramp in ramps)
+
+
 def output_message(output: bool) -> bytes:
     """The output alone: a move of nought would end the one under way."""
     return msgspec.json.encode({OUTPUT: int(output)})
