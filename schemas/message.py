@@ -7,12 +7,13 @@ neither by decoding nor by construction.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from enum import Enum
 from math import isfinite
-from typing import TypeVar
+from operator import attrgetter
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import msgspec
-from msgspec.structs import astuple
 
 Vector = tuple[float, ...]
 UNSURE = frozenset((float, tuple, list))  # what may not be finite, or hold what is not: messages have seen to that
@@ -26,29 +27,62 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
     """A frozen record with defaults for every field and no NaN or infinity anywhere in it."""
 
     def __post_init__(self) -> None:
-        values = astuple(self)
+        kind = type(self)
+        values = (_values_of.get(kind) or _look_at(kind))(self)
         for value in values:
-            kind = type(value)
-            if kind is float:
+            found = type(value)
+            if found is float:
                 if not isfinite(value):
                     break
-            elif (kind is tuple or kind is list) and value and not _is_plainly_finite(value):
-                break
+            elif (found is tuple or found is list) and value:
+                # A quick answer first; the sum is finite only where each number is.
+                if type(value[0]) is float:
+                    if not has_finite_sum(value):
+                        break
+                elif not UNSURE.isdisjoint(map(type, value)):
+                    break
         else:
             return
-        for field, value in zip(self.__struct_fields__, values, strict=True):
+        for field, value in zip(_fields_of[kind], values, strict=True):
             if type(value) is float and not isfinite(value):
                 raise ValueError(f"field `{field}` is {value}: it must be finite")
             if type(value) is tuple or type(value) is list:
                 _require_finite(field, value)
 
 
+WITHOUT_FLOATS = (str, bytes, int, Enum, type(None), Message)
+
+_fields_of: dict[type[Message], tuple[str, ...]] = {}  # that a float may be in, by its type as it is declared
+_values_of: dict[type[Message], Callable[[Message], tuple[Any, ...]]] = {}  # of these fields
+
+
+def _look_at(kind: type[Message]) -> Callable[[Message], tuple[Any, ...]]:
+    """Finds the fields of a kind of message that may hold a float, once; messages within it look at their own."""
+    fields = tuple(name for name, declared in _declared(kind).items() if _may_hold_a_float(declared))
+    _fields_of[kind] = fields
+    if len(fields) > 1:
+        _values_of[kind] = attrgetter(*fields)
+    else:
+        _values_of[kind] = lambda message: tuple(getattr(message, field) for field in fields)
+    return _values_of[kind]
+
+
+def _declared(kind: type[Message]) -> dict[str, object]:
+    """The types of the fields; of what cannot be found where it is declared, anything."""
+    try:
+        found = get_type_hints(kind)
+    except NameError:
+        found = {}
+    return {name: found.get(name, object) for name in kind.__struct_fields__}
+
+
+def _may_hold_a_float(declared: object) -> bool:
+    if within := get_args(declared):
+        return any(_may_hold_a_float(each) for each in within if each is not ...)
+    return not (isinstance(declared, type) and issubclass(declared, WITHOUT_FLOATS))
+
+
 M = TypeVar("M", bound=Message)
-
-
-def _is_plainly_finite(values: Sequence[object]) -> bool:
-    """A quick answer: True only where nothing in `values` can be anything but finite."""
-    return has_finite_sum(values) if type(values[0]) is float else UNSURE.isdisjoint(map(type, values))
 
 
 def _require_finite(field: str, values: Sequence[object]) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 
 from firmware.bindings.firmware_slot import FirmwareSlot, firmware_calls
-from firmware.bindings.frames import OUTPUTS, InputLevels, OutFrame, PinChange, PlatformRequest
+from firmware.bindings.frames import OUTPUTS, InputLevels, LastingState, OutFrame, PinChange, PlatformRequest
 from firmware.bindings.library import LIBRARY, MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
 from firmware.bindings.motor import MotorError, horn_record, motor_record
 from schemas.device import DeviceMode
@@ -200,6 +200,21 @@ class CoreDevice:
             if count == 0:
                 return changes
             changes += [PinChange(ticks[i], steps[i], dirs[i]) for i in range(count)]
+
+    @property
+    def lasting(self) -> LastingState:
+        """What outlasts the device's power, by one look."""
+        record = self._snapshot()
+        if record.config_crc32 != self._config_crc:
+            self._config, self._config_crc = _decoded(self.kept_config), record.config_crc32
+        count = len(self._config.joints)
+        return LastingState(
+            record.config_crc32,
+            tuple(record.steps[:count]),
+            tuple(record.shaft[:count]),
+            bool(record.still),
+            bool(record.referenced),
+        )
 
     def _snapshot(self) -> SnapshotRecord:
         record = SnapshotRecord()

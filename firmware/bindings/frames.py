@@ -31,6 +31,16 @@ class PinChange(NamedTuple):
     dir: int
 
 
+class LastingState(NamedTuple):
+    """What a restart must find; one value for each joint."""
+
+    config_crc32: int  # 0 for none
+    steps: tuple[int, ...]  # executed
+    shaft: tuple[int, ...]  # [steps] where the joints truly are
+    still: bool
+    referenced: bool
+
+
 class InputLevels(NamedTuple):
     """The levels of the device's input pins: bit i is GPIO i, then GPIO 32 + i."""
 

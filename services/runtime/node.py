@@ -149,9 +149,10 @@ class Node:
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """The publisher of a topic; the same one for every call."""
         publishers = self._endpoints.publishers
-        if topic.key not in publishers:
-            publishers[topic.key] = Publisher(self._bus, topic, self.name, self._identity.instance)
-        return publishers[topic.key]
+        publisher = publishers.get(topic.key)
+        if publisher is None:
+            publisher = publishers[topic.key] = Publisher(self._bus, topic, self.name, self._identity.instance)
+        return publisher
 
     def unpublish(self, topic: Topic[M]) -> None:
         """Ends the publisher of a topic, with what late joiners would have got of it."""
@@ -498,7 +499,7 @@ class Node:
 
         Call before each turn of a loop that must not act beside another.
         """
-        return self._stop_watch.is_certain(self.monotonic(), lambda: self.is_connected, self._name.newer)
+        return self._stop_watch.is_certain(self.clock.monotonic(), lambda: self.is_connected, self._name.newer)
 
     def _beat(self) -> None:
         if objection := self._name.objection(self.monotonic()):

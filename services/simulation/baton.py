@@ -18,28 +18,24 @@ class Baton:
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
-        self._wanting: deque[None] = deque()
-
-    @property
-    def is_wanted(self) -> bool:
-        return bool(self._wanting)
+        self.wanting: deque[None] = deque()  # one for each thread that waits for it
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
         if self._lock.acquire(False):
             return True
         if not blocking:
             return False
-        self._wanting.append(None)
+        self.wanting.append(None)
         try:
             return self._lock.acquire(True, timeout)
         finally:
-            self._wanting.pop()
+            self.wanting.pop()
 
     def release(self) -> None:
         self._lock.release()
 
     def __enter__(self) -> bool:
-        return self.acquire()
+        return self._lock.acquire(False) or self.acquire()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._lock.release()
@@ -53,11 +49,11 @@ class Baton:
         return self._lock._release_save()  # type: ignore[attr-defined]
 
     def _acquire_restore(self, state: object) -> None:
-        self._wanting.append(None)
+        self.wanting.append(None)
         try:
             self._lock._acquire_restore(state)  # type: ignore[attr-defined]
         finally:
-            self._wanting.pop()
+            self.wanting.pop()
 
 
 class VirtualCondition(threading.Condition):
@@ -65,15 +61,19 @@ class VirtualCondition(threading.Condition):
 
     def __init__(self, baton: Baton, wait_until: WaitUntil) -> None:
         super().__init__(baton)  # type: ignore[arg-type]
+        self._baton = baton
         self._wait_until = wait_until
         self._notified = 0
+
+    def __enter__(self) -> bool:
+        return self._baton.__enter__()
 
     def wait(self, timeout: float | None = None) -> bool:
         before = self._notified
         return self._wait_until(lambda: self._notified != before, timeout)
 
     def wait_for(self, predicate: Callable[[], T], timeout: float | None = None) -> T:
-        self._wait_until(lambda: bool(predicate()), timeout)
+        self._wait_until(predicate, timeout)  # type: ignore[arg-type]  # whatever it returns is looked at as a truth
         return predicate()
 
     def notify(self, n: int = 1) -> None:

@@ -133,7 +133,7 @@ class VirtualClock:
         with self.baton:
             turns = self._loops[loop] = LoopTurns(loop)
             loop.on_task(lambda: self._wake(turns))
-            self._plan(turns)
+            self._plan(turns, loop.due())
 
     def release(self, loop: DrivenLoop) -> None:
         with self.baton:
@@ -175,9 +175,9 @@ class VirtualClock:
 
     def _run_alone(self, wait: Wait) -> None:
         """The quick way of a single thread: one event after another until it has what it waits for."""
-        events = self._events
+        events, wanting = self._events, self.baton.wanting
         while len(self._participants) == 1 and self._scale is None and events and events[0][0] <= wait.end:
-            if self.now >= wait.end or self._interrupts or self.baton.is_wanted or wait.is_so():
+            if self.now >= wait.end or self._interrupts or wanting or wait.is_so():
                 return
             at, _, event = heapq.heappop(events)
             if at > self.now:
@@ -221,7 +221,7 @@ class VirtualClock:
         else:
             self._turns.wait(BLINK)  # nothing will happen by itself
         self._raise_interrupts()
-        if self.baton.is_wanted:
+        if self.baton.wanting:
             self._turns.wait(0.001)
 
     def _happen(self, event: LoopTurns | VirtualTimer) -> None:
@@ -231,22 +231,25 @@ class VirtualClock:
                 task()
         elif event.at is not None and event.at <= self.now and not event.is_busy:
             event.at, event.is_busy = None, True
+            loop, now, due = event.loop, ZERO + self.now * 1e-9, 0.0
             try:
-                now, due = self.monotonic(), 0.0
                 for _ in range(AT_ONCE):
-                    event.loop.turn()
-                    due = event.loop.due()
+                    loop.turn()
+                    due = loop.due()
                     if due > now:
                         break
+            except BaseException:
+                due = loop.due()
+                raise
             finally:
                 event.is_busy = False
-                self._plan(event)
+                self._plan(event, due)
 
-    def _plan(self, turns: LoopTurns) -> None:
-        if turns.loop in self._loops:
-            due = turns.loop.due()
-            if due < math.inf:
-                self._plan_at(turns, max(self.now, math.floor((due - ZERO) * 1e9) + 1))
+    def _plan(self, turns: LoopTurns, due: float) -> None:
+        """The next turn of a loop that has something to do at `due` [s] monotonic, unless it was released meanwhile."""
+        if due < math.inf and turns.loop in self._loops:
+            at = math.floor((due - ZERO) * 1e9) + 1
+            self._plan_at(turns, at if at > self.now else self.now)
 
     def _wake(self, turns: LoopTurns) -> None:
         with self.baton:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
+
+import msgspec
 
 from schemas.actions import GoalStatusCode
 from schemas.control import ControlAnswer
@@ -19,8 +20,7 @@ from services.stepper_gateway.links.link import Kind
 Response = DeviceCommandResponse | ConfigureResponse | InjectResponse | EchoResponse | ControlAnswer
 
 
-@dataclass(frozen=True, slots=True)
-class SendFrame:
+class SendFrame(msgspec.Struct, frozen=True):
     """Bytes for the device, now or never."""
 
     kind: Kind
@@ -28,31 +28,27 @@ class SendFrame:
     urgent: bool = False  # before all that waits for the wire
 
 
-@dataclass(frozen=True, slots=True)
-class Publish:
+class Publish(msgspec.Struct, frozen=True):
     """A message for the bus."""
 
     topic: Topic[Any]
     message: Message
 
 
-@dataclass(frozen=True, slots=True)
-class GoalExecuting:
+class GoalExecuting(msgspec.Struct, frozen=True):
     """The device has taken the first knots of a goal."""
 
     goal_id: str
 
 
-@dataclass(frozen=True, slots=True)
-class GoalProgress:
+class GoalProgress(msgspec.Struct, frozen=True):
     """Feedback on a goal."""
 
     goal_id: str
     feedback: FollowJointTrajectoryFeedback
 
 
-@dataclass(frozen=True, slots=True)
-class GoalFinished:
+class GoalFinished(msgspec.Struct, frozen=True):
     """A goal's end."""
 
     goal_id: str
@@ -60,23 +56,20 @@ class GoalFinished:
     result: FollowJointTrajectoryResult
 
 
-@dataclass(frozen=True, slots=True)
-class GripperExecuting:
+class GripperExecuting(msgspec.Struct, frozen=True):
     """The device has taken a goal of the gripper."""
 
     goal_id: str
 
 
-@dataclass(frozen=True, slots=True)
-class GripperProgress:
+class GripperProgress(msgspec.Struct, frozen=True):
     """Feedback on a goal of the gripper."""
 
     goal_id: str
     feedback: GripperCommandFeedback
 
 
-@dataclass(frozen=True, slots=True)
-class GripperFinished:
+class GripperFinished(msgspec.Struct, frozen=True):
     """The end of a goal of the gripper."""
 
     goal_id: str
@@ -84,23 +77,20 @@ class GripperFinished:
     result: GripperCommandResult
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+class Answer(msgspec.Struct, frozen=True):
     """The answer to whoever has asked under `ticket`."""
 
     ticket: int
     response: Response
 
 
-@dataclass(frozen=True, slots=True)
-class KeepLedger:
+class KeepLedger(msgspec.Struct, frozen=True):
     """The step ledger, to be kept over a restart."""
 
     record: LedgerRecord
 
 
-@dataclass(frozen=True, slots=True)
-class LogLine:
+class LogLine(msgspec.Struct, frozen=True):
     """A line for people."""
 
     level: LogLevel

@@ -168,7 +168,8 @@ class Shell:
         self._inputs.finish()
 
     def _moment(self) -> Moment:
-        return Moment(self._node.now(), self._node.monotonic())
+        clock = self._node.clock
+        return Moment(clock.unix(), clock.monotonic())
 
     def _on_link(self) -> None:
         self._is_woken.clear()

@@ -113,8 +113,8 @@ def test_ruckig_is_never_given_intermediate_positions() -> None:
 def test_the_path_log_is_the_hermite_that_the_device_plays() -> None:
     log = CommandedPath()
     knot = Knot.at_rest(HOME)
-    log.append(0, StepKnot((0, 0, 0), (0, 0, 0)), knot)
-    log.append(20_000, StepKnot((256, 0, 0), (25600, 0, 0)), knot)
+    log.append(0, StepKnot((0, 0, 0), (0, 0, 0)), knot, 0.0)
+    log.append(20_000, StepKnot((256, 0, 0), (25600, 0, 0)), knot, 0.0)
     assert log.at(-5).steps == (0.0, 0.0, 0.0)
     assert log.at(20_000).steps == (1.0, 0.0, 0.0)
     assert log.at(10_000).steps[0] == pytest.approx(0.5 - 0.125 * 100 * 0.02)

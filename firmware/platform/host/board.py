@@ -109,18 +109,19 @@ class Board:
         self.firmware.remember()
         if self.is_on_trial:
             return
-        crc32 = device.config_crc32
+        present = device.lasting
+        crc32 = present.config_crc32
         if crc32 != self._crc32 and self._flash.keep_configuration(device.kept_config.decode()):
             self._crc32 = crc32
-        if not device.config.joints:
+        if not present.steps:
             return
-        self._shaft = device.shaft
+        self._shaft = present.shaft
         self._memory.keep(
             StoredPosition(
                 device=self.name,
-                steps=device.steps,
-                moving=not device.still,
-                referenced=device.referenced,
+                steps=present.steps,
+                moving=not present.still,
+                referenced=present.referenced,
                 shaft=self._shaft,
             )
         )

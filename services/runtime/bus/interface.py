@@ -7,8 +7,9 @@ task queue and return. A bus delivers its own publications only to subscriptions
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
+
+import msgspec
 
 from schemas.topics import Delivery
 from services.runtime.clock import Clock
@@ -23,8 +24,7 @@ def never(_payload: bytes) -> bool:
     return False
 
 
-@dataclass(frozen=True, slots=True)
-class Arrival:
+class Arrival(msgspec.Struct, frozen=True):
     """One message as it came: `schema` and `writer` (a node's name) are empty where the sender named none.
 
     Of a key that many nodes write, `writer` is the node's address as the key has it (branches.py), else as it says.
@@ -38,8 +38,7 @@ class Arrival:
     instance: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class BusReply:
+class BusReply(msgspec.Struct, frozen=True):
     """One reply to a request; `ok` is False where the payload is a `Failure`."""
 
     ok: bool

@@ -55,8 +55,10 @@ class MemoryPublication:
     unsent: deque[Arrival] = field(default_factory=lambda: deque(maxlen=KEPT))
 
     def put(self, payload: bytes) -> None:
-        arrival = Arrival(self.key, self.schema, payload, self.writer, self.instance)
         network = self.bus.network
+        if self.delivery is Delivery.LATEST and not network.subscriptions.get(self.key):
+            return
+        arrival = Arrival(self.key, self.schema, payload, self.writer, self.instance)
         with network.lock:
             if self.delivery is Delivery.LATCHED:
                 self.last = arrival
@@ -66,7 +68,8 @@ class MemoryPublication:
                 self.unsent.append(arrival)
 
     def send(self, arrival: Arrival) -> None:
-        for reader in list(self.bus.network.subscriptions[self.key]):
+        readers = self.bus.network.subscriptions.get(self.key)
+        for reader in tuple(readers) if readers else ():
             if reader.own or reader.bus is not self.bus:
                 reader.on_arrival(arrival)
 

@@ -34,7 +34,7 @@ class NameHolder:
     @property
     def newer(self) -> str:
         """The token of a node that has started after this one, under its name; empty if there is none."""
-        return max(self._newer, default="")
+        return max(self._newer) if self._newer else ""
 
     def objection(self, now: float) -> str:
         """Why this node has to end at `now` [s] monotonic, empty if it may go on."""

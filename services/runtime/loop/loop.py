@@ -33,12 +33,8 @@ class Schedule:
         if not rate > 0.0:
             raise ValueError(f"rate {rate} Hz: it must be above 0")
         self._start, self._rate, self._count = start, rate, 0
+        self.deadline = start  # [s] of the next step, on the clock of `start`
         self.figures = LoopFigures()
-
-    @property
-    def deadline(self) -> float:
-        """[s] of the next step, on the clock of `start`."""
-        return self._start + self._count / self._rate
 
     def begin(self, now: float) -> None:
         """Records how late the step that begins at `now` [s] is."""
@@ -48,6 +44,7 @@ class Schedule:
     def end(self, now: float) -> None:
         """Advances to the first deadline after `now` [s]."""
         self._count = max(self._count + 1, int((now - self._start) * self._rate) + 1)
+        self.deadline = self._start + self._count / self._rate
 
     def take_figures(self) -> LoopFigures:
         """The figures since the last call."""
@@ -147,7 +144,10 @@ class Loop:
         now, self._turn_thread = self.clock.monotonic(), threading.get_ident()
         try:
             self._step_if_due(now)
-            self._run_once(now, now)
+            self._run_periodic_tasks(now)
+            task = self.tasks.take_at_once()
+            if task is not None:
+                self.carry_out(task)
         finally:
             self._turn_thread = 0
 
@@ -234,15 +234,17 @@ class Loop:
 
     def _run_once(self, now: float, until: float) -> None:
         """Runs the periodic tasks that are due, then one queued task; waits for it until `until` [s] monotonic."""
-        due = now + IDLE_TIMEOUT
+        self._run_periodic_tasks(now)
+        due = min((periodic.due for periodic in self._periodic_tasks), default=math.inf)
+        task = self.tasks.take(min(until, due, now + IDLE_TIMEOUT) - now)
+        if task is not None:
+            self.carry_out(task)
+
+    def _run_periodic_tasks(self, now: float) -> None:
         for periodic in self._periodic_tasks:
             if now >= periodic.due:
                 periodic.due = now + periodic.period
                 self.carry_out(periodic.task)
-            due = min(due, periodic.due)
-        task = self.tasks.take(min(until, due) - now)
-        if task is not None:
-            self.carry_out(task)
 
     @contextmanager
     def _in_this_thread(self) -> Iterator[None]:

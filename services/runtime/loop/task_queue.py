@@ -65,14 +65,20 @@ class TaskQueue:
 
     def take(self, timeout: float) -> Task | None:
         """The next task, or None after `timeout` [s]."""
+        if self._before_all or self._urgent or timeout <= 0.0:
+            return self.take_at_once()
+        try:
+            return self._tasks.get(timeout=timeout)
+        except Empty:
+            return None
+
+    def take_at_once(self) -> Task | None:
+        """The next task, or None where there is none."""
         if self._before_all:
             return self._before_all.popleft()
         if self._urgent:
             return self._urgent.popleft()
-        try:
-            return self._tasks.get(timeout=timeout) if timeout > 0.0 else self._tasks.get_nowait()
-        except Empty:
-            return None
+        return None if self._tasks.empty() else self._tasks.get_nowait()
 
 
 class ArrivalQueue(Protocol):

@@ -82,15 +82,13 @@ class ControlHolder:
             return f"{self._claim.words} takes control"
         return f"{self._holder.words}, who holds control, is gone" if self._holder and self.is_gone else ""
 
-    def state(self, stamp: int) -> ControlState:
-        """What everybody may know; `stamp` [ns] UNIX."""
-        about = ControlState(
-            stamp=stamp, epoch=self._epoch, number=self._number, given=self._was_given, pending=self.must_rest
-        )
+    def state(self) -> ControlState:
+        """What everybody may know, without a stamp."""
+        about = ControlState(epoch=self._epoch, number=self._number, given=self._was_given, pending=self.must_rest)
         if (holder := self._holder) is None:
             return about
         return ControlState(
-            stamp=stamp, epoch=self._epoch, number=self._number, held=True, name=holder.name,
+            epoch=self._epoch, number=self._number, held=True, name=holder.name,
             node=holder.client.node, host=holder.client.host, since=self._since.unix,
             members=tuple(member.address for member in self._members.values()), pending=about.pending,
         )  # fmt: skip

@@ -129,10 +129,10 @@ class ControlHandler:
         """Publishes who holds control where that has changed, and writes it to the log."""
         for level, text in self._control.take_notes():
             self._device.out.log(level, text)
-        state = self._control.state(moment.unix)
-        if self._told is None or replace(state, stamp=0) != self._told:
-            self._told = replace(state, stamp=0)
-            self._device.out.publish(CONTROL, state)
+        state = self._control.state()
+        if state != self._told:
+            self._told = state
+            self._device.out.publish(CONTROL, replace(state, stamp=moment.unix))
 
     def _change(self, moment: Moment) -> None:
         """Brings the arm to rest where control is to change hands."""

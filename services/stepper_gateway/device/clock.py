@@ -44,11 +44,13 @@ class ClockSync:
         self._exchanges: deque[SyncExchange] = deque(maxlen=WINDOW)
         self._contradicting: deque[SyncExchange] = deque(maxlen=WINDOW)  # since the last that agreed
         self._line = ClockLine(0.0, 0.0, 0.0)
+        self.longest_round_trip = 0.0  # [s] of the exchanges that are kept, the last half minute's
 
     def reset(self) -> None:
         """Forget everything: another boot is another clock."""
         self._exchanges.clear()
         self._contradicting.clear()
+        self.longest_round_trip = 0.0
 
     def add(self, t0: int, t1: int, t2: int, t3: int) -> bool:
         """True if it is believed: t0 sent, t3 received on our clock, t1 received, t2 sent on the device's [us]."""
@@ -63,6 +65,7 @@ class ClockSync:
             self._contradicting.clear()
         self._exchanges.append(exchange)
         self._line = _line(self._exchanges)
+        self.longest_round_trip = max(one.round_trip for one in self._exchanges) * 1e-6
         return True
 
     def _begin_anew(self, exchange: SyncExchange) -> bool:
@@ -96,11 +99,6 @@ class ClockSync:
     def round_trip(self) -> float:
         """[s] of the latest exchange."""
         return self._exchanges[-1].round_trip * 1e-6 if self._exchanges else 0.0
-
-    @property
-    def longest_round_trip(self) -> float:
-        """[s] of the exchanges that are kept, the last half minute's."""
-        return max((exchange.round_trip for exchange in self._exchanges), default=0.0) * 1e-6
 
     def device_time(self, monotonic: float) -> int:
         """[us] of the device's clock at an instant of ours [s]."""

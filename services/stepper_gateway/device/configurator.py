@@ -137,13 +137,12 @@ class Configuration:
 
     def _tell(self, unreachable_reason: str, moment: Moment) -> None:
         message = DeviceConfiguration(
-            stamp=moment.unix,
             text=self._text.decode(),
             crc32=self.crc32,
             device_crc32=self.device_crc32,
             accepted=self.is_in_force and not unreachable_reason,
             reason=unreachable_reason or self.mismatch_reason(),
         )
-        if self._told is None or replace(message, stamp=0) != self._told:
-            self._told = replace(message, stamp=0)
-            self._out.publish(DEVICE_CONFIGURATION, message)
+        if message != self._told:
+            self._told = message
+            self._out.publish(DEVICE_CONFIGURATION, replace(message, stamp=moment.unix))

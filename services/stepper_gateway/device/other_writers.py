@@ -69,6 +69,8 @@ class OtherBoots:
 
     def living(self, now: float) -> tuple[int, ...]:
         """The boots of which a device sends states at `now` [s] monotonic, beside the present one."""
+        if not self._seen:
+            return ()
         return tuple(boot for boot, at in sorted(self._seen.items()) if now - at <= PRESENT)
 
 

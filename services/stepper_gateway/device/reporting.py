@@ -26,6 +26,7 @@ class Reporter:
         self._joints = joints
         self._names = tuple(joint.name for joint in joints)
         self._max_error = [0.0] * len(joints)
+        self._converted: tuple[tuple[int, ...] | tuple[float, ...], Vector] = ((), ())  # the last steps, and where
 
     def motion_begins(self) -> None:
         """From here on `max_error` counts anew."""
@@ -33,7 +34,11 @@ class Reporter:
 
     def positions(self, steps: tuple[int, ...] | tuple[float, ...]) -> Vector:
         """[rad] or [m] of motor steps; a joint on its limit is there, not half a step beyond it."""
-        return tuple(_position(joint, count) for joint, count in zip(self._joints, steps, strict=True))
+        known, positions = self._converted
+        if steps is not known:
+            positions = tuple([_position(joint, count) for joint, count in zip(self._joints, steps, strict=True)])
+            self._converted = steps, positions
+        return positions
 
     def _rates(self, rates: tuple[float, ...], scale: float = 1.0) -> Vector:
         return tuple(rate * scale / joint.steps.per_unit for joint, rate in zip(self._joints, rates, strict=True))
@@ -146,5 +151,7 @@ class Reporter:
 def _position(joint: Joint, count: float) -> float:
     """The device stands on the whole step nearest to a limit: a plan from there must not begin outside."""
     position = joint.steps.to_position(count)
+    if joint.lower <= position <= joint.upper:
+        return position
     nearest = min(max(position, joint.lower), joint.upper)
     return nearest if abs(position - nearest) * joint.steps.per_unit <= HALF_STEP else position

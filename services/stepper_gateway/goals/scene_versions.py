@@ -84,8 +84,7 @@ class SceneVersions:
     @property
     def rivals(self) -> str:
         """The sentence for two living planners that have both published a scene; empty if there is one at most."""
-        both = sorted(self._living & self._newest.keys())
-        if len(both) < 2:
+        if len(self._living) < 2 or len(both := sorted(self._living & self._newest.keys())) < 2:
             return ""
         older, newer = map(_process, both[-2:])
         return (

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 from schemas.device import DeviceMode
 from schemas.ledger import StoppingDistance
+from schemas.message import Vector
 from schemas.topics import STOPPING_DISTANCE
 from services.arm.device.device_config import device_config
 from services.arm.frames.transforms import Point
@@ -23,7 +24,6 @@ PERIOD = 1.0 / (STOPPING_DISTANCE.rate or 10.0)  # [s]
 SLOTS = 0.004  # [s] that the device prepares ahead, and a slot for each decision: standard, firmware/core
 JITTER = 1.5  # chosen: times the longest round trip of late, that the device's last heartbeat may have taken one way
 STILL = 1.0  # [steps/s] chosen: slower joints stop within a step
-MOST_PLACES = 512  # places of the tool that are remembered; chosen: the device's queue is shorter
 
 NOT_OURS = "the device plays a path that this gateway has not sent"
 OPEN_LOOP = "this board does not say what it does, nor does it watch a heartbeat"
@@ -39,7 +39,8 @@ class StoppingWatch:
         self._timeout = device_config(device.arm).hold_timeout_ms * 1e-3
         self._told = -1.0e9  # [s] monotonic
         self._stream_id, self._began = -1, 0.0  # and when its first knots may have come [s] monotonic
-        self._places: dict[tuple[float, ...], Point] = {}  # of the tool, by joint values
+        self._segments: dict[int, Segment] = {}  # of the path that waits, by the time [us] of their first knots
+        self._reached: tuple[Vector, Point] = ((), (0.0, 0.0, 0.0))  # joint values of the last knot, and its place
 
     def step(self, moment: Moment) -> None:
         """Tell what is due."""
@@ -73,6 +74,7 @@ class StoppingWatch:
         is_under_way = stream is not None and not stream.is_abandoned and not stream.is_finished
         if stream is not None and stream.id != self._stream_id:
             self._stream_id, self._began = stream.id, moment.monotonic + longest
+            self._segments.clear()
         if state.mode == DeviceMode.HOMING:
             return self._of_ramps(state, max(0.0, silence + self._timeout - moment.monotonic) + SLOTS)
         if is_under_way and stream is not None and not stream.has_started:
@@ -92,7 +94,7 @@ class StoppingWatch:
         clock = self._device.session.clock
         played = stream.played_us(moment.monotonic, clock) - round(0.5e6 * clock.round_trip)
         knots = stream.log.upcoming(played)
-        path = [self._segment(*pair) for pair in pairwise(knots)]
+        path = self._path(knots)
         if path:
             left = (knots[1][0] - max(played, knots[0][0])) / max(1, knots[1][0] - knots[0][0])
             path[0] = path[0]._replace(dt=path[0].dt * left, length=path[0].length * left,
@@ -106,17 +108,24 @@ class StoppingWatch:
         reaction = min(reaction, stop.duration)
         return stop._replace(duration=stop.duration + SLOTS), reaction
 
+    def _path(self, knots: list[tuple[int, Knot]]) -> list[Segment]:
+        """Between the knots that wait; each is computed once, as a knot stays as it was sent."""
+        known = self._segments
+        self._segments = {
+            first[0]: known.get(first[0]) or self._segment(first, second) for first, second in pairwise(knots)
+        }
+        return list(self._segments.values())
+
     def _segment(self, first: tuple[int, Knot], second: tuple[int, Knot]) -> Segment:
         (start, a), (end, b) = first, second
         return segment((end - start) * 1e-6, math.dist(self._place(a), self._place(b)), a.velocity, b.velocity)
 
     def _place(self, knot: Knot) -> Point:
-        """Of the tool; each knot is asked for ten times a second while it waits."""
-        place = self._places.get(knot.position)
-        if place is None:
-            if len(self._places) >= MOST_PLACES:
-                self._places.clear()
-            place = self._places[knot.position] = self._jacobian.tool(knot.position)
+        """Of the tool; a knot ends one segment and begins the next."""
+        position, place = self._reached
+        if position != knot.position:
+            place = self._jacobian.tool(knot.position)
+            self._reached = knot.position, place
         return place
 
     def _longest_braking(self, path: list[Segment]) -> float:

@@ -25,11 +25,14 @@ class CommandedPath:
         self._times: list[int] = []  # [us]
         self._steps: list[StepKnot] = []
         self._knots: list[Knot] = []
+        self._braking: list[float] = []  # [s] from each knot to rest
 
-    def append(self, time_us: int, steps: StepKnot, knot: Knot) -> None:
+    def append(self, time_us: int, steps: StepKnot, knot: Knot, braking: float) -> None:
+        """`braking` [s] is how long the arm takes from the knot to rest."""
         self._times.append(time_us)
         self._steps.append(steps)
         self._knots.append(knot)
+        self._braking.append(braking)
 
     @property
     def end_us(self) -> int:
@@ -47,6 +50,15 @@ class CommandedPath:
         """The knots from the one at or before `from_us` to the one at or before `to_us`."""
         first = max(0, bisect_right(self._times, from_us) - 1)
         return self._knots[first : bisect_right(self._times, to_us)]
+
+    def count_between(self, from_us: int, to_us: int) -> int:
+        """How many `knots_between` has."""
+        return bisect_right(self._times, to_us) - max(0, bisect_right(self._times, from_us) - 1)
+
+    def longest_braking(self, from_us: int, to_us: int) -> float:
+        """[s] the longest that braking from one of `knots_between` to rest takes; 0 for none."""
+        first = max(0, bisect_right(self._times, from_us) - 1)
+        return max(self._braking[first : bisect_right(self._times, to_us)], default=0.0)
 
     def upcoming(self, from_us: int) -> list[tuple[int, Knot]]:
         """Stream times [us] and knots, from the one at or before `from_us` to the last."""
@@ -67,7 +79,7 @@ class CommandedPath:
         """Forget what was played long ago."""
         if len(self._times) > PRUNED_AT:
             gone = max(0, bisect_right(self._times, played_us) - KEPT)
-            del self._times[:gone], self._steps[:gone], self._knots[:gone]
+            del self._times[:gone], self._steps[:gone], self._knots[:gone], self._braking[:gone]
 
 
 def _rest(knot: StepKnot) -> PathPoint:

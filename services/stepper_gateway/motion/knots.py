@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from schemas.message import Vector
@@ -69,12 +68,9 @@ def whole_steps(q8: int) -> int:
     return (q8 + 128) >> 8
 
 
-def longest_stop(knots: Sequence[Knot], joints: tuple[Joint, ...]) -> float:
-    """[s] the longest that braking from one of these knots to rest takes at the acceleration limits; 0 for none."""
-    if not knots:
-        return 0.0
-    by_joint: Iterable[Vector] = zip(*(knot.velocity for knot in knots), strict=True)
-    return max(max(map(abs, each)) / joint.acceleration for joint, each in zip(joints, by_joint, strict=True))
+def braking_time(knot: Knot, joints: tuple[Joint, ...]) -> float:
+    """[s] from a knot to rest, at the acceleration limits."""
+    return max(abs(rate) / joint.acceleration for joint, rate in zip(joints, knot.velocity, strict=True))
 
 
 class Limits(NamedTuple):

@@ -76,11 +76,13 @@ def _ceilings(path: Sequence[Segment], able: Sequence[float], last: float) -> li
     """The highest y before every segment and after the last, from which the device can stop at the last knot."""
     found = [last]
     for part in reversed(path):
-        lowest = 1.0
+        after, twice, lowest = found[-1], 2.0 * part.dt, 1.0
         for speed, gain, limit in zip(part.speeds, part.gains, able, strict=True):
             if speed > 0.0:
                 own = -2.0 * gain if gain < 0.0 else 0.0
-                lowest = min(lowest, (found[-1] * speed + 2.0 * part.dt * limit) / (speed + own))
+                bound = (after * speed + twice * limit) / (speed + own)
+                if bound < lowest:
+                    lowest = bound
         found.append(lowest)
     return found[::-1]
 
@@ -90,14 +92,16 @@ def _fall(part: Segment, able: Sequence[float], y: float) -> float:
     least = math.inf
     for speed, gain, limit in zip(part.speeds, part.gains, able, strict=True):
         if speed > 0.0:
-            room = limit - (max(0.0, -gain) / part.dt) * y
-            least = min(least, 2.0 * part.dt * max(room, 0.0) / speed)
+            room = limit - (-gain / part.dt) * y if gain < 0.0 else limit
+            fall = 2.0 * part.dt * room / speed if room > 0.0 else 0.0
+            if fall < least:
+                least = fall
     return least
 
 
 def _segment_time(dt: float, y0: float, y1: float) -> float:
     """[s] that a path time of `dt` takes; 0 for a segment that is left at once."""
-    total = math.sqrt(max(y0, 0.0)) + math.sqrt(max(y1, 0.0))
+    total = (math.sqrt(y0) if y0 > 0.0 else 0.0) + (math.sqrt(y1) if y1 > 0.0 else 0.0)
     return 2.0 * dt / total if total > 0.0 else 0.0
 
 

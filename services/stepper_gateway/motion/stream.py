@@ -11,7 +11,7 @@ from services.stepper_gateway.device.clock import ClockSync
 from services.stepper_gateway.links.frames import NO_JOINT, Ack, BadFrame, Chunk, ChunkFlag, Code, StateFrame, code_name
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.commanded_path import CommandedPath, PathPoint
-from services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot
+from services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot, braking_time
 
 TIME_TO_LIVE = 1_000_000  # [us] after which the device is to refuse a chunk; chosen: beyond any lead
 RETRY_MIN, RETRY_MAX = 0.06, 0.3  # [s] until a chunk is sent again; chosen: three knots, and about the lead
@@ -89,7 +89,7 @@ class Stream:
         steps = [self.encoder.encode(knot) for knot in knots]
         time_us = 0 if first else self.end_us + dt_us
         for index, (step, knot) in enumerate(zip(steps, knots, strict=True)):
-            self.log.append(time_us + index * dt_us, step, knot)
+            self.log.append(time_us + index * dt_us, step, knot, braking_time(knot, self.joints))
         chunk = SentChunk(self.next_seq, dt_us, int(flags), steps, knots, time_us)
         self.next_seq += 1
         self._credits -= len(knots)
@@ -162,7 +162,7 @@ class Stream:
         """Knots that may be sent."""
         if self.unacked:
             return max(0, self._credits)
-        waiting = len(self.log.knots_between(played_us, self.end_us))
+        waiting = self.log.count_between(played_us, self.end_us)
         return max(self._credits, self.capacity - waiting - 2, 0)
 
     def _acknowledge(self, next_seq: int) -> None:

@@ -7,7 +7,7 @@ from services.stepper_gateway.device.clock import ClockSync
 from services.stepper_gateway.links.frames import Chunk
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.knot_sources import KnotSource
-from services.stepper_gateway.motion.knots import Knot, StepEncoder, longest_stop
+from services.stepper_gateway.motion.knots import Knot, StepEncoder
 from services.stepper_gateway.motion.stream import SentChunk, Stream
 
 LARGEST_CHUNK = 20  # [knots] chosen: 0.4 s of path, in one frame also with eight joints
@@ -104,5 +104,4 @@ class MotionTransmission:
 
     def _braking(self, stream: Stream, played_us: int) -> float:
         """[s] half the longest stopping time on the way: with less, the device would slow down by itself."""
-        knots = stream.log.knots_between(played_us, stream.end_us)
-        return 0.5 * longest_stop(knots, self._joints)
+        return 0.5 * stream.log.longest_braking(played_us, stream.end_us)
