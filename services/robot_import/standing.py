@@ -58,11 +58,7 @@ def _ask_which_are_driven(mended: Mended, driven: list[UrdfJoint], tool: str, qu
 def _chain(model: UrdfModel, driven: list[UrdfJoint], tool: str) -> list[UrdfJoint]:
     """The joints nearest to the tool of those that carry it, then others of the tool, as many as a device drives."""
     above = {joint.child: joint for joint in model.joints}
-    path: list[UrdfJoint] = []
-    link = tool
-    while link in above and above[link] not in path:
-        path.append(above[link])
-        link = above[link].parent
+    path = _path_to_base(tool, above)
     carrying = [joint for joint in path if joint in driven][:MOST]
     if not carrying:
         return driven[:MOST]
@@ -83,26 +79,27 @@ def _names(text: str, driven: list[UrdfJoint]) -> list[str]:
 
 def _aside(model: UrdfModel, driven: list[UrdfJoint], tool: str) -> list[UrdfJoint]:
     """The driven joints that neither move the tool nor are carried by the last joint that does, as a gripper's are."""
-    parents = {joint.child: joint for joint in model.joints}
-    path: list[UrdfJoint] = []
-    link = tool
-    while link in parents and parents[link] not in path:
-        path.append(parents[link])
-        link = parents[link].parent
+    above = {joint.child: joint for joint in model.joints}
+    path = _path_to_base(tool, above)
     last = next((joint for joint in path if joint in driven), None)
     if last is None:
         return []
-    carried = {joint.name for joint in driven if _is_behind(joint.parent, last.child, parents)}
+    carried = {joint.name for joint in driven if _is_behind(joint.parent, last.child, above)}
     return [joint for joint in driven if joint not in path and joint.name not in carried]
 
 
-def _is_behind(link: str, first: str, parents: dict[str, UrdfJoint]) -> bool:
+def _path_to_base(link: str, above: dict[str, UrdfJoint]) -> list[UrdfJoint]:
+    """The joints that carry `link`, nearest first; `above` is the joint above each link, each once if they are a loop."""
+    path: list[UrdfJoint] = []
+    while link in above and above[link] not in path:
+        path.append(above[link])
+        link = above[link].parent
+    return path
+
+
+def _is_behind(link: str, first: str, above: dict[str, UrdfJoint]) -> bool:
     """True if `first` carries `link`, or is it."""
-    seen: set[str] = set()
-    while link != first and link in parents and link not in seen:
-        seen.add(link)
-        link = parents[link].parent
-    return link == first
+    return link == first or any(joint.parent == first for joint in _path_to_base(link, above))
 
 
 def _is_wheel(joint: UrdfJoint) -> bool:
