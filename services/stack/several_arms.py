@@ -39,10 +39,10 @@ def compose_of(
     for each in arms:
         processes |= _of_arm(single["processes"], each, common, environ)
     about = single["processes"][ABOUT]
-    names = " ".join(shlex.quote(each.name) for each in arms)
+    said = " ".join(shlex.quote(f"{each.name}={each.deployment.robot}") for each in arms)
     processes[ABOUT] = {
         **about,
-        "command": f"{about['command']} {names}",
+        "command": f"{about['command']} {_literal(said)}",
         "environment": [f"GEMELO_PATHS_OUT={_literal(common.paths.out)}"],
         "depends_on": {name: {"condition": "process_healthy"} for name in processes},
     }

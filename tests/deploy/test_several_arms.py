@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import shutil
 import subprocess
 import tomllib
@@ -126,10 +128,37 @@ def test_every_process_of_the_single_stack_runs_once_for_each_arm_and_router_bro
     of_each = set(SINGLE["processes"]) - once - {"camera", "detector"}  # there is no cell
     assert set(made) == once | {f"{arm}-{name}" for arm in BOTH for name in of_each}
     assert set(made["about"]["depends_on"]) == set(made) - {"about"}
-    assert made["about"]["command"].endswith("deploy/welcome rm1 parol6")
+    given = " ".join(f"{name}={ROOT}/urdf/{name}" for name in BOTH)
+    assert made["about"]["command"].endswith(f"deploy/welcome {given}")
     for name, process in made.items():
         assert set(process["depends_on"]) <= set(made) - {name}
     assert set(made["parol6-visualizer"]["depends_on"]) == {"router", "viewer"}
+
+
+STATES = {
+    "ready first": ('<group_state name="home" group="arm"><group_state group="arm" name="ready"/>', ("ready", "home")),
+    "one alone": ('<!-- <group_state name="ready" group="arm"/> --><group_state group="arm"\n name="park"/>', ("park",)),
+    "with a blank": ('<group_state name="put it down" group="arm"/>', ("'put it down'",)),
+}
+
+
+@pytest.mark.parametrize(("text", "states"), STATES.values(), ids=STATES)
+@pytest.mark.parametrize("several", [True, False])
+def test_the_welcome_prints_moves_to_states_that_each_arm_has(tmp_path, text, states, several):
+    """Of several arms: one has no state `ready`, or has it only in a comment."""
+    folder = tmp_path / "mi brazo"
+    folder.mkdir()
+    (folder / "arm.srdf").write_text(f"<robot>{text}</robot>")
+    bare = tmp_path / "bare"
+    bare.mkdir()
+    arguments = [f"rm1={ROOT}/urdf/rm1", f"mine={folder}", f"bare={bare}"] if several else []
+    environment = {"PATH": os.environ["PATH"], "GEMELO_PATHS_OUT": str(tmp_path), "GEMELO_ROBOT": str(folder)}
+    command = [ROOT / "deploy/welcome", *arguments]
+    said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+    moves = re.findall(r"gemelo (?:--robot (\w+) )?(move --named .*|jog)$", said, re.MULTILINE)
+    own = [("mine" if several else "", f"move --named {state}") for state in states]
+    others = [("rm1", "move --named ready"), ("rm1", "move --named home")] if several else []
+    assert moves == others + own + ([("bare", "jog")] if several else [])
 
 
 def test_what_would_only_stand_aside_is_left_out(common):
