@@ -137,7 +137,10 @@ def test_every_process_of_the_single_stack_runs_once_for_each_arm_and_router_bro
 
 STATES = {
     "ready first": ('<group_state name="home" group="arm"><group_state group="arm" name="ready"/>', ("ready", "home")),
-    "one alone": ('<!-- <group_state name="ready" group="arm"/> --><group_state group="arm"\n name="park"/>', ("park",)),
+    "one alone": (
+        '<!-- <group_state name="ready" group="arm"/> --><group_state group="arm"\n name="park"/>',
+        ("park",),
+    ),
     "with a blank": ('<group_state name="put it down" group="arm"/>', ("'put it down'",)),
 }
 
