@@ -1,4 +1,4 @@
-"""A program of five hundred steps is written, read, checked and run to its end; the limit is said where it is passed."""
+"""A program of five hundred steps is written, read, checked and run to its end; beyond the limit one is refused."""
 
 from __future__ import annotations
 
@@ -25,15 +25,16 @@ from gemelo.programs.steps import AnyStep
 from gemelo.programs.values import MOST_STEPS
 
 STEPS = 500
+MOVES = 4  # steps from one that moves to the next
 LAST = "efector_joint"
 
 
 def step(index: int, arm: gemelo.Arm) -> AnyStep:
-    """Of each ten steps five motions, one of them a line of the tool."""
-    if index % 2:
+    """Every fourth a motion, every twentieth a line of the tool."""
+    if index % MOVES:
         return Speed(share=0.9 + 0.01 * (index % 10))
-    if index % 10 == 8:
-        return Line(offset=(0.0, 0.0, 0.002 if index % 20 == 8 else -0.002))
+    if index % 20 == 8:
+        return Line(offset=(0.0, 0.0, 0.002 if index % 40 == 8 else -0.002))
     return Go(joints={LAST: arm.states["ready"][LAST] + 0.05 * math.sin(index)})
 
 
@@ -50,7 +51,7 @@ def test_a_program_of_500_steps_is_written_read_and_checked(arm: gemelo.Arm, pro
     checked = check_program(arm, programs["long"], points, programs)
     assert checked.mistakes == ()
     assert [leg.refusal for leg in checked.legs] == [None] * len(checked.legs)
-    assert {path for leg in checked.legs for path in leg.paths} >= {(index,) for index in range(0, STEPS, 2)}
+    assert {path for leg in checked.legs for path in leg.paths} >= {(index,) for index in range(0, STEPS, MOVES)}
 
 
 @pytest.mark.full
@@ -60,8 +61,8 @@ def test_a_program_of_500_steps_runs_to_its_end(arm: gemelo.Arm, program: Progra
     run = ProgramRun(arm, program, points, Programs(tmp_path), on_change=states.append)
     run.start()
     ended = run.wait(10.0 * STEPS)
-    assert (ended.status, ended.message, ended.done) == (RunStatus.DONE, "", STEPS // 2)
-    assert {path for state in states for path in state.steps} >= {(index,) for index in range(0, STEPS, 2)}
+    assert (ended.status, ended.message, ended.done) == (RunStatus.DONE, "", STEPS // MOVES)
+    assert {path for state in states for path in state.steps} >= {(index,) for index in range(0, STEPS, MOVES)}
 
 
 def test_a_program_of_more_steps_than_the_limit_is_refused_with_number_and_remedy(
