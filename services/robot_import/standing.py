@@ -89,7 +89,7 @@ def _aside(model: UrdfModel, driven: list[UrdfJoint], tool: str) -> list[UrdfJoi
 
 
 def _path_to_base(link: str, above: dict[str, UrdfJoint]) -> list[UrdfJoint]:
-    """The joints that carry `link`, nearest first; `above` is the joint above each link, each once if they are a loop."""
+    """The joints that carry `link`, nearest first, each once; `above` has the joint above each link."""
     path: list[UrdfJoint] = []
     while link in above and above[link] not in path:
         path.append(above[link])

@@ -24,7 +24,7 @@ from schemas.system import (
 )
 from schemas.topics import LOG, PARAMETER_CHANGES, STATISTICS, Action, Request, Topic
 from services.runtime.actions.client import ActionClient
-from services.runtime.actions.server import ActionServer, OnCancel, OnGoal
+from services.runtime.actions.server import ActionServer, OnCancel, OnGoal, ReadGoal
 from services.runtime.bus import identity
 from services.runtime.bus.branches import principal_of
 from services.runtime.bus.connection import await_router, connect
@@ -252,12 +252,18 @@ class Node:
         """True if a node serves `request` now. It is watched from the first look on, so that a later call finds it."""
         return self._bus.wait_served(request.key, 0.0)
 
-    def serve_action(self, action: Action[G, F, R], on_goal: OnGoal[G], on_cancel: OnCancel) -> ActionServer[G, F, R]:
-        """Serves an action: `on_goal(goal_id, goal)` accepts or refuses, `on_cancel(goal_id)` says "" or why not."""
+    def serve_action(
+        self, action: Action[G, F, R], on_goal: OnGoal[G], on_cancel: OnCancel, read: ReadGoal[G] | None = None
+    ) -> ActionServer[G, F, R]:
+        """Serves an action: `on_goal(goal_id, goal)` accepts or refuses, `on_cancel(goal_id)` says "" or why not.
+
+        `read` decodes goals in pieces, between which the loop goes on.
+        """
         clients = ClientWatch(self._watch_alive, lambda: self._bus.is_connected)
         server = ActionServer(
-            action, on_goal, on_cancel, self._serve, self.publisher, clients, self.log.warning, self.clock
-        )
+            action, on_goal, on_cancel, self._serve, self.publisher, clients, self.log.warning, self.post, self.clock,
+            read,
+        )  # fmt: skip
         self._loop.every(ActionServer.HEARTBEAT, server.beat)
         self._endpoints.actions.append(server)
         return server

@@ -5,7 +5,7 @@ Every public method takes the present `Moment` and returns outputs in order.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from msgspec.structs import replace
 
@@ -102,6 +102,10 @@ class GatewayCore:
                 self.device.event("bad_frame", f"{received.kind}: {error} ({self.bad_frames} so far)", moment)
             return self._components.out.take()
         return self._finish(moment)
+
+    def prepare_goal(self, goal: FollowJointTrajectoryGoal, moment: Moment) -> Iterator[None]:
+        """Checks a long goal ahead, in pieces; no input: what `on_goal` then decides is the same without it."""
+        return self._components.goals.prepare(goal, moment)
 
     def on_goal(
         self, goal_id: str, goal: FollowJointTrajectoryGoal, moment: Moment, caller: MotionCaller = NOBODY

@@ -50,6 +50,8 @@ from services.runtime.requests.server import Pending
 from services.stepper_gateway.control.control import seal
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
+from services.stepper_gateway.goals.goal_reading import read_goal
+from services.stepper_gateway.goals.pieces import Pieces
 from services.stepper_gateway.input_log import InputLog
 from services.stepper_gateway.inputs import (
     BeganInput,
@@ -124,7 +126,9 @@ class Shell:
         self._is_woken = threading.Event()
         self._callers: dict[int, Pending[Any]] = {}  # by ticket: who waits for the device's answer
         self._tickets = itertools.count(1)
-        self._server: Server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self._on_goal, self._on_cancel)
+        self._server: Server = node.serve_action(
+            FOLLOW_JOINT_TRAJECTORY, self._on_goal, self._on_cancel, self._read_goal
+        )
         self._gripper: Gripper = node.serve_action(GRIPPER_COMMAND, self._on_grip, self._on_grip_cancel)
         self._absences = node.absences()
         node.subscribe_signed(JOINT_TARGETS, self._on_targets)
@@ -194,6 +198,12 @@ class Shell:
         if was_silent and not self._silent:
             self.wake()
         return self._silent
+
+    def _read_goal(self, payload: bytes) -> Pieces[FollowJointTrajectoryGoal]:
+        """A long one is read and checked while the loop goes on; raises `BadMessage`."""
+        goal = yield from read_goal(payload)
+        yield from self._core.prepare_goal(goal, self._moment())
+        return goal
 
     def _on_goal(self, goal_id: str, goal: FollowJointTrajectoryGoal) -> GoalDecision:
         if self._is_silent():

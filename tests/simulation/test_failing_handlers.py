@@ -122,9 +122,9 @@ class TroubledNode(ServiceNode):
         TROUBLE.served.add((self.name, request.key))
         return super().serve_later(request, TROUBLE.within(self.name, request.key, handler))
 
-    def serve_action(self, action: Any, on_goal: Any, on_cancel: Any) -> Any:
+    def serve_action(self, action: Any, on_goal: Any, on_cancel: Any, read: Any = None) -> Any:
         goal = TROUBLE.within(self.name, f"{action.key}/goal", on_goal)
-        return super().serve_action(action, goal, TROUBLE.within(self.name, f"{action.key}/cancel", on_cancel))
+        return super().serve_action(action, goal, TROUBLE.within(self.name, f"{action.key}/cancel", on_cancel), read)
 
 
 @pytest.fixture(scope="module")

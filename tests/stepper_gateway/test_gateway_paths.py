@@ -17,7 +17,15 @@ from services.stepper_gateway.goals.limit_checks import within
 from services.stepper_gateway.motion.commanded_path import CommandedPath
 from services.stepper_gateway.motion.knot_sources import PathKnots
 from services.stepper_gateway.motion.knots import Knot, Limits, StepEncoder, StepKnot, whole_steps
-from services.stepper_gateway.motion.paths import JoinedPath, RoundedPath, SampledPath, TimedPath, join_path, profile
+from services.stepper_gateway.motion.paths import (
+    JoinedPath,
+    RoundedPath,
+    SampledPath,
+    StraightLines,
+    TimedPath,
+    join_path,
+    profile,
+)
 from services.virtual_arm.virtual_arm import rm1
 from tests.profiles import examples
 from tests.stepper_gateway.harness import ROOT, move
@@ -32,13 +40,20 @@ def corners(*rows: Vector, spacing: float = 1.0) -> JointTrajectory:
     return JointTrajectory(joint_names=rm1().joint_names, points=points)
 
 
+def rounded(trajectory: JointTrajectory, start: Vector, offset: float = 0.0) -> RoundedPath:
+    lines = StraightLines.of(trajectory)
+    while lines.integrate(1):
+        pass
+    return RoundedPath(lines, start, 0.1, offset)
+
+
 def derivative(path: TimedPath, t: float, field: int, joint: int, h: float = 1e-5) -> float:
     return (path.at(t + h)[field][joint] - path.at(t - h)[field][joint]) / (2 * h)
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.55])
 def test_a_rounded_path_is_smooth_and_its_rates_are_its_derivatives(offset: float) -> None:
-    path = RoundedPath(corners(HOME, (0.5, -0.2, 0.02), (0.3, 0.1, 0.04)), HOME, 0.1, offset)
+    path = rounded(corners(HOME, (0.5, -0.2, 0.02), (0.3, 0.1, 0.04)), HOME, offset)
     assert path.duration == pytest.approx(2.1 - offset)
     for t in (0.03, 0.2, 0.44, 0.93, 1.017, 1.04):
         for joint in range(3):
@@ -53,7 +68,7 @@ def test_a_rounded_path_is_smooth_and_its_rates_are_its_derivatives(offset: floa
 
 def test_a_rounded_path_starts_from_the_arm_where_the_first_point_comes_later() -> None:
     points = (TrajectoryPoint(positions=(0.1, 0.1, 0.1), time_from_start=2.0),)
-    path = RoundedPath(JointTrajectory(joint_names=rm1().joint_names, points=points), (0.2, 0.2, 0.1), 0.1)
+    path = rounded(JointTrajectory(joint_names=rm1().joint_names, points=points), (0.2, 0.2, 0.1))
     assert path.at(0.0).position == pytest.approx((0.2, 0.2, 0.1))
     assert path.at(1.05).position == pytest.approx((0.15, 0.15, 0.1))
 

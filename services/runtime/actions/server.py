@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -21,11 +21,13 @@ from schemas.actions import (
 from schemas.message import BadMessage, Message, decode, encode
 from schemas.topics import Action
 from services.runtime.actions import keys as keys
+from services.runtime.actions.coming_goals import ComingGoals
 from services.runtime.actions.goal_registry import GoalRecord, GoalRegistry
 from services.runtime.bus.identity import is_token
 from services.runtime.client_watch import ClientWatch
 from services.runtime.clock import SYSTEM, Clock
 from services.runtime.errors import RequestRefused
+from services.runtime.loop.task_queue import Task
 from services.runtime.requests.server import Pending, RequestServer, shortened
 from services.runtime.topics import Publisher, Warn
 
@@ -57,6 +59,7 @@ def refuse(code: int, reason: str) -> GoalDecision:
 
 OnGoal = Callable[[str, G], GoalDecision]
 OnCancel = Callable[[str], str]
+ReadGoal = Callable[[bytes], Generator[None, None, G]]  # yields between the pieces of a long one; raises `BadMessage`
 
 
 class ActionServer(Generic[G, F, R]):
@@ -73,9 +76,13 @@ class ActionServer(Generic[G, F, R]):
         publisher: Callable[[Any], Publisher[Any]],
         clients: ClientWatch,
         warn: Warn,
+        post: Callable[[Task], None],
         clock: Clock = SYSTEM,
+        read: ReadGoal[G] | None = None,
     ) -> None:
+        """`read` decodes goals, in pieces where they are long."""
         self.action = action
+        self._read = read or self._read_at_once
         self._clock = clock
         self._on_goal, self._on_cancel = on_goal, on_cancel
         self._goals, self._clients, self._warn = GoalRegistry(clock), clients, warn
@@ -84,6 +91,8 @@ class ActionServer(Generic[G, F, R]):
         self._status: Publisher[GoalStatuses] = publisher(keys.status_topic(action))
         self._ended: Publisher[GoalEnd] = publisher(keys.ended_topic(action))
         self._goal_requests = serve(keys.goal_request(action), self._answer_goal)
+        refusing = self._goal_requests.failures_refused
+        self._coming = ComingGoals(self._goal_requests.request.key, self._answering, refusing, post)
         serve(keys.cancel_request(action), self._answer_cancel)
         serve(keys.result_request(action), self._goals.answer_result)
         self.beat()
@@ -126,6 +135,7 @@ class ActionServer(Generic[G, F, R]):
 
         `asked` are the clients that want it, as in `Pending.asked`.
         """
+        self._coming.refuse(reason)
         self._goal_requests.refuse_waiting(reason, asked)
 
     def session_of(self, goal_id: str) -> str:
@@ -145,10 +155,23 @@ class ActionServer(Generic[G, F, R]):
         self._publish_status()
 
     def _answer_goal(self, request: GoalRequest, pending: Pending[GoalResponse]) -> None:
-        pending.reply(
-            self._void(request) or self._goals.response_to(request.goal_id) or self._decide(request, pending.client)
-        )
+        self._coming.take(request, pending)
+
+    def _answering(self, request: GoalRequest, pending: Pending[GoalResponse]) -> Iterator[None]:
+        response = self._void(request) or self._goals.response_to(request.goal_id)
+        if response is None:
+            self._require_form(request)
+            try:
+                wanted = yield from self._read(bytes(request.goal))
+            except BadMessage as error:
+                raise RequestRefused(f"{self.action.key}: {error}", "bad request") from error
+            response = self._decide(request, wanted, pending.client)
+        pending.reply(response)
         self._publish_status()
+
+    def _read_at_once(self, payload: bytes) -> Generator[None, None, G]:
+        yield from ()  # one piece
+        return decode(self.action.goal, payload)
 
     def _void(self, request: GoalRequest) -> GoalResponse | None:
         """The refusal of a goal meant for another process in this one's place; one that names none is taken."""
@@ -157,7 +180,8 @@ class ActionServer(Generic[G, F, R]):
         why = f"it was sent to a {self.action.server} that was started anew since: ask again for what is wanted"
         return GoalResponse(reason=why, stamp=self._clock.unix())
 
-    def _decide(self, request: GoalRequest, session: str) -> GoalResponse:
+    def _require_form(self, request: GoalRequest) -> None:
+        """Raises `RequestRefused`."""
         if not request.goal_id:
             raise RequestRefused(f"{self.action.key}: a goal needs an id", "bad request")
         for what, text in (("its id", request.goal_id), ("the name of its client", request.client)):
@@ -167,13 +191,10 @@ class ActionServer(Generic[G, F, R]):
         if request.attached and not is_token(request.client):  # whose end nobody would ever see
             wanted_token = "an attached goal names the liveliness token of its client"
             raise RequestRefused(f'{self.action.key}: {wanted_token}, not "{request.client[:80]}"', "bad request")
-        try:
-            wanted = decode(self.action.goal, bytes(request.goal))
-        except BadMessage as error:
-            raise RequestRefused(f"{self.action.key}: {error}", "bad request") from error
+
+    def _decide(self, request: GoalRequest, wanted: G, session: str) -> GoalResponse:
         if self._cancelled_early.pop(request.goal_id, None) is not None:
-            reason = "it was cancelled before it was looked at"
-            return self._goals.refuse(request.goal_id, GoalResponse(reason=reason, stamp=self._clock.unix()))
+            return self._canceled_early(request.goal_id)
         response = GoalResponse(accepted=True, stamp=self._clock.unix())
         goal = GoalRecord(request.goal_id, request.client, response, session=session)
         self._goals.add(goal)
@@ -188,6 +209,10 @@ class ActionServer(Generic[G, F, R]):
         if decision.accepted and request.attached and not goal.status.is_terminal:
             self._clients.add(request.goal_id, request.client, self._clock.monotonic())
         return response
+
+    def _canceled_early(self, goal_id: str) -> GoalResponse:
+        reason = "it was cancelled before it was looked at"
+        return self._goals.refuse(goal_id, GoalResponse(reason=reason, stamp=self._clock.unix()))
 
     def _answer_cancel(self, request: CancelRequest, pending: Pending[CancelResponse]) -> None:
         if request.goal_id and request.goal_id not in self.active:
@@ -210,6 +235,9 @@ class ActionServer(Generic[G, F, R]):
         known = self._goals.get(goal_id)
         if known is not None:
             return f"it has ended as {known.status.name}"
+        if (coming := self._coming.take_out(goal_id)) is not None:
+            coming.reply(self._canceled_early(goal_id))
+            return "it was not decided upon yet, and is refused"
         now = self._clock.monotonic()
         self._cancelled_early = {key: at for key, at in self._cancelled_early.items() if now - at < EARLY_CANCEL_KEPT}
         if len(self._cancelled_early) < MAX_EARLY_CANCELS and len(goal_id) <= LONGEST_NAME:

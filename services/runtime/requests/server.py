@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import threading
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Generic, Protocol, TypeVar
 
 import msgspec
@@ -279,8 +280,14 @@ class RequestServer(Generic[Q, R]):
             return None
 
     def _handle(self, question: Q, pending: Pending[R]) -> None:
-        try:
+        with self.failures_refused(pending):
             self._handler(question, pending)
+
+    @contextmanager
+    def failures_refused(self, pending: Pending[R]) -> Iterator[None]:
+        """What is raised within becomes the refusal of that request, also where it is answered later."""
+        try:
+            yield
         except RequestRefused as error:
             pending.refuse(error.kind, str(error))
         except Exception as error:

@@ -174,7 +174,7 @@ class ActiveGoal:
     ):  # fmt: skip
         """`positions`: commanded and executed [rad] or [m]."""
         elapsed = self.elapsed(state)
-        times = [p.time_from_start for p in self.goal.trajectory.points]
+        points = self.goal.trajectory.points
         scale = state.time_scale
         wanted = tuple(r * scale / j.steps.per_unit for j, r in zip(self.joints, point.rate, strict=True))
         done = tuple(r / j.steps.per_unit for j, r in zip(self.joints, state.velocity, strict=True))
@@ -191,8 +191,8 @@ class ActiveGoal:
             desired=desired,
             actual=actual,
             error=error,
-            index=min(bisect_right(times, elapsed), len(times) - 1),
-            points=len(times),
+            index=min(bisect_right(points, elapsed, key=lambda each: each.time_from_start), len(points) - 1),
+            points=len(points),
             elapsed=elapsed,
             duration=self.duration_us * 1e-6,
         )

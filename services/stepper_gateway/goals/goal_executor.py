@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from msgspec.structs import replace
@@ -65,6 +66,15 @@ class GoalExecutor:
     def use_tick(self, tick_hz: int) -> None:
         """The device's own figure for the tick that bounds step rates."""
         self._validator = GoalValidator(self._device.joints, tick_hz)
+
+    def prepare(self, goal: FollowJointTrajectoryGoal, moment: Moment) -> Iterator[None]:
+        """Checks ahead, in pieces, what `accept` finds done then; it decides the same without."""
+        start = None
+        if goal.after and self._current is not None:
+            start = NextGoal.start_of(self._current).start
+        elif not self._device.refusal(moment, self._controller.comes_to_rest()):
+            start = self._controller.motion_start(moment).start
+        yield from self._validator.prepare(goal, start, self._device.parameters)
 
     def accept(self, goal_id: str, goal: FollowJointTrajectoryGoal, moment: Moment) -> GoalVerdict:
         """Accept and start a goal, or say why not."""

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from schemas.message import Vector
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from services.arm.interpolation import TrajectorySampler
 from services.arm.model.description import Joint
-from services.stepper_gateway.goals.limit_checks import require_path_within, require_points_within, within
+from services.stepper_gateway.goals.goal_checks import GoalChecks
+from services.stepper_gateway.goals.limit_checks import within
 from services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from services.stepper_gateway.goals.scene_versions import PlannedIn
-from services.stepper_gateway.goals.trajectory_checks import Tolerances, ordered_trajectory, time_tolerance, tolerances
+from services.stepper_gateway.goals.trajectory_checks import Tolerances, time_tolerance, tolerances
 from services.stepper_gateway.motion.knots import Knot, Limits, whole_steps
-from services.stepper_gateway.motion.paths import RoundedPath, SampledPath, TimedPath, join_path, profile
+from services.stepper_gateway.motion.paths import TimedPath, join_path, profile
 from services.stepper_gateway.parameters import GatewayParameters
 
 SAME_VELOCITY = 1e-9  # [rad/s] or [m/s] chosen: rounding of a velocity that was computed
@@ -29,6 +30,7 @@ class ValidatedGoal:
     goal_tolerance: Tolerances
     time_tolerance: float | None  # [s]
     planned_in: PlannedIn
+    checks: GoalChecks
 
     @property
     def target(self) -> Vector:
@@ -68,15 +70,34 @@ class GoalValidator:
         self._joints = joints
         self._limits = Limits.of(joints)
         self._tick_hz = tick_hz
+        self._prepared: GoalChecks | None = None
+
+    def prepare(
+        self, goal: FollowJointTrajectoryGoal, start: Knot | None, parameters: GatewayParameters
+    ) -> Iterator[None]:
+        """Does ahead, in pieces, what `check` and `path` find done then; `start` is where the arm is, if it is known.
+
+        Whatever they find, done or not, they decide the same.
+        """
+        checks = GoalChecks(goal, self._joints, parameters, self._tick_hz)
+        yield from checks.pieces(start)
+        self._prepared = checks
 
     def check(self, goal: FollowJointTrajectoryGoal, now: int, parameters: GatewayParameters) -> ValidatedGoal:
         """What does not depend on where the arm is; `now` in ns UNIX; raises `GoalRejected`."""
         path_bounds, end_bounds = tolerances(goal, self._joints, parameters.tolerance_factor)
         late = time_tolerance(goal, parameters.goal_time_tolerance)
-        trajectory = ordered_trajectory(goal.trajectory, self._joints)
+        checks = self._checks_of(goal, parameters)
+        trajectory = checks.form.result()
         _require_time_ahead(trajectory, now)
-        require_points_within(trajectory, self._joints)
-        return ValidatedGoal(trajectory, path_bounds, end_bounds, late, PlannedIn.of(goal))
+        checks.points.result()
+        return ValidatedGoal(trajectory, path_bounds, end_bounds, late, PlannedIn.of(goal), checks)
+
+    def _checks_of(self, goal: FollowJointTrajectoryGoal, parameters: GatewayParameters) -> GoalChecks:
+        prepared, self._prepared = self._prepared, None
+        if prepared is not None and prepared.goal is goal and prepared.parameters == parameters:
+            return prepared
+        return GoalChecks(goal, self._joints, parameters, self._tick_hz)
 
     def path(
         self, goal: ValidatedGoal, motion_start: MotionStart, now: int, parameters: GatewayParameters
@@ -85,10 +106,10 @@ class GoalValidator:
         trajectory = goal.trajectory
         offset = max(0.0, (now - trajectory.stamp) * 1e-9) if trajectory.stamp else 0.0
         start = motion_start.start
-        if len(trajectory.points) == 1 and not trajectory.points[0].velocities:
+        checks = goal.checks if goal.checks.parameters == parameters else self._checks_of(goal.checks.goal, parameters)
+        if checks.is_single_point:
             return self._single_point(trajectory.points[0], start, offset)
-        path = _path(trajectory, start, offset, parameters.corner_time)
-        require_path_within(path, self._joints, parameters, self._tick_hz)
+        path = checks.path_from(start, offset)
         first = path.at(0.0)
         if self._is_same(motion_start, first):
             return path
@@ -139,17 +160,6 @@ class GoalValidator:
                     f"{where} {joint.unit}: {distance:.4f} {joint.unit} apart, more than the {tolerance:g} "
                     f"{joint.unit} allowed; plan from the present state"
                 )
-
-
-def _path(trajectory: JointTrajectory, start: Knot, offset: float, corner: float) -> TimedPath:
-    if not trajectory.points[0].velocities:
-        return RoundedPath(trajectory, start.position, corner, offset)
-    beginning = TrajectoryPoint(
-        positions=start.position,
-        velocities=start.velocity,
-        accelerations=start.acceleration if trajectory.points[0].accelerations else (),
-    )
-    return SampledPath(TrajectorySampler(trajectory, beginning), offset)
 
 
 def _require_time_ahead(trajectory: JointTrajectory, now: int) -> None:

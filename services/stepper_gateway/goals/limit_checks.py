@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 from schemas.motion import JointTrajectory
 from services.arm.model.description import Joint
+from services.stepper_gateway.goals.pieces import PIECE, Pieces
 from services.stepper_gateway.goals.rejections import invalid
 from services.stepper_gateway.motion.knot_sources import KNOT_TIME
 from services.stepper_gateway.motion.knots import Knot
@@ -13,26 +18,48 @@ from services.stepper_gateway.parameters import GatewayParameters
 SLACK = 1e-9  # [rad] or [m]: rounding of a limit that was computed
 
 
-def require_points_within(trajectory: JointTrajectory, joints: tuple[Joint, ...]) -> None:
+def points_within(trajectory: JointTrajectory, joints: tuple[Joint, ...]) -> Pieces[None]:
     """Every point within the joint limits; raises `GoalRejected`."""
     for index, point in enumerate(trajectory.points):
         for joint, position in zip(joints, point.positions, strict=True):
             if not joint.lower - SLACK <= position <= joint.upper + SLACK:
                 raise invalid(f"{beyond(joint, position)} at point {index} ({point.time_from_start:.3f} s)")
+        if index % PIECE == PIECE - 1:
+            yield
 
 
-def require_path_within(
-    path: TimedPath, joints: tuple[Joint, ...], parameters: GatewayParameters, tick_hz: int
-) -> None:
-    """The path between the points too, at twice the knots' rate; raises `GoalRejected`."""
+@dataclass(frozen=True)
+class Samples:
+    """Times at twice the knots' rate, both ends of a path of `duration` [s] among them: those in [begin, end)."""
+
+    duration: float
+    begin: float = 0.0
+    end: float = math.inf
+
+    def __iter__(self) -> Iterator[float]:
+        count = max(1, int(self.duration / (KNOT_TIME / 2)) + 1)
+        step = self.duration / count
+        first = max(0, int(self.begin / step) - 1) if step else 0
+        for index in range(first, count + 1):
+            t = self.duration * index / count
+            if t >= self.end:
+                return
+            if t >= self.begin:
+                yield t
+
+
+def path_within(
+    path: TimedPath, samples: Samples, joints: tuple[Joint, ...], parameters: GatewayParameters, tick_hz: int
+) -> Pieces[None]:
+    """The path between the points too, at the times `samples`; raises `GoalRejected`."""
     bounds = [_Bound(joint, parameters, tick_hz) for joint in joints]
-    count = max(1, int(path.duration / (KNOT_TIME / 2)) + 1)
-    for index in range(count + 1):
-        t = path.duration * index / count
+    for number, t in enumerate(samples, 1):
         knot = path.at(t)
         for column, bound in enumerate(bounds):
             if not bound.holds(knot.position[column], knot.velocity[column], knot.acceleration[column]):
                 raise invalid(bound.complaint(knot, column, t))
+        if number % PIECE == 0:
+            yield
 
 
 def within(knot: Knot, joints: tuple[Joint, ...]) -> bool:

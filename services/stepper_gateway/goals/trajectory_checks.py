@@ -10,20 +10,27 @@ from schemas.message import Vector
 from schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
 from services.arm.errors import suggestion
 from services.arm.model.description import Joint
+from services.stepper_gateway.goals.pieces import PIECE, Pieces
 from services.stepper_gateway.goals.rejections import invalid, invalid_joints
 
 REST = 1e-6  # [rad/s] or [m/s] that a final velocity may be off zero; chosen: far below a step a second
 MAX_DURATION = 3600.0  # [s] chosen: an hour; longer work is several goals
 
 
-def ordered_trajectory(trajectory: JointTrajectory, joints: tuple[Joint, ...]) -> JointTrajectory:
+def ordered_trajectory(trajectory: JointTrajectory, joints: tuple[Joint, ...]) -> Pieces[JointTrajectory]:
     """The trajectory with its columns in the arm's order; raises `GoalRejected`."""
     require_names(trajectory.joint_names, joints)
-    _require_points(trajectory)
-    order = [trajectory.joint_names.index(joint.name) for joint in joints]
-    points = tuple(_reordered(point, order) for point in trajectory.points)
-    _require_rest_at_end(points[-1], joints)
-    return JointTrajectory(stamp=trajectory.stamp, joint_names=tuple(joint.name for joint in joints), points=points)
+    yield from _require_points(trajectory)
+    names = tuple(joint.name for joint in joints)
+    if trajectory.joint_names != names:
+        order = [trajectory.joint_names.index(name) for name in names]
+        points = []
+        for begin in range(0, len(trajectory.points), PIECE):
+            points += [_reordered(point, order) for point in trajectory.points[begin : begin + PIECE]]
+            yield
+        trajectory = JointTrajectory(stamp=trajectory.stamp, joint_names=names, points=tuple(points))
+    _require_rest_at_end(trajectory.points[-1], joints)
+    return trajectory
 
 
 def require_names(names: tuple[str, ...], joints: tuple[Joint, ...]) -> None:
@@ -113,7 +120,7 @@ def _filled(given: Tolerances, defaults: list[float]) -> Tolerances:
     return given._replace(position=tuple(default if bound == 0.0 else bound for bound, default in rows))
 
 
-def _require_points(trajectory: JointTrajectory) -> None:
+def _require_points(trajectory: JointTrajectory) -> Pieces[None]:
     points, width = trajectory.points, len(trajectory.joint_names)
     if not points:
         raise invalid("the trajectory has no points")
@@ -124,9 +131,11 @@ def _require_points(trajectory: JointTrajectory) -> None:
         _require_size(index, "positions", point.positions, width, True)
         _require_size(index, "velocities", point.velocities, width, fields[0])
         _require_size(index, "accelerations", point.accelerations, width, fields[1])
+        if index % PIECE == PIECE - 1:
+            yield
     if fields == (False, True):
         raise invalid("the points have accelerations but no velocities; give both, or positions only")
-    _require_times([point.time_from_start for point in points])
+    yield from _require_times([point.time_from_start for point in points])
 
 
 def _require_size(index: int, field: str, values: Vector, width: int, wanted: bool) -> None:
@@ -135,7 +144,7 @@ def _require_size(index: int, field: str, values: Vector, width: int, wanted: bo
         raise invalid(f"point {index} has {len(values)} {field}; {expected}")
 
 
-def _require_times(times: list[float]) -> None:
+def _require_times(times: list[float]) -> Pieces[None]:
     if times[0] < 0.0:
         raise invalid(f"point 0 has time_from_start {times[0]:g} s; it must not be negative")
     for index, (before, after) in enumerate(pairwise(times), start=1):
@@ -143,6 +152,8 @@ def _require_times(times: list[float]) -> None:
             raise invalid(
                 f"time_from_start does not increase: {before:g} s at point {index - 1}, {after:g} s at point {index}"
             )
+        if index % PIECE == 0:
+            yield
     if times[-1] > MAX_DURATION:
         raise invalid(f"the trajectory takes {times[-1]:g} s, more than {MAX_DURATION:g} s; send it in parts")
 

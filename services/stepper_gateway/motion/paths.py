@@ -6,7 +6,7 @@ A bridge is continuous in position, velocity and acceleration.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
@@ -41,6 +41,57 @@ class SampledPath:
         return Knot(*self._sampler.at(t + self._offset))
 
 
+class StraightLines:
+    """Straight lines between positions, with the integral of the position over the time; held at both ends."""
+
+    def __init__(self, times: Sequence[float], rows: Sequence[Vector], integral: Vector) -> None:
+        """`times` [s], `rows` [rad] or [m]; `integral` is that at the first time, the others follow by `integrate`."""
+        self.times, self.rows = times, rows
+        self._integrals = [integral]
+
+    @classmethod
+    def of(cls, trajectory: JointTrajectory) -> StraightLines:
+        """Those between its points."""
+        points = trajectory.points
+        zeros = tuple(0.0 for _ in points[0].positions)
+        return cls([point.time_from_start for point in points], [point.positions for point in points], zeros)
+
+    @classmethod
+    def before(cls, lines: StraightLines, start: Vector) -> StraightLines:
+        """The one from `start` at time 0 to the first point of `lines`, where its integral is 0 as theirs."""
+        end, row = lines.times[0], lines.rows[0]
+        made = cls([0.0, end], [start, row], tuple(-0.5 * end * (a + b) for a, b in zip(start, row, strict=True)))
+        made._integrals.append(tuple(0.0 for _ in row))
+        return made
+
+    def integrate(self, count: int) -> bool:
+        """Computes the integrals at `count` more points; False if there are no more."""
+        times, rows = self.times, self.rows
+        begin = len(self._integrals)
+        for i in range(begin, min(begin + count, len(times))):
+            step = 0.5 * (times[i] - times[i - 1])
+            rises = zip(self._integrals[-1], rows[i - 1], rows[i], strict=True)
+            self._integrals.append(tuple(s + step * (a + b) for s, a, b in rises))
+        return len(self._integrals) < len(times)
+
+    def at(self, t: float) -> tuple[Vector, Vector, Vector]:
+        """Position, velocity and the position's integral at `t` [s]."""
+        times, rows = self.times, self.rows
+        zeros = tuple(0.0 for _ in rows[0])
+        if t < times[0]:
+            dt = t - times[0]
+            return rows[0], zeros, tuple(s + dt * p for s, p in zip(self._integrals[0], rows[0], strict=True))
+        i = bisect_right(times, t) - 1
+        dt = t - times[i]
+        if i == len(times) - 1:
+            return rows[i], zeros, tuple(s + dt * p for s, p in zip(self._integrals[i], rows[i], strict=True))
+        span = times[i + 1] - times[i]
+        velocity = tuple((b - a) / span for a, b in zip(rows[i], rows[i + 1], strict=True))
+        position = tuple(a + v * dt for a, v in zip(rows[i], velocity, strict=True))
+        area = tuple(s + 0.5 * dt * (a + p) for s, a, p in zip(self._integrals[i], rows[i], position, strict=True))
+        return position, velocity, area
+
+
 class RoundedPath:
     """Straight lines between positions, each corner a parabola over `corner` seconds.
 
@@ -48,20 +99,12 @@ class RoundedPath:
     acceleration of the change of velocity divided by `corner`, and over so much later.
     """
 
-    def __init__(self, trajectory: JointTrajectory, start: Vector, corner: float, offset: float = 0.0) -> None:
-        times = [point.time_from_start for point in trajectory.points]
-        rows = [point.positions for point in trajectory.points]
-        if times[0] > 0.0:
-            times.insert(0, 0.0)
-            rows.insert(0, start)
-        self._times, self._rows, self._corner, self._offset = times, rows, corner, offset
-        self._integrals = [tuple(0.0 for _ in rows[0])]
-        for i in range(1, len(times)):
-            step = 0.5 * (times[i] - times[i - 1])
-            self._integrals.append(
-                tuple(s + step * (a + b) for s, a, b in zip(self._integrals[-1], rows[i - 1], rows[i], strict=True))
-            )
-        self.duration = max(0.0, times[-1] + corner - offset)
+    def __init__(self, lines: StraightLines, start: Vector, corner: float, offset: float = 0.0) -> None:
+        """`lines` with all their integrals; the arm comes to their first point from `start` where that is later."""
+        self._lines = lines
+        self._lead_in = StraightLines.before(lines, start) if lines.times[0] > 0.0 else None
+        self._corner, self._offset = corner, offset
+        self.duration = max(0.0, lines.times[-1] + corner - offset)
 
     def at(self, t: float) -> Knot:
         """The knot at `t` [s]."""
@@ -76,20 +119,9 @@ class RoundedPath:
         )
 
     def _line(self, t: float) -> tuple[Vector, Vector, Vector]:
-        """Position, velocity and the position's integral of the straight lines, held at both ends."""
-        times, rows = self._times, self._rows
-        zeros = tuple(0.0 for _ in rows[0])
-        if t < times[0]:
-            return rows[0], zeros, tuple((t - times[0]) * p for p in rows[0])
-        i = bisect_right(times, t) - 1
-        dt = t - times[i]
-        if i == len(times) - 1:
-            return rows[i], zeros, tuple(s + dt * p for s, p in zip(self._integrals[i], rows[i], strict=True))
-        span = times[i + 1] - times[i]
-        velocity = tuple((b - a) / span for a, b in zip(rows[i], rows[i + 1], strict=True))
-        position = tuple(a + v * dt for a, v in zip(rows[i], velocity, strict=True))
-        area = tuple(s + 0.5 * dt * (a + p) for s, a, p in zip(self._integrals[i], rows[i], position, strict=True))
-        return position, velocity, area
+        if self._lead_in is not None and t < self._lines.times[0]:
+            return self._lead_in.at(t)
+        return self._lines.at(t)
 
 
 class ProfilePath:
