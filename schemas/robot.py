@@ -5,7 +5,7 @@ example "46.656" or "380/21"; everything else is SI unless the name says otherwi
 those that depend on another field or file are checked by `services.arm`.
 
 An arm to plan and look at only leaves out [device], [[driver]], every [joint.motor] and whatever is wired to a pin, and
-[[joint]] too if it likes: `services.arm` generates a virtual device then, and chooses a tick rate that is left out.
+[[joint]] too if it likes: `services.arm` then generates a virtual device, and what tick rate is left out.
 """
 
 from __future__ import annotations
