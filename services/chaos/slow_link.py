@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 from contextlib import suppress
 from enum import Enum
 from random import Random
 from typing import NamedTuple
 
 from services.chaos.lost_packets import PacketLoss
+from services.chaos.proxy import ProxyThread
 
 PIECE = 16 * 1024  # [B] that are read at once
 LOOK_EVERY = 0.01  # [s] while the link stalls
@@ -54,19 +54,14 @@ class SlowLink:
         self.garbling = 0.0
         self.stalled_ways: frozenset[OneWay] = frozenset()
         self._clients: list[str] = []  # ids, the newest last
-        self._port, self._target, self._random = port, target, Random(seed)
+        self._target, self._random = target, Random(seed)
         self._writers: set[asyncio.StreamWriter] = set()
-        self._loop = asyncio.new_event_loop()
-        self._is_listening = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="slow link", daemon=True)
-        self._thread.start()
-        if not self._is_listening.wait(5.0):
-            raise OSError(f"nothing can listen on 127.0.0.1:{port}")
+        self._thread = ProxyThread(port, self._take)
 
     def cut(self) -> None:
         """Drops every connection, and takes none until `heal`."""
         self.is_cut = True
-        self._loop.call_soon_threadsafe(self._drop_all)
+        self._thread.call(self._drop_all)
 
     def heal(self) -> None:
         """Everything passes as it should again."""
@@ -79,21 +74,8 @@ class SlowLink:
 
     def close(self) -> None:
         """Drops every connection and ends the thread."""
-        self._loop.call_soon_threadsafe(self._drop_all)
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join(5.0)
-
-    def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        with suppress(OSError):
-            server = self._loop.run_until_complete(asyncio.start_server(self._take, "127.0.0.1", self._port))
-            self._is_listening.set()
-            self._loop.run_forever()
-            server.close()
-        for task in asyncio.all_tasks(self._loop):
-            task.cancel()
-        self._loop.run_until_complete(asyncio.sleep(0))
-        self._loop.close()
+        self._thread.call(self._drop_all)
+        self._thread.close()
 
     def _drop_all(self) -> None:
         for writer in self._writers:

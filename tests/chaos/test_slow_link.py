@@ -56,6 +56,15 @@ def is_dropped(peer: socket.socket) -> bool:
         return True
 
 
+def assert_comes_when_healed(data: bytes, peer: socket.socket, link: SlowLink) -> None:
+    peer.settimeout(SHORTLY)
+    with pytest.raises(TimeoutError):
+        peer.recv(100)
+    link.heal()
+    peer.settimeout(5.0)
+    assert peer.recv(100) == data
+
+
 def test_everything_passes_both_ways(link: SlowLink) -> None:
     with client(link) as peer:
         peer.sendall(b"there")
@@ -83,12 +92,7 @@ def test_a_stall_keeps_what_is_said_until_it_is_healed(link: SlowLink) -> None:
     with client(link) as peer:
         link.is_stalled = True
         peer.sendall(b"late")
-        peer.settimeout(SHORTLY)
-        with pytest.raises(TimeoutError):
-            peer.recv(100)
-        link.heal()
-        peer.settimeout(5.0)
-        assert peer.recv(100) == b"late"
+        assert_comes_when_healed(b"late", peer, link)
 
 
 def connect_of(version: str, client_id: str) -> bytes:
@@ -125,12 +129,7 @@ def test_a_way_that_stalls_keeps_what_goes_that_way_of_that_client_alone(link: S
         for peer in (one, other):
             peer.sendall(b"there")
         assert other.recv(100) == b"there"
-        one.settimeout(SHORTLY)
-        with pytest.raises(TimeoutError):
-            one.recv(100)
-        link.heal()
-        one.settimeout(5.0)
-        assert one.recv(100) == b"there"
+        assert_comes_when_healed(b"there", one, link)
 
 
 def test_garbling_changes_one_bit_of_a_piece(link: SlowLink) -> None:

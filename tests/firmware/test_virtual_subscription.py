@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import socket
-import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, suppress
+from contextlib import closing
 from pathlib import Path
 
 import paho.mqtt.client as paho
@@ -14,13 +12,14 @@ import pytest
 from paho.mqtt.enums import CallbackAPIVersion
 
 from schemas.device_topics import topic
+from services.chaos.slow_link import client_id_in
 from services.stepper_gateway.links.frames import Sync, encode
+from tests.mqtt.packet_proxy import PacketProxy
 from tests.stepper_gateway.processes import DEVICE, Processes
 
 pytestmark = pytest.mark.full
 
 NAME = "rm1"
-CONNECT = 0x10
 SUBSCRIBE = 0x82  # first byte of the packet, MQTT 3.1.1, 3.8.1
 SOON = 10.0  # [s] 4 s of silence, and a start on a loaded machine
 
@@ -29,55 +28,17 @@ class Proxy:
     """Between a device and its broker; swallows the first `swallowed` SUBSCRIBE packets, and keeps the client id."""
 
     def __init__(self, broker: int, swallowed: int) -> None:
-        self._broker, self._left = broker, swallowed
+        self._left = swallowed
         self.swallowed = 0
         self.client_id = ""
-        self._listening = socket.create_server(("127.0.0.1", 0))
-        self.port: int = self._listening.getsockname()[1]
-        self._open: list[socket.socket] = []
-        threading.Thread(target=self._accept, daemon=True).start()
+        self._proxy = PacketProxy(broker, to_broker=self._passes)
+        self.port, self.close = self._proxy.port, self._proxy.close
 
-    def close(self) -> None:
-        for each in (self._listening, *self._open):
-            with suppress(OSError):
-                each.shutdown(socket.SHUT_RDWR)
-            each.close()
-
-    def _accept(self) -> None:
-        with suppress(OSError):
-            while True:
-                device = self._listening.accept()[0]
-                broker = socket.create_connection(("127.0.0.1", self._broker))
-                self._open += [device, broker]
-                threading.Thread(target=self._to_broker, args=(device, broker), daemon=True).start()
-                threading.Thread(target=_copy, args=(broker, device), daemon=True).start()
-
-    def _to_broker(self, device: socket.socket, broker: socket.socket) -> None:
-        with suppress(OSError), device.makefile("rb") as packets:
-            while head := packets.read(1):
-                length, size = b"", 0
-                while not length or length[-1] & 0x80:  # MQTT 3.1.1, 2.2.3
-                    length += packets.read(1)
-                    size |= (length[-1] & 0x7F) << 7 * (len(length) - 1)
-                body = packets.read(size)
-                if head[0] == CONNECT:
-                    self.client_id = _client_id(body)
-                if head[0] == SUBSCRIBE and self.swallowed < self._left:
-                    self.swallowed += 1
-                else:
-                    broker.sendall(head + length + body)
-
-
-def _client_id(connect: bytes) -> str:
-    """Behind protocol, flags and keep-alive (10 bytes) and the properties of MQTT 5, fewer than 128 bytes."""
-    at = 10 + (1 + connect[10] if connect[6] == 5 else 0)
-    return connect[at + 2 : at + 2 + int.from_bytes(connect[at : at + 2])].decode()
-
-
-def _copy(source: socket.socket, target: socket.socket) -> None:
-    with suppress(OSError):
-        while data := source.recv(4096):
-            target.sendall(data)
+    def _passes(self, packet: bytes) -> bool:
+        self.client_id = client_id_in(packet) or self.client_id
+        is_swallowed = packet[0] == SUBSCRIBE and self.swallowed < self._left
+        self.swallowed += is_swallowed
+        return not is_swallowed
 
 
 class Asker:

@@ -15,6 +15,7 @@ from msgspec.structs import replace
 
 from schemas.device import DeviceCommandResponse
 from schemas.topics import DEVICE_STOP
+from services.chaos.proxy import ProxyThread
 from services.runtime.bus import zenoh_bus
 from services.runtime.bus.recognition import Recognition
 from services.runtime.errors import BusError
@@ -34,26 +35,10 @@ class ForgettingRouter:
         (self.port,) = free_ports(1)
         self.forgets = False
         self._target = target
-        self._loop = asyncio.new_event_loop()
-        self._is_listening = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-        assert self._is_listening.wait(60.0)
+        self._thread = ProxyThread(self.port, self._take)
 
     def close(self) -> None:
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join(60.0)
-
-    def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        server = self._loop.run_until_complete(asyncio.start_server(self._take, "127.0.0.1", self.port))
-        self._is_listening.set()
-        self._loop.run_forever()
-        server.close()
-        for task in asyncio.all_tasks(self._loop):
-            task.cancel()
-        self._loop.run_until_complete(asyncio.sleep(0))
-        self._loop.close()
+        self._thread.close()
 
     async def _take(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         from_router, to_router = await asyncio.open_connection("127.0.0.1", self._target)

@@ -306,3 +306,36 @@ def test_a_request_that_waits_for_its_answer_costs_no_thread(
         client.ask("plan", "Question", b"", 30.0, lambda answer: None)
     assert until(lambda: len(kept) == 100)
     assert len(list(Path("/proc/self/task").iterdir())) <= before + 10
+
+
+class SlowName(str):
+    """A client whose thread loses the processor in the midst of being counted, until `goes_on`."""
+
+    is_counted, goes_on = threading.Event(), threading.Event()
+
+    def __hash__(self) -> int:
+        self.is_counted.set()
+        self.goes_on.wait(60.0)
+        return super().__hash__()
+
+
+def test_a_stop_waits_for_no_thread_that_counts_other_requests() -> None:
+    rates, is_permitted = RequestRates(), threading.Event()
+
+    def stop() -> None:
+        if rates.permit_request("local", "person", urgent=True):
+            is_permitted.set()
+
+    threads = [
+        threading.Thread(target=lambda: rates.permit_request("local", SlowName("flooder"))),
+        threading.Thread(target=stop),
+    ]
+    try:
+        threads[0].start()
+        assert SlowName.is_counted.wait(60.0)
+        threads[1].start()
+        assert is_permitted.wait(10.0)
+    finally:
+        SlowName.goes_on.set()
+        for thread in threads:
+            thread.join(60.0)

@@ -17,6 +17,17 @@ pytestmark = pytest.mark.alone
 SEED = 1
 
 
+def reported(tmp_path, pytestconfig, *options, minutes, ends):
+    """The report of a run of chaos that exits with 0 within `ends` [s]."""
+    command = [sys.executable, "-m", "services.chaos", *options, "--seed", str(SEED), "--minutes", str(minutes)]
+    done = subprocess.run(
+        [*command, "--out", str(tmp_path / "out")],
+        cwd=pytestconfig.rootpath, capture_output=True, text=True, timeout=ends,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return json.loads((tmp_path / "out/report.json").read_text())
+
+
 def test_a_minute_of_chaos_violates_nothing(tmp_path, pytestconfig):
     need("mosquitto")
     command = [sys.executable, "-m", "services.cli.main", "chaos", "--minutes", "1", "--seed", str(SEED)]
@@ -33,23 +44,8 @@ def test_a_minute_of_chaos_violates_nothing(tmp_path, pytestconfig):
 
 
 def test_the_clocks_of_the_host_and_of_single_processes_step_in_the_middle_of_moves(tmp_path, pytestconfig):
-    command = [
-        sys.executable,
-        "-m",
-        "services.chaos",
-        "--only",
-        "clock steps",
-        "--broker",
-        "embedded",
-        "--seed",
-        str(SEED),
-    ]
-    done = subprocess.run(
-        [*command, "--minutes", "0.3", "--out", str(tmp_path / "out")],
-        cwd=pytestconfig.rootpath, capture_output=True, text=True, timeout=150.0,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    report = json.loads((tmp_path / "out/report.json").read_text())
+    options = ("--only", "clock steps", "--broker", "embedded")
+    report = reported(tmp_path, pytestconfig, *options, minutes=0.3, ends=150.0)
     assert {each["fault"] for each in report["episodes"]} == {"host clock steps", "one clock steps"}
     assert all(each["ended"] == "succeeded" for each in report["episodes"])  # no motion depends on a wall clock
     assert report["states_lost"] == 0
@@ -86,13 +82,7 @@ def all_below(running: subprocess.Popen[str]) -> list[psutil.Process]:
 
 
 def test_disks_that_refuse_and_processes_without_a_descriptor_end_no_move(tmp_path, pytestconfig):
-    command = [sys.executable, "-m", "services.chaos", "--only", "run folder", "--seed", str(SEED)]
-    done = subprocess.run(
-        [*command, "--minutes", "0.3", "--out", str(tmp_path / "out")],
-        cwd=pytestconfig.rootpath, capture_output=True, text=True, timeout=150.0,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    report = json.loads((tmp_path / "out/report.json").read_text())
+    report = reported(tmp_path, pytestconfig, "--only", "run folder", minutes=0.3, ends=150.0)
     assert {each["fault"] for each in report["episodes"]} == {"run folder full", "run folder read-only"}
     assert [each["reason"] for each in report["episodes"] if each["ended"] != "succeeded"] == []
 
@@ -106,13 +96,7 @@ def test_twins_deafness_flutters_replays_and_a_bad_serial_line_violate_nothing(t
         "goal replayed during a move",
         "SIGHUP stepper_gateway",
     )
-    command = [sys.executable, "-m", "services.chaos", "--only", *names, "--broker", "embedded", "--seed", str(SEED)]
-    done = subprocess.run(
-        [*command, "--minutes", "0.8", "--out", str(tmp_path / "out")],
-        cwd=pytestconfig.rootpath, capture_output=True, text=True, timeout=200.0,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    report = json.loads((tmp_path / "out/report.json").read_text())
+    report = reported(tmp_path, pytestconfig, "--only", *names, "--broker", "embedded", minutes=0.8, ends=200.0)
     faults = [each["fault"] for each in report["episodes"]]
     assert len(faults) >= 3
     assert set(faults) <= set(names)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import socket
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -17,6 +14,7 @@ import gemelo
 from firmware.platform.host.flash import Flash, NetworkCredentials
 from services.runtime.process.unwritten import UnwrittenFiles
 from services.stack.stack import Stack
+from tests.mqtt.packet_proxy import PacketProxy
 from tests.stack.gemelo import COMMAND
 from tests.stack.person import Operator
 from tests.stacks.shared import NEEDED, found_by_scripts
@@ -33,46 +31,8 @@ class DevicesWay:
     def __init__(self, broker: int) -> None:
         """`broker` is its port."""
         self.is_deaf = False
-        self._broker = broker
-        self._server = socket.create_server(("127.0.0.1", 0))
-        self.port: int = self._server.getsockname()[1]
-        self._open: list[socket.socket] = [self._server]
-        threading.Thread(target=self._accept, daemon=True).start()
-
-    def close(self) -> None:
-        for each in self._open:
-            with suppress(OSError):
-                each.shutdown(socket.SHUT_RDWR)
-            each.close()
-
-    def _accept(self) -> None:
-        with suppress(OSError):
-            while True:
-                device, _ = self._server.accept()
-                try:
-                    broker = socket.create_connection(("127.0.0.1", self._broker))
-                except OSError:  # it starts, or has ended
-                    device.close()
-                    continue
-                self._open += [device, broker]
-                threading.Thread(target=self._up, args=(device, broker), daemon=True).start()
-                threading.Thread(target=self._down, args=(broker, device), daemon=True).start()
-
-    def _up(self, device: socket.socket, broker: socket.socket) -> None:
-        with suppress(OSError), device, broker:
-            while piece := device.recv(65536):
-                broker.sendall(piece)
-
-    def _down(self, broker: socket.socket, device: socket.socket) -> None:
-        with suppress(OSError), device, broker, broker.makefile("rb") as packets:
-            while head := packets.read(1):
-                lengths = bytearray(packets.read(1))
-                while lengths[-1] & 0x80:
-                    lengths += packets.read(1)
-                size = sum((byte & 0x7F) << (7 * place) for place, byte in enumerate(lengths))
-                packet = head + bytes(lengths) + packets.read(size)
-                if not (self.is_deaf and head[0] >> 4 == PUBLISH):
-                    device.sendall(packet)
+        self._proxy = PacketProxy(broker, to_client=lambda packet: not (self.is_deaf and packet[0] >> 4 == PUBLISH))
+        self.port, self.close = self._proxy.port, self._proxy.close
 
 
 class Site:

@@ -45,7 +45,7 @@ class Newcomer(NamedTuple):
 
 
 class PrincipalRates:
-    """The rates of one principal's requests, urgent or not; its clients are told apart by what they say."""
+    """The rates of one principal's requests; its clients are told apart by what they say."""
 
     def __init__(self, of_a_client: Rate, now: float) -> None:
         """`now` in [s] monotonic."""
@@ -84,35 +84,50 @@ class PrincipalRates:
             self._known[client] = self._new.pop(client).bucket
 
 
+class RatesOfPrincipals:
+    """The rates of all principals, each for itself; from any thread."""
+
+    def __init__(self, of_a_client: Rate) -> None:
+        self._of_a_client = of_a_client
+        self._of: dict[str, PrincipalRates] = {}
+        self._lock = threading.Lock()
+
+    def permit(self, principal: str, client: str, now: float) -> bool:
+        """True if `client` may ask once more at `now` [s] monotonic."""
+        with self._lock:
+            return self._rates(principal, now).permit(client, now)
+
+    def _rates(self, principal: str, now: float) -> PrincipalRates:
+        if (found := self._of.get(principal)) is not None:
+            return found
+        if len(self._of) >= MAX_PRINCIPALS:
+            self._of = {each: rates for each, rates in self._of.items() if not rates.is_idle(now)}
+        if len(self._of) >= MAX_PRINCIPALS:
+            principal = ""
+        return self._of.setdefault(principal, PrincipalRates(self._of_a_client, now))
+
+
 class RequestRates:
-    """The rates of one node, over all keys that it serves; from any thread."""
+    """The rates of one node, over all keys that it serves; from any thread.
+
+    Urgent requests are counted for themselves, under a lock of their own: a stop waits for no thread that counts
+    others, which in a flood may itself wait for the processor.
+    """
 
     def __init__(self, of_a_client: Rate = OF_A_CLIENT, of_refusals: Rate = OF_REFUSALS, clock: Clock = SYSTEM) -> None:
         self._clock = clock
-        self._of_a_client = of_a_client
+        self._urgent, self._others = RatesOfPrincipals(of_a_client), RatesOfPrincipals(of_a_client)
         self._refusals = TokenBucket(of_refusals, clock.monotonic())
-        self._of: dict[tuple[str, bool], PrincipalRates] = {}  # by principal, and whether of its urgent requests
-        self._lock = threading.Lock()
+        self._lock_of_refusals = threading.Lock()
 
     def permit_request(self, principal: str, client: str, urgent: bool = False) -> bool:
-        """True if `client` may ask once more now; its urgent requests are counted for themselves."""
-        now = self._clock.monotonic()
-        with self._lock:
-            return self._rates(principal, urgent, now).permit(client, now)
+        """True if `client` may ask once more now."""
+        return (self._urgent if urgent else self._others).permit(principal, client, self._clock.monotonic())
 
     def permit_refusal(self) -> bool:
         """True if one more request may be answered with why it is not carried out."""
-        with self._lock:
+        with self._lock_of_refusals:
             return self._refusals.take(self._clock.monotonic())
-
-    def _rates(self, principal: str, urgent: bool, now: float) -> PrincipalRates:
-        if (found := self._of.get((principal, urgent))) is not None:
-            return found
-        if len(self._of) >= 2 * MAX_PRINCIPALS:
-            self._of = {each: rates for each, rates in self._of.items() if not rates.is_idle(now)}
-        if len(self._of) >= 2 * MAX_PRINCIPALS:
-            principal = ""
-        return self._of.setdefault((principal, urgent), PrincipalRates(self._of_a_client, now))
 
 
 @dataclass
