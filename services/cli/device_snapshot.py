@@ -71,9 +71,9 @@ class DeviceView:
 
     @property
     def _is_settled(self) -> bool:
-        """True if nothing more is to be expected: an offline device has no state."""
+        """True if nothing more is to be expected: a silent device has no state, one that does not hear has."""
         status = self.status.message
-        return status is not None and (not status.online or self.state.message is not None)
+        return status is not None and (not (status.online or status.speaks) or self.state.message is not None)
 
 
 class DeviceJoint(msgspec.Struct, frozen=True, kw_only=True):

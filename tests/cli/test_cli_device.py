@@ -150,6 +150,17 @@ def test_an_offline_device_says_why(session, connected, rm1_device, capsys):
         home(connected, [])
 
 
+def test_a_device_that_speaks_and_does_not_hear_is_shown_with_its_state(session, arm, network, deployment, capsys):
+    with Node("stepper_gateway", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        deaf = PretendDevice(node, arm)
+        deaf.status = DeviceStatus(online=False, speaks=True, device="rm1", reason="it speaks and does not hear")
+        deaf.set(round_trip_age=40.0)
+        deaf.tell()
+        threading.Timer(0.3, lambda: deaf.step(node.now())).start()  # later than its status, which is latched
+        assert device_status.status(session, as_json=False) is ExitCode.OK
+    assert "round trip 2.0 ms, measured 40 s ago" in capsys.readouterr().out
+
+
 def test_the_status_as_json_has_the_messages_and_the_words(session, rm1_device, capsys):
     assert device_status.status(session, as_json=True) is ExitCode.OK
     shown = json.loads(capsys.readouterr().out)
