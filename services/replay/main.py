@@ -51,6 +51,7 @@ class Replayed(msgspec.Struct, frozen=True, kw_only=True):
     tolerance: float = 0.0  # share by which a float may differ
     alike: dict[str, int]  # messages that are the same, by topic
     aside: dict[str, int]  # messages that are not compared, by why
+    added: dict[str, list[str]] = {}  # fields that a topic did not have when it was recorded: read with their defaults
     difference: Difference | None = None
     other_versions: dict[str, tuple[str, str]] = {}  # recorded and here, where they differ
 
@@ -90,7 +91,8 @@ def replay(file: Path, service: str, robot: Path | None = None, tolerance: float
     return Replayed(
         file=str(file), service=service, recorded_s=recorded.seconds, replayed_s=took,
         alike=dict(comparison.alike), aside={why: count for why, count in comparison.aside.items() if count},
-        tolerance=tolerance, difference=comparison.difference, other_versions=other_versions(recorded.versions),
+        added={key: sorted(names) for key, names in recorded.added.items()}, tolerance=tolerance,
+        difference=comparison.difference, other_versions=other_versions(recorded.versions),
     )  # fmt: skip
 
 
@@ -110,6 +112,10 @@ def text_of(replayed: Replayed) -> str:
     same = f"the same within {replayed.tolerance:g}" if replayed.tolerance else "the same to the byte"
     lines += [f"  {count:6} of {topic}: {same}" for topic, count in sorted(replayed.alike.items())]
     lines += [f"  {count:6} set aside: {why}" for why, count in sorted(replayed.aside.items())]
+    lines += [
+        f"  {topic} is older than its fields {', '.join(names)}: read with their defaults"
+        for topic, names in sorted(replayed.added.items())
+    ]
     return "\n".join([*lines, *_difference(replayed)])
 
 

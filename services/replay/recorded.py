@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
@@ -46,6 +46,7 @@ class Heard(Generic[M]):
     stamp: int  # [ns] UNIX, the message's own; of one without, its arrival
     arrival: int  # [ns] UNIX, at the recorder
     began: int  # [ns] UNIX arrival of the first message of the recording
+    added: frozenset[str] = frozenset()  # fields that its recorded schema does not have: it is older than they are
 
     @property
     def at(self) -> float:
@@ -56,11 +57,16 @@ class Heard(Generic[M]):
     def message(self) -> M:
         """Raises `NotReplayable`."""
         try:
-            return msgspec.json.decode(self.data, type=self.topic.message)
+            message = msgspec.json.decode(self.data, type=self.topic.message)
         except (msgspec.DecodeError, ValueError) as error:
-            raise NotReplayable(
-                f"{self.file}: message {self.sequence} of {self.topic.key} cannot be read: {error}; {AGAIN}"
-            ) from error
+            raise NotReplayable(f"{self._name} cannot be read: {error}; {AGAIN}") from error
+        if left_out := [name for name in missing_fields(self.data, message) if name not in self.added]:
+            raise NotReplayable(f"{self._name} has no {left_out[0]}, which its own schema has; {AGAIN}")
+        return message
+
+    @property
+    def _name(self) -> str:
+        return f"{self.file}: message {self.sequence} of {self.topic.key}"
 
 
 @dataclass
@@ -71,6 +77,7 @@ class Recorded:
     topics: Iterable[Topic[Any]]
     robot: Path | None = None  # the folder of the arm; None: that of the recorded arm, in this checkout
     seconds: float = 0.0  # from the first message of the whole recording to the last
+    added: dict[str, frozenset[str]] = field(default_factory=dict)  # by topic: fields that it did not have then
     _heard: dict[str, list[Heard[Any]]] = field(default_factory=lambda: defaultdict(list))
     _first: int = 0  # [ns] UNIX arrival of the first message
 
@@ -161,13 +168,16 @@ class Recorded:
         return f"replay it with the files of commit {commit[:12]}, or {AGAIN}" if commit else AGAIN
 
     def _take(self, topic: Topic[Any], row: Row) -> None:
-        if not is_part_of(row.schema.data, schema_of(described(topic))):
+        here = schema_of(described(topic))
+        if not is_part_of(row.schema.data, here):
             raise NotReplayable(
                 f"{self.path}: its message {row.schema.name} of {topic.key} has other fields than here: "
-                f"{_other_fields(row.schema.data, schema_of(described(topic)))}; {self._with_its_own_version()}"
+                f"{_other_fields(row.schema.data, here)}; {self._with_its_own_version()}"
             )
+        if added := added_fields(row.schema.data, here):
+            self.added[topic.key] = added
         said = row.message
-        heard = Heard(self.path, topic, said.data, said.sequence, said.publish_time, said.log_time, self._first)
+        heard = Heard(self.path, topic, said.data, said.sequence, said.publish_time, said.log_time, self._first, added)
         self._heard[topic.key].append(heard)
 
     def _require_unbroken(self, topic: Topic[Any]) -> None:
@@ -199,6 +209,40 @@ def _is_part_of(recorded: Any, here: Any) -> bool:
     if isinstance(recorded, list) and isinstance(here, list):
         return len(recorded) == len(here) and all(map(_is_part_of, recorded, here))
     return bool(recorded == here)
+
+
+@lru_cache(maxsize=256)
+def added_fields(recorded: bytes, here: bytes) -> frozenset[str]:
+    """The names of the fields that messages have here, at the top or within, and not by the recorded schema."""
+    return frozenset() if recorded == here else frozenset(_added(json.loads(recorded or b"{}"), json.loads(here)))
+
+
+def _added(recorded: Any, here: Any) -> Iterator[str]:
+    if isinstance(recorded, dict) and isinstance(here, dict):
+        for key, value in here.items():
+            if key == "properties":
+                yield from (name for name in value if name not in recorded.get(key, {}))
+            if key in recorded:
+                yield from _added(recorded[key], value)
+    elif isinstance(recorded, list) and isinstance(here, list):
+        for one, other in zip(recorded, here, strict=False):
+            yield from _added(one, other)
+
+
+def missing_fields(data: bytes, message: Message) -> Iterator[str]:
+    """The names of the fields of `message` that its JSON in `data` does not say."""
+    said, whole = msgspec.json.decode(data), msgspec.json.decode(msgspec.json.encode(message))
+    return iter(()) if said == whole else _missing(said, whole)
+
+
+def _missing(said: Any, whole: Any) -> Iterator[str]:
+    if isinstance(said, dict) and isinstance(whole, dict):
+        yield from (key for key in whole if key not in said)
+        for key in said.keys() & whole.keys():
+            yield from _missing(said[key], whole[key])
+    elif isinstance(said, list) and isinstance(whole, list):
+        for one, other in zip(said, whole, strict=False):
+            yield from _missing(one, other)
 
 
 def _other_fields(recorded: bytes, here: bytes) -> str:

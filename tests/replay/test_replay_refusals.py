@@ -10,7 +10,7 @@ import pytest
 from mcap.records import Channel, Metadata, Schema
 
 from services.recordings.reader import BadRecording
-from services.replay.main import replay
+from services.replay.main import replay, text_of
 from services.replay.recorded import NotReplayable
 from tests.replay.conftest import RECORDINGS, Messages
 
@@ -128,7 +128,35 @@ def test_a_message_that_has_got_a_field_since_is_read_with_its_default(changed):
             record.data = json.dumps(schema).encode()
         return record
 
-    replay(changed("state_publisher", change), "state_publisher")
+    replayed = replay(changed("state_publisher", change), "state_publisher")
+    assert replayed.added == {"joint_states": ["effort"]}
+    assert "joint_states is older than its fields effort: read with their defaults" in text_of(replayed)
+
+
+@pytest.mark.parametrize(
+    ("service", "topic", "place"),
+    [("state_publisher", "joint_states", ()), ("planner", "plan/inputs", ("present",)), ("planner", "scene", ())],
+)
+def test_a_message_without_a_field_that_its_own_schema_has_is_not_whole(changed, service, topic, place):
+    """It is not older than that field, so its default is a guess."""
+    lost = []
+
+    def alter(content, number):
+        if number == 1:
+            for key in place:
+                content = content[key]
+            lost.append(list(content)[-1])
+            del content[lost[0]]
+
+    with pytest.raises(NotReplayable) as refused:
+        replay(changed(service, Messages(topic, alter)), service)
+    assert f"message 1 of {topic} has no {lost[0]}, which its own schema has" in str(refused.value)
+
+
+def test_a_recording_of_today_has_no_added_fields():
+    replayed = replay(RECORDINGS / "state_publisher.mcap", "state_publisher")
+    assert replayed.added == {}
+    assert "older" not in text_of(replayed)
 
 
 def test_nothing_but_inputs(changed):
