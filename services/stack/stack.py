@@ -18,6 +18,7 @@ from services.mqtt import secure_folder
 from services.runtime.deployment import project_root
 from services.runtime.process.readiness import says_ready
 from services.stack.compose import Compose, ComposeError
+from services.stack.guard import Guard
 from services.stack.not_ready import NotReady, not_ready
 
 PROCESSES = (
@@ -50,7 +51,7 @@ class StackError(Exception):
 
 
 class Stack:
-    """Starts on entering, stops on leaving; every process can be looked at and killed by name.
+    """Starts on entering, stops on leaving, or when this process ends; each process can be killed by name.
 
     `viewer="none"` leaves the viewer's process out, `panel` adds the operator's page; without GEMELO_CELL in
     `environment` the cameras are left out, which would stand aside.
@@ -86,6 +87,7 @@ class Stack:
         self.socket = self.folder / "process-compose.sock"
         self.compose = Compose(self.socket)
         self.server: subprocess.Popen[bytes] | None = None
+        self._guard: Guard | None = None
         router, mqtt, grpc, web, page = free_ports(5)
         self.deployment: dict[str, str] = {
             "GEMELO_ROUTER_PORT": str(router),
@@ -144,15 +146,19 @@ class Stack:
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
             )
+        self._guard = Guard(self.server.pid)
         self.wait_ready(self._ready_timeout)
         self.ready_seconds = time.monotonic() - started
 
     def stop(self) -> int | None:
         """Ends all processes as Ctrl-C would; returns the exit code of process-compose, None if it did not run."""
         server, self.server = self.server, None
+        guard, self._guard = self._guard, None
         code = None
         if server is not None:
             server.send_signal(signal.SIGTERM)
+            if guard is not None:
+                guard.close()
             try:
                 code = server.wait(STOP)
             except subprocess.TimeoutExpired:
