@@ -25,6 +25,7 @@ from schemas.planning import (
 )
 from schemas.scene import PlanningScene
 from tests.planner.judging import asked, planner_of, require_refused, require_sound, show
+from tests.profiles import count
 from tests.table import table
 
 ARMS = pytest.mark.parametrize("name", ["rm1", "parol6"])
@@ -170,13 +171,14 @@ def test_as_fast_as_nothing_can_be_is_as_fast_as_the_joints_can(name: str, motio
     assert planned(name, whole(name, goal, motion=motion)) == ""
 
 
+@pytest.mark.scaled
 @ARMS
 @table("motion", [FreeMotion(), PointToPoint(), LinearMotion()])
 @table("blend", [0.0, 0.01])
 def test_thousands_of_waypoints_are_gone_by_or_refused_in_time(name: str, motion: Motion, blend: float):
     planner = planner_of(name)
     x, y, z = planner.kinematics.tool(planner.arm.named_states["ready"]).position.tolist()
-    points = tuple(PoseGoal(position=(x - 0.01, y + 0.02 * math.sin(i), z)) for i in range(2000))
+    points = tuple(PoseGoal(position=(x - 0.01, y + 0.02 * math.sin(i), z)) for i in range(count(quick=200, full=2000)))
     words = planned(name, whole(name, WaypointGoal(points=points, blend=blend), motion=motion))
     assert "allow" in words or "waypoints" in words or words == ""
 
