@@ -13,6 +13,7 @@ from services.cli.parser import Options
 from services.cli.request_text import millimetres, rotation_text
 from services.cli.text_table import table
 from services.cli.units import LENGTH, parse_quantity, parse_rotation
+from services.runtime.deployment import project_root
 
 
 def object_of(options: Options) -> SceneObject:
@@ -100,8 +101,22 @@ def place_text(pose: Transform, frame: str) -> str:
 
 
 def sized_text(shape: Shape) -> str:
-    """The shape as text with its unit."""
-    return f"{shape_text(shape)}{'' if isinstance(shape, PlaneShape | MeshShape) else ' mm'}"
+    """The shape as text with its unit; of a mesh with its size, which shows a wrong scale."""
+    if isinstance(shape, MeshShape):
+        return f"{shape_text(shape)}{_mesh_size(shape)}"
+    return f"{shape_text(shape)}{'' if isinstance(shape, PlaneShape) else ' mm'}"
+
+
+def _mesh_size(shape: MeshShape) -> str:
+    """Empty for what is no mesh, which the planner says."""
+    from services.arm.stl import BadStl, read_stl  # slow to load: numpy
+
+    try:
+        vertices = read_stl(shape.data or (project_root() / shape.path).read_bytes()).vertices
+    except (BadStl, OSError):
+        return ""
+    edges = (vertices.max(axis=0) - vertices.min(axis=0)) * shape.scale
+    return f", {' x '.join(f'{1000.0 * edge:.3g}' for edge in edges)} mm large"
 
 
 def shape_text(shape: Shape) -> str:

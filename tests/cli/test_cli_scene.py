@@ -120,6 +120,7 @@ def test_a_mesh_in_millimetres_is_noticed_and_its_scale_is_listed(scene, tmp_pat
     assert said(f"scene add plate --mesh {path}") is ExitCode.USAGE
     assert "would be 92 m long: if it is drawn in mm, give --scale 0.001" in capsys.readouterr().err
     assert said(f"scene add plate --mesh {path} --scale 0.001") is ExitCode.OK
+    assert f"mesh of {path.stat().st_size} bytes, scale 0.001, 92 x 92 x 0 mm large, at" in capsys.readouterr().out
     assert scene().objects[0].shape.scale == (0.001,) * 3
     assert said("scene list") is ExitCode.OK
     assert f"mesh of {path.stat().st_size} bytes, scale 0.001" in capsys.readouterr().out

@@ -11,12 +11,14 @@ import trimesh
 from schemas.joints import JointState
 from schemas.planning import PlanRequest, PoseGoal
 from services.arm.checks.findings import Severity
+from services.arm.checks.meshes import MOST_TRIANGLES
 from services.arm.model.description import load_arm
 from services.arm.model.srdf_edit import entries
 from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.planner.core import Planner
 from services.robot_import.coarser import coarser
+from services.robot_import.mesh_copies import MOST_COARSER
 from services.robot_import.rigid_groups import MOST_PARTS
 from tests.robot_import.plain_arm import LIMIT, arm, body, boxes, hinge, hinges, meshed, part, stl
 from tests.robot_import.test_what_restricts_motion import jaws, survey
@@ -176,6 +178,23 @@ def test_a_mesh_of_too_many_triangles_keeps_its_shape():
     assert moved < 0.005
     assert np.linalg.norm(smaller.vertices, axis=1) == pytest.approx(0.1, abs=0.002)
     assert smaller.volume == pytest.approx(ball.volume, rel=0.02)
+
+
+@pytest.mark.full
+def test_an_arm_of_a_mesh_of_600_000_triangles_is_imported_with_a_coarser_copy(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    folder = tmp_path / "in"
+    heights = np.linspace(0.0, 0.2, 301)
+    profile = np.column_stack((np.r_[0.0, np.full(301, 0.03), 0.0], np.r_[0.0, heights, 0.2]))
+    fine = trimesh.creation.revolve(profile, sections=1000)
+    source = arm(folder, boxes(upper=meshed("fine.stl")), hinges())
+    (folder / "fine.stl").write_bytes(trimesh.exchange.stl.export_stl(fine))
+    output = imported(source, tmp_path / "out")
+    assert f"has {len(fine.faces)} triangles, more than {MOST_TRIANGLES} -> its copy is made" in capsys.readouterr().out
+    copy = trimesh.load_mesh(output / "meshes/fine.stl")
+    assert len(copy.faces) <= MOST_COARSER
+    assert np.ptp(copy.vertices, axis=0) == pytest.approx(np.ptp(fine.vertices, axis=0), abs=0.001)
 
 
 def test_axes_that_rounding_has_shortened_are_no_fault(tmp_path: Path):
