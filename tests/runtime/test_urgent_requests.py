@@ -116,7 +116,8 @@ def test_a_stop_is_read_before_the_holds_that_have_arrived_before_it(router: Rou
         is_released.set()
         for bus in (server, client):
             bus.close()
-    assert read == [hold, stop] + [hold] * 299
+    assert stop in read[:2]  # the first hold may be read before it has arrived
+    assert read.count(hold) == 300
 
 
 def test_equal_stops_that_wait_are_handled_once_and_all_answered(buses: Buses) -> None:
