@@ -184,6 +184,9 @@ def stream_a_little(stack):
         while abs(arm.joints["brazo_joint"] - 0.1) > 0.005:
             assert time.monotonic() < end
             arm.stream({"brazo_joint": 0.1})
+        while arm.device.mode is not api.DeviceMode.IDLE:  # a device that is ended in a motion says that it holds
+            assert time.monotonic() < end
+            time.sleep(0.02)
 
 
 def test_make_up_welcomes_the_user_and_a_sigterm_ends_it(tmp_path):
