@@ -72,15 +72,26 @@ status() {
     fi
 }
 
-# end_lanes CODE: ends every lane with all that it has started, and the bootstrap.
+# end_lanes CODE: ends every lane with all that it has started, and the bootstrap; what is there after 5 s is killed.
 end_lanes() {
-    local pid
+    local tries=0
     trap '' INT TERM HUP
-    for pid in "${lanes[@]}"; do kill -TERM -- "-$pid" 2>/dev/null || true; done
-    wait || true
+    signal_lanes TERM || true
+    while [ $tries -lt 50 ] && signal_lanes 0; do
+        sleep 0.1
+        tries=$((tries + 1))
+    done
+    signal_lanes KILL || true
     line
     printf '%sbootstrap: interrupted%s; what is done need not be done again\n' "$red" "$plain" >&2
     exit "$1"
+}
+
+# signal_lanes SIGNAL: to every process of every lane; fails where none is left.
+signal_lanes() {
+    local pid left=1
+    for pid in "${lanes[@]}"; do ! kill "-$1" -- "-$pid" 2>/dev/null || left=0; done
+    return $left
 }
 
 # The output and the words of every step that has failed; the same words once.
