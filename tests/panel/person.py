@@ -12,9 +12,10 @@ import imageio.v3 as imageio
 import numpy as np
 from playwright.sync_api import Browser, Locator, Page, ViewportSize, expect
 
+from tests.stacks.browser import PATIENCE, new_context
+
 T = TypeVar("T")
 
-PATIENCE = 60_000.0  # [ms] a loaded machine draws a picture in seconds
 OPENING = 300_000.0  # [ms] and compiles its shaders in a minute or more
 SCALE = 0.5  # of a picture's pixels to those of the page: a processor draws a quarter of them
 CONTROLS = 450  # [pixels] of the page
@@ -32,14 +33,13 @@ class Person:
     """One browser window."""
 
     def __init__(self, browser: Browser, port: str, language: str, size: ViewportSize) -> None:
-        self._context = browser.new_context(viewport=size, locale=language, device_scale_factor=SCALE)
+        self._context = new_context(browser, viewport=size, locale=language, device_scale_factor=SCALE)
         self._drawing = int(
             SCALE * (size["width"] - CONTROLS)
         )  # [pixels] of the picture that are drawn in three dimensions
         self._address = f"http://127.0.0.1:{port}"
         self._context.add_init_script(CALM)
         self.page = self._context.new_page()
-        self.page.set_default_timeout(PATIENCE)
         self._errors: list[str] = []
         self.page.on("pageerror", lambda error: self._errors.append(str(error)))
 

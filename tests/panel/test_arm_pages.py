@@ -16,6 +16,7 @@ from services.runtime.deployment import project_root
 from services.stack.arms import stacked_arms
 from services.stack.several_arms import write
 from services.stack.stack import free_ports
+from tests.stacks.browser import new_context
 
 ENGLISH = Words("en")
 
@@ -52,10 +53,9 @@ def both() -> Iterator[tuple[ArmPage, ...]]:
 def test_a_click_leads_to_the_other_arms_page_by_the_name_by_which_this_one_was_opened(
     both: tuple[ArmPage, ...], chromium: Browser
 ) -> None:
-    context = chromium.new_context()
+    context = new_context(chromium)
     try:
         page = context.new_page()
-        page.set_default_timeout(60_000.0)
         page.goto(f"http://localhost:{both[0].port}")
         page.get_by_role("link", name="parol6", exact=True).click()
         expect(page).to_have_url(re.compile(f"^http://localhost:{both[1].port}/"), timeout=60_000.0)

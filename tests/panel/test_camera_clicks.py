@@ -16,6 +16,7 @@ from schemas.camera import CameraImage
 from services.panel.view.browser import CHANNEL, read_browser, script_html
 from tests.panel.person import OPENING, PATIENCE, place_in_image, until
 from tests.panel.test_camera_box import opened
+from tests.stacks.browser import new_context
 
 JPEG = cv2.imencode(".jpg", np.full((480, 640, 3), 90, np.uint8))[1].tobytes()
 
@@ -42,7 +43,7 @@ def shown(server: viser.ViserServer, chromium: Browser) -> Iterator[SimpleNamesp
 
     page.told = []
     page.stamp = 0
-    context = chromium.new_context(viewport={"width": 900, "height": 900}, device_scale_factor=0.5)
+    context = new_context(chromium, viewport={"width": 900, "height": 900}, device_scale_factor=0.5)
     browser = context.new_page()
     browser.goto(f"http://127.0.0.1:{server.get_port()}")
     show(page)

@@ -8,13 +8,14 @@ import pytest
 from playwright.sync_api import Browser, Frame, Page
 
 from services.panel.view.browser import script_html
+from tests.stacks.browser import new_context
 
 BUTTON = "<button onpointerdown=\"document.title += '+'\" onpointerup=\"document.title += '-'\">x +  ▲</button>"
 
 
 @pytest.fixture
 def page(chromium: Browser) -> Iterator[Page]:
-    context = chromium.new_context()
+    context = new_context(chromium)
     yield context.new_page()
     context.close()
 

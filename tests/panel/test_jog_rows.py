@@ -10,6 +10,7 @@ from playwright.sync_api import Browser
 
 from services.panel.view.browser import CHANNEL, script_html
 from tests.panel.person import OPENING, until
+from tests.stacks.browser import new_context
 
 LABELS = ("Home", "x +  ▲", "x -  ▼", "z +  PgUp", "z -  PgDn", "a long_joint -", "a long_joint +", "Go + stop")
 
@@ -37,7 +38,7 @@ def jogged() -> Iterator[Jogged]:
 def test_the_two_jog_buttons_of_an_axis_share_a_row_and_each_key_holds_and_presses_its_own(
     jogged: Jogged, chromium: Browser
 ) -> None:
-    context = chromium.new_context(viewport={"width": 900, "height": 700}, device_scale_factor=0.5)
+    context = new_context(chromium, viewport={"width": 900, "height": 700}, device_scale_factor=0.5)
     page = context.new_page()
     page.goto(f"http://127.0.0.1:{jogged.server.get_port()}")
     try:
@@ -82,7 +83,7 @@ TOPS = """() => {
 
 def test_buttons_that_come_later_share_a_row_in_every_frame(jogged: Jogged, chromium: Browser) -> None:
     """So that none moves away below a pointer that is already there."""
-    context = chromium.new_context(viewport={"width": 900, "height": 700}, device_scale_factor=0.5)
+    context = new_context(chromium, viewport={"width": 900, "height": 700}, device_scale_factor=0.5)
     page = context.new_page()
     page.goto(f"http://127.0.0.1:{jogged.server.get_port()}")
     try:

@@ -18,6 +18,7 @@ from services.panel.view.page import Page
 from tests.panel.memory_page import MemoryPage, memory_page
 from tests.panel.person import OPENING, until
 from tests.runtime.support import free_port
+from tests.stacks.browser import new_context
 
 HIDE_STOP = f"""() => {{
   const stop = [...document.querySelectorAll('button')].find((b) => b.textContent.trim().startsWith('{STOP_SIGN}'));
@@ -62,7 +63,7 @@ def opened(tmp_path: Path, chromium: Browser) -> Iterator[Opened]:
     with memory_page("rm1", tmp_path) as memory:
         port = free_port()
         link = SlowLink(port, memory.port)
-        context = chromium.new_context(viewport={"width": 820, "height": 600}, device_scale_factor=0.5)
+        context = new_context(chromium, viewport={"width": 820, "height": 600}, device_scale_factor=0.5)
         yield Opened(memory, context.new_page(), link, port)
         context.close()
         link.close()

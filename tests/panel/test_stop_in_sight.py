@@ -10,6 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from services.panel.view.browser import CHANNEL, STOP_SIGN, script_html
 from tests.panel.person import OPENING, PATIENCE, until
+from tests.stacks.browser import new_context
 
 SECOND = "[data-gemelo-stop]"
 
@@ -40,7 +41,7 @@ def stopped() -> Iterator[Stopped]:
 
 @pytest.fixture
 def page(stopped: Stopped, chromium: Browser) -> Iterator[Page]:
-    context = chromium.new_context(viewport={"width": 820, "height": 600}, device_scale_factor=0.5)
+    context = new_context(chromium, viewport={"width": 820, "height": 600}, device_scale_factor=0.5)
     page = context.new_page()
     page.goto(f"http://127.0.0.1:{stopped.server.get_port()}")
     page.get_by_role("button", name="line 59").wait_for(timeout=OPENING, state="attached")

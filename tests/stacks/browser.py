@@ -6,7 +6,7 @@ import os
 import shlex
 import shutil
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -14,7 +14,7 @@ from tests.optional import need
 from tests.stacks.counts import count_start
 
 if TYPE_CHECKING:  # it is slow to load, and few tests need it
-    from playwright.sync_api import Browser, ViewportSize
+    from playwright.sync_api import Browser, BrowserContext, ViewportSize
 
 # As root it would put its drawing before everything else on the machine, and as a session of its own it counts as much
 # as the whole stack: both are taken from it.
@@ -29,10 +29,20 @@ FLAGS = [  # three dimensions are drawn by a processor; the page itself is drawn
 SIZE: ViewportSize = {"width": 900, "height": 640}  # small: the browser draws without a graphics card here
 
 
+PATIENCE = 120_000.0  # [ms] for whatever a page is asked: a loaded machine draws a picture in seconds
+
+
+def new_context(browser: Browser, **options: Any) -> BrowserContext:
+    """A context, with these options of playwright, whose pages are waited for with patience."""
+    context = browser.new_context(**options)
+    context.set_default_timeout(PATIENCE)
+    return context
+
+
 @pytest.fixture(scope="session")
 def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     need("chromium")
-    from playwright.sync_api import sync_playwright
+    from playwright.sync_api import expect, sync_playwright
 
     program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     assert program is not None
@@ -41,6 +51,7 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
         modest.write_text(MODESTLY.format(program=shlex.quote(program)))
         modest.chmod(0o755)
         program = str(modest)
+    expect.set_options(timeout=PATIENCE)
     with sync_playwright() as playwright:
         count_start("browsers")
         browser = playwright.chromium.launch(executable_path=program, args=FLAGS)
