@@ -19,6 +19,7 @@ from services.stack.stack import Stack
 from tests.simulation.test_large_scenes import tube
 from tests.stack import gemelo as command
 
+pytestmark = pytest.mark.alone  # ten megabytes pass through every link of two cores
 SERVICES = ("stepper_gateway", "planner", "state_publisher", "logger")
 
 
