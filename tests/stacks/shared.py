@@ -155,10 +155,11 @@ def left_as_found(request: pytest.FixtureRequest) -> Iterator[None]:
     The arm stands at home when a test begins.
     """
     name = kind_of(request.node)
+    stacks: SharedStacks = request.getfixturevalue("shared_stacks")
     if not name:
+        stacks.stop()  # the tests that share one are over; this one may start its own
         yield
         return
-    stacks: SharedStacks = request.getfixturevalue("shared_stacks")
     reset = stacks.reset(name)
     try:
         before = reset.before()
