@@ -14,14 +14,15 @@ import pytest
 
 import gemelo
 from schemas import system
-from schemas.topics import camera_truth
+from schemas.topics import DEVICE_SHAFT, camera_truth
 from services.runtime.endpoints import parameter_request, parameters_request
 from services.stack.stack import Stack
-from tests.simulated import put_right
+from tests.simulated import put_right, where_it_stands
 
 READY = 60.0  # [s] in which a process that a test has killed is there again
 CAMERA = "overhead"  # of the sample cell
 LAID_BACK = 1e-3  # [m] by which a thing that nobody has carried may differ from where it lay
+SETTLED = 2.0  # [s] after rest in which what is said of the shafts is of where they rest
 LETS_GO = 6.0  # [s] in which control, motions and processes of a client that has just ended are over
 
 Values = dict[tuple[str, str], system.ParameterValue]
@@ -43,6 +44,7 @@ class Reset:
         self._stack = stack
         self._arm = self._connected()
         self._parameters: Values = {}
+        self._shaft = self._arm.node.latest(DEVICE_SHAFT)
         self._truth = self._arm.node.latest(camera_truth(CAMERA)) if "camera" in stack.processes else None
         self._laid: Places = {}
         try:
@@ -154,9 +156,20 @@ class Reset:
         return found
 
     def _put_right(self) -> None:
-        """Without a word: armed, referenced, at full speed, with an empty scene."""
+        """Without a word: armed, referenced where it really stands, at full speed, with an empty scene."""
         self._stack.wait_ready(READY)
         put_right(self._arm)
+        if not self._becomes(
+            self._is_where_it_says, SETTLED
+        ):  # a person has declared otherwise, or a shaft has slipped
+            self._arm.reference(where_it_stands(self._arm))
+
+    def _is_where_it_says(self) -> bool:
+        shaft, joint = self._shaft.message, self._arm.description.joint
+        return shaft is not None and all(
+            abs(at - self._arm.joints[name]) * joint(name).steps.per_unit <= 3.0
+            for name, at in zip(shaft.name, shaft.position, strict=True)
+        )
 
     def _places(self) -> Places:
         newest = self._truth.message if self._truth is not None else None
