@@ -50,8 +50,7 @@ def test_the_first_hour_goes_as_it_is_told(twin: Stack, chromium: Browser) -> No
 
 
 def walk(language: str, twin: Stack, chromium: Browser) -> None:
-    """All that the page of that language tells, on a twin that was just started: its page knows of nobody's program."""
-    twin.kill("panel")
+    """All that the page of that language tells, on a twin that was just started."""
     twin.wait_ready(120.0)
     port = twin.deployment["GEMELO_PANEL_PORT"]
     with Newcomer(chromium, port, language) as person, gemelo.connect(timeout=60.0) as arm:

@@ -79,9 +79,16 @@ class Reset:
         left = [*self._processes(), *self._children(before), *self._complaints(before)]
         left += [*self._motion(), *self._control(), *self._device(), *self._changed_parameters()]
         self._put_right()
-        for path in self._files() - before.files:
-            path.unlink()
+        self._forget(self._files() - before.files)
         return left
+
+    def _forget(self, files: set[Path]) -> None:
+        """What was taught; a page that has it open, and says that it is unsaved then, starts anew."""
+        for path in files:
+            path.unlink()
+        if files and "panel" in self._stack.processes:
+            self._stack.kill("panel")
+            self._stack.wait_ready(READY)
 
     def _processes(self) -> Iterator[str]:
         """Frozen ones; those that were killed have time to come back."""
