@@ -19,25 +19,25 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from gemelo.arguments import Target, ToolGoal
-    from gemelo.arm import Arm
-    from gemelo.connection import connect, robots
-    from gemelo.control import Control, Hold
-    from gemelo.device import Device
-    from gemelo.errors import Aborted, BadArgument, Canceled, Error, Interrupted, Lost, Refused
-    from gemelo.gripping import Gripped
-    from gemelo.homing_report import HomingProgress, HomingReport
-    from gemelo.ledger import JointLedger, Ledger
-    from gemelo.motion import Motion
-    from gemelo.picking import Picked
-    from gemelo.planning import Configurations, Plan
-    from gemelo.robot_files import Robot, load_robot
-    from gemelo.scene import Scene
-    from gemelo.scene_files import load_mesh
-    from gemelo.seeing import Seen
-    from gemelo.simulation import SimulatedArm, SimulatedArms, SimulatedWorld, Simulation, simulate
-    from gemelo.units import Pose, deg, mm
-    from gemelo.verification import Verification
+    from gemelo.api.arguments import Target, ToolGoal
+    from gemelo.api.arm import Arm
+    from gemelo.api.connection import connect, robots
+    from gemelo.api.control import Control, Hold
+    from gemelo.api.device import Device
+    from gemelo.api.errors import Aborted, BadArgument, Canceled, Error, Interrupted, Lost, Refused
+    from gemelo.api.gripping import Gripped
+    from gemelo.api.homing_report import HomingProgress, HomingReport
+    from gemelo.api.ledger import JointLedger, Ledger
+    from gemelo.api.motion import Motion
+    from gemelo.api.picking import Picked
+    from gemelo.api.planning import Configurations, Plan
+    from gemelo.api.robot_files import Robot, load_robot
+    from gemelo.api.scene import Scene
+    from gemelo.api.scene_files import load_mesh
+    from gemelo.api.seeing import Seen
+    from gemelo.api.simulation import SimulatedArm, SimulatedArms, SimulatedWorld, Simulation, simulate
+    from gemelo.api.units import Pose, deg, mm
+    from gemelo.api.verification import Verification
     from schemas import topics
     from schemas.actions import GoalStatusCode
     from schemas.device import DeviceMode, StopKind
@@ -91,25 +91,25 @@ __all__ = [
 
 # Each name is imported when it is first used: a program that needs one part, as the command line, loads no other.
 MODULES = {
-    "gemelo.arguments": ("Target", "ToolGoal"),
-    "gemelo.arm": ("Arm",),
-    "gemelo.connection": ("connect", "robots"),
-    "gemelo.control": ("Control", "Hold"),
-    "gemelo.device": ("Device",),
-    "gemelo.errors": ("Aborted", "BadArgument", "Canceled", "Error", "Interrupted", "Lost", "Refused"),
-    "gemelo.gripping": ("Gripped",),
-    "gemelo.homing_report": ("HomingProgress", "HomingReport"),
-    "gemelo.ledger": ("JointLedger", "Ledger"),
-    "gemelo.motion": ("Motion",),
-    "gemelo.picking": ("Picked",),
-    "gemelo.planning": ("Configurations", "Plan"),
-    "gemelo.robot_files": ("Robot", "load_robot"),
-    "gemelo.scene": ("Scene",),
-    "gemelo.scene_files": ("load_mesh",),
-    "gemelo.seeing": ("Seen",),
-    "gemelo.simulation": ("SimulatedArm", "SimulatedArms", "SimulatedWorld", "Simulation", "simulate"),
-    "gemelo.units": ("Pose", "deg", "mm"),
-    "gemelo.verification": ("Verification",),
+    "gemelo.api.arguments": ("Target", "ToolGoal"),
+    "gemelo.api.arm": ("Arm",),
+    "gemelo.api.connection": ("connect", "robots"),
+    "gemelo.api.control": ("Control", "Hold"),
+    "gemelo.api.device": ("Device",),
+    "gemelo.api.errors": ("Aborted", "BadArgument", "Canceled", "Error", "Interrupted", "Lost", "Refused"),
+    "gemelo.api.gripping": ("Gripped",),
+    "gemelo.api.homing_report": ("HomingProgress", "HomingReport"),
+    "gemelo.api.ledger": ("JointLedger", "Ledger"),
+    "gemelo.api.motion": ("Motion",),
+    "gemelo.api.picking": ("Picked",),
+    "gemelo.api.planning": ("Configurations", "Plan"),
+    "gemelo.api.robot_files": ("Robot", "load_robot"),
+    "gemelo.api.scene": ("Scene",),
+    "gemelo.api.scene_files": ("load_mesh",),
+    "gemelo.api.seeing": ("Seen",),
+    "gemelo.api.simulation": ("SimulatedArm", "SimulatedArms", "SimulatedWorld", "Simulation", "simulate"),
+    "gemelo.api.units": ("Pose", "deg", "mm"),
+    "gemelo.api.verification": ("Verification",),
     "schemas.actions": ("GoalStatusCode",),
     "schemas.device": ("DeviceMode", "StopKind"),
     "services.runtime.node": ("Node",),

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import gemelo
-from gemelo.simulation import SimulatedArm
+from gemelo.api.simulation import SimulatedArm
 from schemas.topics import DEVICE_SHAFT
 from services.cli import simulated
 from services.cli.errors import ExitCode

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from gemelo.arm import Arm
-from gemelo.errors import BadArgument, Refused
+from gemelo.api.arm import Arm
+from gemelo.api.errors import BadArgument, Refused
 from gemelo.programs.meaning import find_mistakes
 from gemelo.programs.mistakes import Mistake
 from gemelo.programs.planning import plan_leg

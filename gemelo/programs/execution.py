@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from functools import partial
 from threading import Event
 
-from gemelo.arm import Arm
-from gemelo.errors import Aborted, Error, Refused
-from gemelo.motion import Motion
-from gemelo.planning import Plan
+from gemelo.api.arm import Arm
+from gemelo.api.errors import Aborted, Error, Refused
+from gemelo.api.motion import Motion
+from gemelo.api.planning import Plan
 from gemelo.programs.planning import plan_leg
 from gemelo.programs.points import Point
 from gemelo.programs.sequence import Leg

@@ -6,6 +6,8 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
+from gemelo.api.targets import FULL, Waypoint
+from gemelo.api.units import Pose
 from gemelo.programs.planning import require_point, waypoint_of
 from gemelo.programs.points import Point
 from gemelo.programs.program import Program
@@ -27,8 +29,6 @@ from gemelo.programs.steps import (
     WaitFor,
     goal_of,
 )
-from gemelo.targets import FULL, Waypoint
-from gemelo.units import Pose
 
 WAIT_FOR = '''def wait_for(
     arm: gemelo.Arm, sensor: str, above: float | None = None, below: float | None = None, timeout: float = 60.0

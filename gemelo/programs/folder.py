@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from gemelo.arm import Arm
-from gemelo.errors import BadArgument
+from gemelo.api.arm import Arm
+from gemelo.api.errors import BadArgument
 from gemelo.programs.names import checked_folder, program_name
 from gemelo.programs.program import Program
 from gemelo.programs.reading import read_program

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from gemelo.errors import BadArgument, Error
-from gemelo.gripping import opening_of
+from gemelo.api.errors import BadArgument, Error
+from gemelo.api.gripping import opening_of
+from gemelo.api.targets import joint_state
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import program_name, read_text
 from gemelo.programs.points import Point
@@ -14,7 +15,6 @@ from gemelo.programs.program import Program
 from gemelo.programs.reading import parse_program, value_mistakes
 from gemelo.programs.steps import AnyStep, Attach, Call, Grip, MotionStep, Output, Pick, WaitFor
 from gemelo.programs.values import DEEPEST, Wrong, in_words_of_a_file
-from gemelo.targets import joint_state
 from services.arm.errors import suggestion
 from services.arm.model.description import ArmDescription
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from gemelo.errors import Error
+from gemelo.api.errors import Error
 from gemelo.programs.steps import StepPath, path_text
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import unicodedata
 from pathlib import Path
 
-from gemelo.errors import BadArgument, Error
+from gemelo.api.errors import BadArgument, Error
 from schemas import text_file
 
 LONGEST = 64  # [characters] of a name

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import cast
 
-from gemelo.arm import Arm
-from gemelo.errors import BadArgument
-from gemelo.planning import Plan
+from gemelo.api.arm import Arm
+from gemelo.api.errors import BadArgument
+from gemelo.api.planning import Plan
+from gemelo.api.targets import FULL, Target, Waypoint
+from gemelo.api.units import Pose
 from gemelo.programs.points import Point
 from gemelo.programs.sequence import Leg
 from gemelo.programs.steps import Arc, Line, MotionStep, goal_of
-from gemelo.targets import FULL, Target, Waypoint
-from gemelo.units import Pose
 from services.arm.errors import suggestion
 
 ALLOWED_TIME = 5.0  # [s] for one plan

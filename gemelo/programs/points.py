@@ -9,15 +9,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from gemelo.errors import BadArgument, Error
+from gemelo.api.errors import BadArgument, Error
+from gemelo.api.targets import Joints, named_joints
+from gemelo.api.whole_files import write_whole
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import checked_folder, point_name, read_text
 from gemelo.programs.program import VERSION
 from gemelo.programs.reading import load_toml
 from gemelo.programs.toml_lines import toml_lines
 from gemelo.programs.toml_text import key_text, value_text
-from gemelo.targets import Joints, named_joints
-from gemelo.whole_files import write_whole
 from services.arm.errors import suggestion
 from services.arm.model.description import ArmDescription
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from gemelo.gripping import CLOSE, OPEN
+from gemelo.api.gripping import CLOSE, OPEN
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import read_text
 from gemelo.programs.program import VERSION, Program, step_place

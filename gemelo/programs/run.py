@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial
 
-from gemelo.arm import Arm
-from gemelo.errors import Error, Refused
+from gemelo.api.arm import Arm
+from gemelo.api.errors import Error, Refused
 from gemelo.programs.execution import Controls, Execution
 from gemelo.programs.meaning import require_right
 from gemelo.programs.points import Point

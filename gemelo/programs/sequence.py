@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from gemelo.errors import BadArgument
+from gemelo.api.errors import BadArgument
 from gemelo.programs.program import Program
 from gemelo.programs.steps import AnyStep, Call, Go, Line, MotionStep, Repeat, Speed, StepPath, path_text
 

@@ -6,7 +6,7 @@ import re
 
 import msgspec
 
-from gemelo.errors import BadArgument
+from gemelo.api.errors import BadArgument
 
 StepPath = tuple[int, ...]  # from 0: the step's place in its list, after those of the repeats and calls around it
 

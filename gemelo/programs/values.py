@@ -7,9 +7,9 @@ import re
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from gemelo.errors import BadArgument
+from gemelo.api.errors import BadArgument
+from gemelo.api.targets import FASTEST, point, quaternion, turned, vector
 from gemelo.programs.steps import Arc, Line, MotionStep, Repeat, Speed, Step, Wait, WaitFor, goal_of
-from gemelo.targets import FASTEST, point, quaternion, turned, vector
 
 Wrong = tuple[str, str]  # the key, and what is wrong with it
 

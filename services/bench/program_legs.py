@@ -6,7 +6,7 @@ from bisect import bisect_left
 from itertools import pairwise
 
 import gemelo
-from gemelo.arm import Arm
+from gemelo.api.arm import Arm
 from gemelo.programs import Go, Point, Program, ProgramRun, Repeat, RunStatus
 from schemas.device import DeviceState
 from schemas.topics import DEVICE_STATE

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 import gemelo
-from gemelo.targets import FULL
+from gemelo.api.targets import FULL
 from services.cli.camera_images import Subject, subject
 from services.cli.camera_tip import ask_offset, step_floor, tip_length, tip_option
 from services.cli.errors import CommandError, ExitCode, in_commands, usage

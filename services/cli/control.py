@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from gemelo import control_file
+from gemelo.api import control_file
 from schemas.control import ControlState
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options, Parser, json_option

@@ -131,7 +131,7 @@ def reference(arm: Arm, assignments: Sequence[str]) -> ExitCode:
 
 def reference_request(arm: ArmDescription, assignments: Sequence[str]) -> ReferenceCommand:
     """The command with every joint named."""
-    from gemelo.device import reference_command  # slow to load: half of `gemelo`
+    from gemelo.api.device import reference_command  # slow to load: half of `gemelo`
 
     return reference_command(arm, parse_joints(assignments, arm.joints))
 

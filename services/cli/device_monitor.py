@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from gemelo.homing import joint_name
+from gemelo.api.homing import joint_name
 from schemas.device import DeviceConfiguration, DeviceEvent, DeviceState, DeviceStatus
 from schemas.device_faults import fault_text
 from schemas.topics import DEVICE_CONFIGURATION, DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS

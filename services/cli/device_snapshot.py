@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from gemelo.homing import joint_name
+from gemelo.api.homing import joint_name
 from schemas.device import DeviceConfiguration, DeviceState, DeviceStatus, SensorReadings
 from schemas.device_faults import FaultDescription, explain
 from schemas.device_link import offline_text

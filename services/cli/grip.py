@@ -16,7 +16,7 @@ from services.cli.units import LENGTH, parse_quantity
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
-    from gemelo.arguments import Grip
+    from gemelo.api.arguments import Grip
     from schemas.gripper import GripperCommandFeedback
 
 WORDS = ("open", "close")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from gemelo.homing_report import HOME, WAITS
+from gemelo.api.homing_report import HOME, WAITS
 from services.cli.errors import CommandError, ExitCode, in_commands, joint_of
 from services.cli.parser import Choices, Options, Parser, json_option
 from services.cli.session import connect_arm, load_robot

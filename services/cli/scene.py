@@ -182,7 +182,7 @@ def load(options: Options) -> ExitCode:
 
 def save(options: Options) -> ExitCode:
     """Writes the scene into a file."""
-    from gemelo.scene_files import write_scene  # slow to load
+    from gemelo.api.scene_files import write_scene  # slow to load
 
     with connect_arm() as arm:
         scene = arm.scene.whole()
@@ -232,7 +232,7 @@ def _link_names(robot: Robot | None) -> tuple[str, ...]:
 
 def _read(path: Path) -> PlanningScene:
     """The scene of a file; raises `CommandError` where it cannot be read, or holds none."""
-    from gemelo.scene_files import read_scene  # slow to load
+    from gemelo.api.scene_files import read_scene  # slow to load
 
     try:
         return read_scene(path)

@@ -28,7 +28,7 @@ class CommandSession(NamedTuple):
 
 def load_robot() -> Robot:
     """The arm that runs, or that of this folder; raises `CommandError` where files are wrong, or several run."""
-    from gemelo.robot_files import find_robot  # slow to load
+    from gemelo.api.robot_files import find_robot  # slow to load
 
     try:
         return find_robot(ask=simulated.chosen() is None)
@@ -101,7 +101,7 @@ def connect(robot: Robot | None = None) -> Iterator[CommandSession]:
 
 def share_control(session: CommandSession) -> None:
     """Shares the hold of control that another process of this user has on this host, if there is one."""
-    from gemelo.control import join_shared  # slow to load: the bus
+    from gemelo.api.control import join_shared  # slow to load: the bus
 
     join_shared(session.node, session.arm.name, session.deployment)
 
@@ -110,7 +110,7 @@ def require_router(deployment: Deployment) -> None:
     """Raises `CommandError` where no router listens, before anything slow is loaded; a simulated twin needs none."""
     if simulated.chosen() is not None:
         return
-    from gemelo import robot_files  # slow to load
+    from gemelo.api import robot_files  # slow to load
 
     try:
         robot_files.require_router(deployment)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from gemelo.session import Session as ArmSession
+from gemelo.api.session import Session as ArmSession
 from schemas.actions import GoalStatusCode
 from schemas.deployment import Deployment, PathsSection
 from schemas.device import (

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gemelo.units import Pose
+from gemelo.api.units import Pose
 from schemas.cell import VirtualSource
 from schemas.joints import JointState
 from services.arm.cell.camera_file import CAMERA_FILE

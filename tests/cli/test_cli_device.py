@@ -99,7 +99,7 @@ def test_a_device_in_fault_is_not_homed_but_the_remedy_is_said(connected, rm1_de
 
 
 def test_a_homing_that_never_begins_is_not_waited_for_for_ever(connected, rm1_device, monkeypatch):
-    from gemelo import homing as module
+    from gemelo.api import homing as module
 
     monkeypatch.setattr(module, "TO_BEGIN", 0.2)
     monkeypatch.setattr(rm1_device, "go_on_homing", lambda: rm1_device.set(mode=DeviceMode.UNREFERENCED))

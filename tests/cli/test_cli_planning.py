@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import pytest
 
 import gemelo
-from gemelo import planning
+from gemelo.api import planning
 from schemas.joints import JointState
 from schemas.planning import NamedGoal, PlanPhase, PlanProgress, PlanRequest, PlanResponse
 from schemas.scene import SceneReplace, SceneRequest

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 import gemelo
-from gemelo.simulation import SimulatedArm
+from gemelo.api.simulation import SimulatedArm
 from tests.simulated import found_by_connect, make_ready
 
 SHOWS = {  # what the last line of each says

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import gemelo
-from gemelo.simulation import SimulatedArm
+from gemelo.api.simulation import SimulatedArm
 from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.scene import BoxShape, PlanningScene, SceneAdd, SceneObject

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from gemelo.simulation import SimulatedArm
+from gemelo.api.simulation import SimulatedArm
 from tests.simulated import found_by_connect, make_ready
 
 

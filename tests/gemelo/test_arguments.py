@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gemelo
-from gemelo.arguments import Target
-from gemelo.jog import jog_command
-from gemelo.planning import refused
-from gemelo.targets import as_target, request_of
+from gemelo.api.arguments import Target
+from gemelo.api.jog import jog_command
+from gemelo.api.planning import refused
+from gemelo.api.targets import as_target, request_of
 from schemas.planning import (
     CircularMotion,
     JointGoal,

@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 import gemelo
-from gemelo.simulation import SimulatedArm
+from gemelo.api.simulation import SimulatedArm
 from schemas.device import HomeCommand
 from schemas.planning import PlanProgress
 from tests.simulated import is_moving

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from gemelo import seeing
-from gemelo.errors import Refused
-from gemelo.scene import Scene
-from gemelo.seeing import Eyes
-from gemelo.session import Session
+from gemelo.api import seeing
+from gemelo.api.errors import Refused
+from gemelo.api.scene import Scene
+from gemelo.api.seeing import Eyes
+from gemelo.api.session import Session
 from schemas.camera import CameraCondition, CameraStatus
 from schemas.deployment import Deployment, PathsSection
 from schemas.detections import Detection, DetectionKind, Detections

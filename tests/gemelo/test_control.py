@@ -13,9 +13,9 @@ import msgspec
 import pytest
 
 import gemelo
-from gemelo import control_file
-from gemelo.control import Hold
-from gemelo.session import Session
+from gemelo.api import control_file
+from gemelo.api.control import Hold
+from gemelo.api.session import Session
 from schemas.actions import GoalRequest, GoalResponse, ResultRequest
 from schemas.control import ControlAnswer, ControlState, ControlTake
 from schemas.deployment import Deployment, PathsSection

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gemelo import BadArgument
-from gemelo.gripping import opening_of, opens
+from gemelo.api.gripping import opening_of, opens
 from schemas.gripper import GripperState
 from schemas.robot import Gripper
 from services.arm.model.description import load_arm

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from gemelo.simulation import SimulatedArm
+from gemelo.api.simulation import SimulatedArm
 from schemas.cell import MeasuredCamera, Mount
 from schemas.topics import camera_truth
 from services.arm.cell.camera_file import CAMERA_FILE, write_measured

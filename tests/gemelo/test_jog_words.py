@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gemelo import Refused
-from gemelo.jog import BEGIN, PERIOD, JogCommands
+from gemelo.api.jog import BEGIN, PERIOD, JogCommands
 from schemas.planning import JogCommand, JogStatus
 
 BUSY = JogStatus(limited_by="a goal is being carried out: cancel it first")

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from gemelo import Lost, Refused
-from gemelo.grasping import lift_above, looking_down, turn_between, yaw_of
-from gemelo.picking import look_twice
-from gemelo.seeing import Seen
-from gemelo.units import Pose
+from gemelo.api.grasping import lift_above, looking_down, turn_between, yaw_of
+from gemelo.api.picking import look_twice
+from gemelo.api.seeing import Seen
+from gemelo.api.units import Pose
 from schemas.cell import ColourThing, TagThing
 from schemas.robot import Gripper
 from services.arm.frames.transforms import from_axis_angle, rotate

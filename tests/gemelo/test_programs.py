@@ -16,6 +16,7 @@ import pytest
 
 import gemelo
 import gemelo.programs
+from gemelo.api.simulation import SimulatedArm
 from gemelo.programs import (
     Arc,
     Attach,
@@ -37,7 +38,6 @@ from gemelo.programs import (
     export_script,
 )
 from gemelo.programs.steps import AnyStep
-from gemelo.simulation import SimulatedArm
 from schemas.device import DeviceMode, DeviceState
 from tests.gemelo.test_docstrings import OPTIONS
 from tests.simulated import is_moving, make_ready, rests

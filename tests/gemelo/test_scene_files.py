@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from gemelo.scene_files import read_scene, write_scene
+from gemelo.api.scene_files import read_scene, write_scene
 from schemas.scene import PlanningScene, SceneObject, SphereShape
 
 ONE = PlanningScene(objects=(SceneObject(name="ball", shape=SphereShape(radius=0.02)),))

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from gemelo.seeing import Seen, add_to_scene, body_of, combined, streams, why_unclear
-from gemelo.units import Pose
+from gemelo.api.seeing import Seen, add_to_scene, body_of, combined, streams, why_unclear
+from gemelo.api.units import Pose
 from schemas.camera import CameraCondition, CameraStatus
 from schemas.cell import ColourThing, TagThing
 from schemas.detections import Detection, DetectionKind, Detections, Unclear

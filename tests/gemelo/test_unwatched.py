@@ -11,7 +11,7 @@ from collections.abc import Callable
 import pytest
 
 import gemelo
-from gemelo.simulation import SimulatedArm
+from gemelo.api.simulation import SimulatedArm
 from tests.simulated import is_moving, rests
 
 FAR = 1.2  # [rad] of the first joint

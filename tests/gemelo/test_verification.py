@@ -9,8 +9,8 @@ import pytest
 from msgspec.structs import replace
 
 import gemelo
-from gemelo.ledger import Requirement, read_ledger
-from gemelo.verification import far_side, is_passable, trip_of
+from gemelo.api.ledger import Requirement, read_ledger
+from gemelo.api.verification import far_side, is_passable, trip_of
 from schemas.ledger import StepLedger, VerifiedBy
 from services.arm.model.description import ArmDescription, load_arm
 from services.runtime.deployment import project_root

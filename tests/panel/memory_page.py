@@ -13,7 +13,7 @@ from typing import Any
 from unittest import mock
 
 import gemelo
-from gemelo.session import Session
+from gemelo.api.session import Session
 from schemas.device import (
     DeviceCommandResponse,
     DeviceMode,

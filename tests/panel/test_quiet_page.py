@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.device import Device
+from gemelo.api.device import Device
 from schemas.device import StopKind
 from schemas.frames import Transform
 from schemas.scene import BoxShape, PlanningScene, SceneObject

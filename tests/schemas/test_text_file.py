@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 import gemelo
+from gemelo.api.scene_files import read_scene, write_scene
 from gemelo.programs import Points
 from gemelo.programs.reading import read_program
-from gemelo.scene_files import read_scene, write_scene
 from schemas.scene import PlanningScene
 from schemas.text_file import NotUtf8, decode_text
 from services.arm.cell.cell_file import load_cell

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import gemelo
-from gemelo.simulation import SimulatedArm
+from gemelo.api.simulation import SimulatedArm
 from schemas.device import DeviceCommandRequest, DeviceStopRequest, InjectRequest, StopKind
 from schemas.frames import Transform
 from schemas.joints import JointTargets

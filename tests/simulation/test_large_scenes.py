@@ -43,7 +43,7 @@ class SeenKeeper(SceneKeeper):
 class Everybody:
     """One arm with all who have its scene."""
 
-    arm: gemelo.simulation.SimulatedArm
+    arm: gemelo.api.simulation.SimulatedArm
     keeper: SceneKeeper
     page: BusReadings
     viewed: list[PlanningScene]  # what the viewer is given, the newest last
@@ -162,8 +162,8 @@ def test_a_mesh_that_nobody_knows_or_that_is_too_large_is_refused_and_nothing_ha
     assert everybody.require_one_scene() == before
 
 
-def gemelo_add(name: str, shape: MeshShape) -> gemelo.scene.SceneAdd:
-    return gemelo.scene.SceneAdd(object=SceneObject(name=name, shape=shape))
+def gemelo_add(name: str, shape: MeshShape) -> gemelo.api.scene.SceneAdd:
+    return gemelo.api.scene.SceneAdd(object=SceneObject(name=name, shape=shape))
 
 
 @given(steps=st.lists(st.tuples(st.sampled_from("abc"), st.sampled_from((*SIZES, 0, -1))), min_size=1, max_size=8))

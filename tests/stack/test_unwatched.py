@@ -104,7 +104,7 @@ def test_ctrl_c_decelerates_and_then_raises(twin: Stack, arm: gemelo.Arm, goal: 
         assert said(process) == "True True"
         code, _, errors = ended(process)
     assert code == 1
-    assert errors.splitlines()[-1].startswith("gemelo.errors.Interrupted: stopped by Ctrl-C: <Motion rm1: joints=")
+    assert errors.splitlines()[-1].startswith("gemelo.api.errors.Interrupted: stopped by Ctrl-C: <Motion rm1: joints=")
     assert "canceled in" in errors
     assert not is_moving(arm)
     assert abs(arm.joints["brazo_joint"] - goal) > 0.1

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 import gemelo
-from gemelo.device import fault_of
+from gemelo.api.device import fault_of
 from schemas.control import ControlState
 from schemas.device import DeviceState, DeviceStatus
 from schemas.gripper import GripperState

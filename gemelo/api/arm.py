@@ -6,19 +6,19 @@ from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Self, Unpack
 
-from gemelo.arguments import Grip, Joints, Target, ToolGoal, Vector, Waypoint
-from gemelo.control import Control, Hold, named_where_another_moves
-from gemelo.device import Device, reference_command
-from gemelo.errors import BadArgument
-from gemelo.frames import Frames
-from gemelo.gripping import Gripped, Gripping, OnGripping
-from gemelo.homing import OnHoming, home
-from gemelo.homing_report import HomingReport
-from gemelo.jog import JogCommands, Streaming, jog_command
-from gemelo.ledger import Ledger, Requirement, read_ledger
-from gemelo.motion import Motion, MotionRegistry, OnMotion
-from gemelo.picking import OnPicking, Picked, named, pick
-from gemelo.planning import (
+from gemelo.api.arguments import Grip, Joints, Target, ToolGoal, Vector, Waypoint
+from gemelo.api.control import Control, Hold, named_where_another_moves
+from gemelo.api.device import Device, reference_command
+from gemelo.api.errors import BadArgument
+from gemelo.api.frames import Frames
+from gemelo.api.gripping import Gripped, Gripping, OnGripping
+from gemelo.api.homing import OnHoming, home
+from gemelo.api.homing_report import HomingReport
+from gemelo.api.jog import JogCommands, Streaming, jog_command
+from gemelo.api.ledger import Ledger, Requirement, read_ledger
+from gemelo.api.motion import Motion, MotionRegistry, OnMotion
+from gemelo.api.picking import OnPicking, Picked, named, pick
+from gemelo.api.planning import (
     Configurations,
     OnPlanProgress,
     Plan,
@@ -27,12 +27,12 @@ from gemelo.planning import (
     make_plan,
     require_valid,
 )
-from gemelo.scene import Scene
-from gemelo.seeing import Eyes, Seen
-from gemelo.session import Session
-from gemelo.targets import as_target, ik_request, joint_state, request_of
-from gemelo.units import Pose
-from gemelo.verification import OnVerifying, Verification, verify
+from gemelo.api.scene import Scene
+from gemelo.api.seeing import Eyes, Seen
+from gemelo.api.session import Session
+from gemelo.api.targets import as_target, ik_request, joint_state, request_of
+from gemelo.api.units import Pose
+from gemelo.api.verification import OnVerifying, Verification, verify
 from schemas.deployment import Deployment
 from schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
 from schemas.gripper import GripperState

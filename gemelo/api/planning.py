@@ -14,12 +14,12 @@ from queue import SimpleQueue
 import msgspec
 from msgspec.structs import replace
 
-from gemelo.arguments import Joints, Target, ToolGoal
-from gemelo.errors import Error, Interrupted, Lost, Refused
-from gemelo.frames import pose_from
-from gemelo.session import Session, answer_of
-from gemelo.targets import as_target, named_joints
-from gemelo.units import Pose
+from gemelo.api.arguments import Joints, Target, ToolGoal
+from gemelo.api.errors import Error, Interrupted, Lost, Refused
+from gemelo.api.frames import pose_from
+from gemelo.api.session import Session, answer_of
+from gemelo.api.targets import as_target, named_joints
+from gemelo.api.units import Pose
 from schemas.device import DeviceMode
 from schemas.motion import JointTrajectory
 from schemas.planning import (

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from gemelo.errors import BadArgument, Lost, Refused
-from gemelo.homing import joint_name
-from gemelo.session import PATIENCE, Session
-from gemelo.targets import number
+from gemelo.api.errors import BadArgument, Lost, Refused
+from gemelo.api.homing import joint_name
+from gemelo.api.session import PATIENCE, Session
+from gemelo.api.targets import number
 from schemas.device import (
     ArmCommand,
     ConfigureRequest,

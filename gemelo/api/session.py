@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from itertools import count
 from typing import Any, TypeVar
 
-from gemelo.errors import Error, Lost, Refused
+from gemelo.api.errors import Error, Lost, Refused
 from schemas.deployment import Deployment
 from schemas.message import Message
 from schemas.topics import Request, Topic

@@ -8,12 +8,12 @@ from typing import cast
 
 from msgspec.structs import asdict, replace
 
-from gemelo.arguments import Joints as Joints
-from gemelo.arguments import Target as Target
-from gemelo.arguments import ToolGoal
-from gemelo.arguments import Waypoint as Waypoint
-from gemelo.errors import BadArgument
-from gemelo.units import Pose
+from gemelo.api.arguments import Joints as Joints
+from gemelo.api.arguments import Target as Target
+from gemelo.api.arguments import ToolGoal
+from gemelo.api.arguments import Waypoint as Waypoint
+from gemelo.api.errors import BadArgument
+from gemelo.api.units import Pose
 from schemas.joints import JointState
 from schemas.planning import (
     MOST_ATTEMPTS,

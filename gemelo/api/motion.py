@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from gemelo.errors import Aborted, Canceled, Error, Interrupted, Lost, Refused
-from gemelo.planning import Plan, words_of
-from gemelo.session import Session
+from gemelo.api.errors import Aborted, Canceled, Error, Interrupted, Lost, Refused
+from gemelo.api.planning import Plan, words_of
+from gemelo.api.session import Session
 from schemas.actions import GoalStatusCode
 from schemas.motion import (
     FollowErrorCode,

@@ -7,10 +7,10 @@ from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-from gemelo.errors import BadArgument, Error, Refused
-from gemelo.scene import Scene
-from gemelo.session import Session
-from gemelo.units import Point, Pose
+from gemelo.api.errors import BadArgument, Error, Refused
+from gemelo.api.scene import Scene
+from gemelo.api.session import Session
+from gemelo.api.units import Point, Pose
 from schemas.camera import CameraCondition, CameraStatus
 from schemas.cell import CellTexts, TagThing, Thing
 from schemas.detections import Detection, Detections

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from gemelo.errors import Refused
-from gemelo.seeing import Seen, body_of
-from gemelo.units import Point, Pose
+from gemelo.api.errors import Refused
+from gemelo.api.seeing import Seen, body_of
+from gemelo.api.units import Point, Pose
 from schemas.cell import Thing
 from schemas.robot import Gripper
 from services.arm.frames.transforms import IDENTITY, Quaternion, Rigid, compose, from_axis_angle, rotate

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from gemelo.errors import BadArgument, Error, Lost
+from gemelo.api.errors import BadArgument, Error, Lost
 from schemas.deployment import Deployment
 from services.arm.errors import suggestion
 from services.arm.model import description as descriptions

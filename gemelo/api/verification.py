@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from gemelo.errors import BadArgument, Refused
-from gemelo.ledger import Ledger
-from gemelo.planning import Plan
+from gemelo.api.errors import BadArgument, Refused
+from gemelo.api.ledger import Ledger
+from gemelo.api.planning import Plan
 from schemas.device_config import InputRole
 from schemas.ledger import VerifiedBy
 from schemas.robot import HomingDirection
@@ -16,7 +16,7 @@ from services.arm.errors import suggestion
 from services.arm.model.description import ArmDescription, Joint
 
 if TYPE_CHECKING:
-    from gemelo.arm import Arm
+    from gemelo.api.arm import Arm
 
 OVERSHOOT = {"rad": 0.02, "m": 0.002}  # chosen: beyond the switch, where the limits leave as much
 LEAST_STEPS = 3.0  # beyond the switch: closer to it the limit may come first

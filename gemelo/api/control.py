@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
 
-from gemelo import control_file
-from gemelo.errors import Lost, Refused
-from gemelo.session import Session
+from gemelo.api import control_file
+from gemelo.api.errors import Lost, Refused
+from gemelo.api.session import Session
 from schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlState, ControlTake
 from schemas.deployment import Deployment
 from schemas.topics import CONTROL, CONTROL_GIVE, CONTROL_JOIN, CONTROL_TAKE
@@ -117,7 +117,7 @@ class Control:
 
         >>> arm.control.give()
         Traceback (most recent call last):
-        gemelo.errors.Refused: refused: this connection does not hold control: nothing to give back
+        gemelo.api.errors.Refused: refused: this connection does not hold control: nothing to give back
         """
         own, self._own = self._own, None
         if own is None:

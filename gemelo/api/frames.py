@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from gemelo.errors import BadArgument, Lost
-from gemelo.session import PATIENCE, Session
-from gemelo.units import Pose
+from gemelo.api.errors import BadArgument, Lost
+from gemelo.api.session import PATIENCE, Session
+from gemelo.api.units import Pose
 from schemas.frames import Transform
 from schemas.topics import FRAMES, STATIC_FRAMES
 from services.arm.errors import suggestion

@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from gemelo.arm import Arm
-from gemelo.errors import Error, Lost
-from gemelo.robot_files import Robot, find_robot, require_router
-from gemelo.session import Session, open_node
+from gemelo.api.arm import Arm
+from gemelo.api.errors import Error, Lost
+from gemelo.api.robot_files import Robot, find_robot, require_router
+from gemelo.api.session import Session, open_node
 from schemas.deployment import Deployment
 from services.runtime.deployment import is_loopback, load_deployment
 from services.runtime.robots import robots_on

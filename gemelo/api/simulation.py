@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING, Self, overload
 import msgspec
 from msgspec.structs import replace
 
-from gemelo.arguments import Joints
-from gemelo.arm import Arm
-from gemelo.errors import BadArgument, Error
-from gemelo.robot_files import Robot, load_robot
-from gemelo.session import Session
-from gemelo.targets import named_joints
+from gemelo.api.arguments import Joints
+from gemelo.api.arm import Arm
+from gemelo.api.errors import BadArgument, Error
+from gemelo.api.robot_files import Robot, load_robot
+from gemelo.api.session import Session
+from gemelo.api.targets import named_joints
 from schemas.robot import Motor
 from schemas.simulation import WireConditions
 from services.arm.errors import suggestion

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TypedDict
 
-from gemelo.units import Pose
+from gemelo.api.units import Pose
 
 Joints = Mapping[str, float] | Sequence[float]
 Vector = Sequence[float]

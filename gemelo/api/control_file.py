@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from gemelo.errors import Error
+from gemelo.api.errors import Error
 from schemas.deployment import Deployment
 
 PATH_VARIABLE = "GEMELO_CONTROL"  # another file than the usual one, for a login that several people share

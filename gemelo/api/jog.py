@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 from msgspec.structs import replace
 
-from gemelo.arguments import Joints, Vector
-from gemelo.errors import BadArgument, Interrupted, Lost, Refused
-from gemelo.session import Session
-from gemelo.targets import joint_state, named_joints, vector
+from gemelo.api.arguments import Joints, Vector
+from gemelo.api.errors import BadArgument, Interrupted, Lost, Refused
+from gemelo.api.session import Session
+from gemelo.api.targets import joint_state, named_joints, vector
 from schemas.device import DeviceEvent
 from schemas.joints import JointTargets
 from schemas.planning import JogCommand, JogStatus

@@ -8,11 +8,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from gemelo.errors import Aborted, BadArgument, Canceled, Lost, Refused
-from gemelo.grasping import grasp_point, lift_above, looking_down, turn_between, yaw_of
-from gemelo.seeing import Eyes, Seen, add_to_scene, body_of
-from gemelo.targets import FULL
-from gemelo.units import Point, Pose
+from gemelo.api.errors import Aborted, BadArgument, Canceled, Lost, Refused
+from gemelo.api.grasping import grasp_point, lift_above, looking_down, turn_between, yaw_of
+from gemelo.api.seeing import Eyes, Seen, add_to_scene, body_of
+from gemelo.api.targets import FULL
+from gemelo.api.units import Point, Pose
 from schemas.actions import GoalStatusCode
 from schemas.cell import Place, PosePlace, Thing
 from schemas.robot import Gripper
@@ -20,11 +20,11 @@ from services.arm.errors import DescriptionError
 from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_axis_angle
 
 if TYPE_CHECKING:
-    from gemelo.arguments import Grip
-    from gemelo.arm import Arm
-    from gemelo.gripping import Gripped
-    from gemelo.motion import Motion
-    from gemelo.planning import Plan
+    from gemelo.api.arguments import Grip
+    from gemelo.api.arm import Arm
+    from gemelo.api.gripping import Gripped
+    from gemelo.api.motion import Motion
+    from gemelo.api.planning import Plan
 
 APPROACH = 0.04  # [m] the straight way down to a thing, and up with it
 SLOW = 0.05  # [m/s] down and up

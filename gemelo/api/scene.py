@@ -7,11 +7,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from queue import SimpleQueue
 
-from gemelo.arguments import Vector
-from gemelo.errors import BadArgument, Lost, Refused
-from gemelo.scene_files import load_mesh, read_scene, write_scene
-from gemelo.session import PATIENCE, Session
-from gemelo.targets import number, point, quaternion, vector
+from gemelo.api.arguments import Vector
+from gemelo.api.errors import BadArgument, Lost, Refused
+from gemelo.api.scene_files import load_mesh, read_scene, write_scene
+from gemelo.api.session import PATIENCE, Session
+from gemelo.api.targets import number, point, quaternion, vector
 from schemas.frames import Transform
 from schemas.scene import (
     AllowedPair,

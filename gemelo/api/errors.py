@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from gemelo.arguments import Target
-from gemelo.homing_report import HomingReport
+from gemelo.api.arguments import Target
+from gemelo.api.homing_report import HomingReport
 from schemas.actions import GoalStatusCode
 from schemas.motion import FollowJointTrajectoryResult
 from schemas.planning import Refusal
@@ -122,7 +122,7 @@ class Lost(Error):
 
     >>> gemelo.connect("parol6")
     Traceback (most recent call last):
-    gemelo.errors.Lost: no stepper_gateway of parol6 at the router ...; there is rm1: gemelo.connect("rm1")
+    gemelo.api.errors.Lost: no stepper_gateway of parol6 at the router ...; there is rm1: gemelo.connect("rm1")
     """
 
     def __init__(self, message: str, robots: tuple[str, ...] = (), has_begun: bool = False) -> None:

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from gemelo.errors import BadArgument, Refused
-from gemelo.session import Session
+from gemelo.api.errors import BadArgument, Refused
+from gemelo.api.session import Session
 from schemas.ledger import StepLedger, VerifiedBy
 from schemas.topics import STEP_LEDGER
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from gemelo.arguments import Grip
-from gemelo.errors import Aborted, BadArgument, Canceled, Interrupted, Lost, Refused
-from gemelo.motion import check_of
-from gemelo.scene import Scene
-from gemelo.session import Session
-from gemelo.targets import number
+from gemelo.api.arguments import Grip
+from gemelo.api.errors import Aborted, BadArgument, Canceled, Interrupted, Lost, Refused
+from gemelo.api.motion import check_of
+from gemelo.api.scene import Scene
+from gemelo.api.session import Session
+from gemelo.api.targets import number
 from schemas.actions import GoalStatusCode
 from schemas.device import InjectKind, InjectRequest
 from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState

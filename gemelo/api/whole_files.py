@@ -7,7 +7,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from gemelo.errors import Error
+from gemelo.api.errors import Error
 
 
 def write_whole(path: Path, content: bytes) -> None:

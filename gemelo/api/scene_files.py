@@ -6,9 +6,9 @@ from pathlib import Path
 
 import msgspec
 
-from gemelo.errors import BadArgument, Error
-from gemelo.targets import number
-from gemelo.whole_files import write_whole
+from gemelo.api.errors import BadArgument, Error
+from gemelo.api.targets import number
+from gemelo.api.whole_files import write_whole
 from schemas.scene import MeshShape, PlanningScene
 from schemas.text_file import read_text
 from services.runtime.deployment import project_root

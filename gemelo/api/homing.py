@@ -6,9 +6,9 @@ import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 
-from gemelo.errors import Aborted, BadArgument, Interrupted, Refused
-from gemelo.homing_report import HOME, OFF, TO, WAITS, HomingProgress, HomingReport
-from gemelo.session import Session
+from gemelo.api.errors import Aborted, BadArgument, Interrupted, Refused
+from gemelo.api.homing_report import HOME, OFF, TO, WAITS, HomingProgress, HomingReport
+from gemelo.api.session import Session
 from schemas.device import DeviceCommand, DeviceEvent, DeviceMode, DeviceState, HomeCommand, StopKind
 from schemas.device_faults import fault_text
 from schemas.device_link import offline_text

@@ -1,0 +1,1 @@
+"""The Python interface of gemelo, whose public names `gemelo` itself has."""
