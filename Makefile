@@ -56,7 +56,7 @@ check: setup ## ruff, mypy, import-linter, clang-format, gofmt
 checks := check-types check-walls check-lint check-format check-cpp check-go
 .PHONY: $(checks)
 check-types:
-	@$(bin)/mypy --no-error-summary gemelo schemas services firmware docs examples
+	@$(bin)/mypy --no-error-summary gemelo docs examples
 check-walls:
 	@$(bin)/lint-imports --no-logo >/dev/null || $(bin)/lint-imports --no-logo
 check-lint:
@@ -77,16 +77,16 @@ docs: setup ## docs/api.md from the docstrings of gemelo
 	@$(bin)/python docs/make_api.py
 
 demo: setup ## a sine and a tour, without a display: out/demo.json, recording, picture
-	@$(bin)/python -m services.demo
+	@$(bin)/python -m gemelo.services.demo
 
 coverage: setup ## lines of the firmware core that its tests reach, and why not the others
 	@deploy/coverage
 
 bench: setup ## the figures: out/bench.json
-	@$(bin)/python -m services.bench
+	@$(bin)/python -m gemelo.services.bench
 
 recordings: setup ## the recordings that `make test` replays, made anew: tests/replay/recordings
-	@$(bin)/python -m services.replay.make_recordings
+	@$(bin)/python -m gemelo.services.replay.make_recordings
 
 lock: setup ## resolve pyproject.toml anew into requirements.lock
 	@deploy/lock

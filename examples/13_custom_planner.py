@@ -1,8 +1,8 @@
 """A node that plans for itself: every joint goes a little further and back, sent as a trajectory to the gateway."""
 
 from gemelo import Node, topics
-from schemas.joints import JointState
-from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 
 
 def there_and_back(state: JointState, step: float = 0.02, time: float = 2.0) -> JointTrajectory:

@@ -1,8 +1,8 @@
 """A node in place of our planner: `gemelo move --joints` goes straight there, slowly, and heeds nothing on the way."""
 
 from gemelo import Node, topics
-from schemas.motion import JointTrajectory, TrajectoryPoint
-from schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, Refusal
+from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
+from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, Refusal
 
 SECONDS = 10.0  # for every move
 

@@ -1,4 +1,4 @@
-"""`python -m firmware.draw_wiring` draws wiring.svg: the wiring of rm1, with the pins of urdf/rm1/robot.toml.
+"""`python -m gemelo.firmware.draw_wiring` draws wiring.svg: the wiring of rm1, with the pins of urdf/rm1/robot.toml.
 
 A net that is named in a flag is one wire wherever that flag stands.
 """
@@ -9,7 +9,7 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from firmware.schematic import GROUND, INK, POWER, SAFETY, SIGNAL, Drawing
+from gemelo.firmware.schematic import GROUND, INK, POWER, SAFETY, SIGNAL, Drawing
 
 HERE = Path(__file__).parent
 ROBOT = HERE.parent / "urdf/rm1/robot.toml"

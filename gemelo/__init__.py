@@ -38,10 +38,10 @@ if TYPE_CHECKING:
     from gemelo.api.simulation import SimulatedArm, SimulatedArms, SimulatedWorld, Simulation, simulate
     from gemelo.api.units import Pose, deg, mm
     from gemelo.api.verification import Verification
-    from schemas import topics
-    from schemas.actions import GoalStatusCode
-    from schemas.device import DeviceMode, StopKind
-    from services.runtime.node import Node
+    from gemelo.schemas import topics
+    from gemelo.schemas.actions import GoalStatusCode
+    from gemelo.schemas.device import DeviceMode, StopKind
+    from gemelo.services.runtime.node import Node
 
 __all__ = [
     "Aborted",
@@ -110,9 +110,9 @@ MODULES = {
     "gemelo.api.simulation": ("SimulatedArm", "SimulatedArms", "SimulatedWorld", "Simulation", "simulate"),
     "gemelo.api.units": ("Pose", "deg", "mm"),
     "gemelo.api.verification": ("Verification",),
-    "schemas.actions": ("GoalStatusCode",),
-    "schemas.device": ("DeviceMode", "StopKind"),
-    "services.runtime.node": ("Node",),
+    "gemelo.schemas.actions": ("GoalStatusCode",),
+    "gemelo.schemas.device": ("DeviceMode", "StopKind"),
+    "gemelo.services.runtime.node": ("Node",),
 }
 _MODULE_OF = {name: module for module, names in MODULES.items() for name in names}
 
@@ -122,7 +122,7 @@ def __getattr__(name: str) -> object:
     if name in _MODULE_OF:
         value: object = getattr(import_module(_MODULE_OF[name]), name)
     elif name == "topics":
-        value = import_module("schemas.topics")
+        value = import_module("gemelo.schemas.topics")
     else:
         raise AttributeError(f"module 'gemelo' has no attribute {name!r}")
     globals()[name] = value

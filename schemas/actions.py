@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import msgspec
 
-from schemas.message import Message
+from gemelo.schemas.message import Message
 
 NIL = msgspec.Raw(b"\xc0")  # msgpack nil
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-from schemas.frames import Transform
-from schemas.message import Message, Vector
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.message import Message, Vector
 
 
 class CameraImage(Message, frozen=True, kw_only=True):

@@ -1,4 +1,4 @@
-"""`cell.toml` as types: the cameras, things and places around the arm. Read by `services.arm.cell`.
+"""`cell.toml` as types: the cameras, things and places around the arm. Read by `gemelo.services.arm.cell`.
 
 Everything is SI, positions are in the arm's base frame unless `parent` names a link. `camera.toml` beside it holds what
 was measured of each camera: it is written by `gemelo camera calibrate` and `mount` only, and wins over what is here.
@@ -12,8 +12,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from schemas.message import Message
-from schemas.robot import Edges, NotNegative, Positive
+from gemelo.schemas.message import Message
+from gemelo.schemas.robot import Edges, NotNegative, Positive
 
 CellName = Annotated[str, Meta(pattern="^[a-z][a-z0-9_]*$")]  # a camera's is part of a key on the bus
 Point = tuple[float, float, float]  # [m]

@@ -6,7 +6,7 @@ recorded nor published, and in no answer.
 
 from __future__ import annotations
 
-from schemas.message import Message
+from gemelo.schemas.message import Message
 
 
 class ControlState(Message, frozen=True, kw_only=True):

@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import msgspec
 
-from schemas.system import ParameterValue
+from gemelo.schemas.system import ParameterValue
 
 
 class DeploymentRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

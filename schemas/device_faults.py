@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from schemas.device import DeviceFault
+from gemelo.schemas.device import DeviceFault
 
 AGAIN = "`gemelo reset`, `gemelo home`"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.device import DeviceStatus
+from gemelo.schemas.device import DeviceStatus
 
 OLD = 2.0  # [s] of a round trip, beyond which it says nothing of the link as it is; it is measured twice a second
 UNKNOWN = "no reason is known"

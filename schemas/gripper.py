@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.message import Message
+from gemelo.schemas.message import Message
 
 
 class GripperCommandGoal(Message, frozen=True, kw_only=True):

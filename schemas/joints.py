@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.message import Message, Vector
+from gemelo.schemas.message import Message, Vector
 
 
 class JointState(Message, frozen=True, kw_only=True):

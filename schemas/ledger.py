@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-from schemas.message import Message, Vector
+from gemelo.schemas.message import Message, Vector
 
 
 class VerifiedBy(StrEnum):

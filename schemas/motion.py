@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from enum import IntEnum
 
-from schemas.message import Message, Vector
+from gemelo.schemas.message import Message, Vector
 
 MOST_POINTS = (
     100_000  # of a trajectory; chosen: half an hour at the gateway's own knots, and the device follows no more

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from enum import IntEnum, StrEnum
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.message import Message, Vector, has_finite_sum
-from schemas.motion import JointTrajectory
-from schemas.scene import Contact, SceneObject
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import Message, Vector, has_finite_sum
+from gemelo.schemas.motion import JointTrajectory
+from gemelo.schemas.scene import Contact, SceneObject
 
 
 class PoseGoal(Message, frozen=True, kw_only=True, tag="pose"):

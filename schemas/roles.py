@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from schemas.message import Message
-from schemas.topics import (
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import (
     ACTIONS,
     ANY,
     CAMERA_TOPICS,

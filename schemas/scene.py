@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.frames import Transform
-from schemas.message import Message, Vector
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.message import Message, Vector
 
 
 class BoxShape(Message, frozen=True, kw_only=True, tag="box"):

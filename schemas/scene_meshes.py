@@ -11,7 +11,16 @@ from functools import lru_cache
 
 from msgspec.structs import replace
 
-from schemas.scene import MeshShape, PlanningScene, SceneAdd, SceneEdit, SceneObject, SceneReplace, SceneResize, Shape
+from gemelo.schemas.scene import (
+    MeshShape,
+    PlanningScene,
+    SceneAdd,
+    SceneEdit,
+    SceneObject,
+    SceneReplace,
+    SceneResize,
+    Shape,
+)
 
 DIGEST_BYTES = 16  # chosen: two files have the same one by chance in 2^64
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from schemas.deployment import DeviceKind, Wire
+from gemelo.schemas.deployment import DeviceKind, Wire
 
 
 class SiteRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

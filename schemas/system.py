@@ -6,8 +6,8 @@ from enum import IntEnum
 
 import msgspec
 
-from schemas.actions import NIL
-from schemas.message import Message
+from gemelo.schemas.actions import NIL
+from gemelo.schemas.message import Message
 
 
 class LogLevel(IntEnum):
@@ -87,7 +87,7 @@ class TopicInterface(Message, frozen=True, kw_only=True):
     key: str = ""
     message: str = ""  # the class's name
     fields: tuple[tuple[str, str], ...] = ()  # name and type, as written where the class is defined
-    delivery: str = ""  # of `schemas.topics.Delivery`
+    delivery: str = ""  # of `gemelo.schemas.topics.Delivery`
     rate: float | None = None  # [Hz]; None: when there is something to say
     recorded: bool = False
     writer: str = ""

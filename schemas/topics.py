@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Generic, TypeVar
 
-from schemas.camera import CameraImage, CameraInfo, CameraStatus
-from schemas.cell import CellTexts
-from schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlState, ControlTake
-from schemas.detections import Detections
-from schemas.device import (
+from gemelo.schemas.camera import CameraImage, CameraInfo, CameraStatus
+from gemelo.schemas.cell import CellTexts
+from gemelo.schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlState, ControlTake
+from gemelo.schemas.detections import Detections
+from gemelo.schemas.device import (
     CommandAck,
     CommandChunk,
     ConfigureRequest,
@@ -35,17 +35,17 @@ from schemas.device import (
     ShaftPositions,
     StopKind,
 )
-from schemas.frames import FrameTransforms, RobotDescription
-from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
-from schemas.joints import JointState, JointTargets, StepErrors
-from schemas.ledger import StepLedger, StoppingDistance
-from schemas.message import Message
-from schemas.motion import (
+from gemelo.schemas.frames import FrameTransforms, RobotDescription
+from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
+from gemelo.schemas.joints import JointState, JointTargets, StepErrors
+from gemelo.schemas.ledger import StepLedger, StoppingDistance
+from gemelo.schemas.message import Message
+from gemelo.schemas.motion import (
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
 )
-from schemas.planning import (
+from gemelo.schemas.planning import (
     AnswerInputs,
     FkRequest,
     FkResponse,
@@ -64,8 +64,8 @@ from schemas.planning import (
     ValidityRequest,
     ValidityResponse,
 )
-from schemas.scene import Contacts, PlanningScene, SceneMesh, SceneRequest, SceneResponse
-from schemas.system import LogRecord, NodeStatistics, ParameterChange
+from gemelo.schemas.scene import Contacts, PlanningScene, SceneMesh, SceneRequest, SceneResponse
+from gemelo.schemas.system import LogRecord, NodeStatistics, ParameterChange
 
 M_co = TypeVar("M_co", bound=Message, covariant=True)
 Q_co = TypeVar("Q_co", bound=Message, covariant=True)

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import msgspec
 
-from firmware.bindings.firmware_slot import FirmwareSlot, firmware_calls
-from firmware.bindings.frames import OUTPUTS, InputLevels, LastingState, OutFrame, PinChange, PlatformRequest
-from firmware.bindings.library import LIBRARY, MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
-from firmware.bindings.motor import MotorError, horn_record, motor_record
-from schemas.device import DeviceMode
-from schemas.device_config import DeviceConfig, config_text
-from schemas.robot import Gripper, Motor, ServoGripper
-from services.arm.model.gripper import opening_of, pulse_of
-from services.runtime.serial_frames import LARGEST, JsonFrame
+from gemelo.firmware.bindings.firmware_slot import FirmwareSlot, firmware_calls
+from gemelo.firmware.bindings.frames import OUTPUTS, InputLevels, LastingState, OutFrame, PinChange, PlatformRequest
+from gemelo.firmware.bindings.library import LIBRARY, MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
+from gemelo.firmware.bindings.motor import MotorError, horn_record, motor_record
+from gemelo.schemas.device import DeviceMode
+from gemelo.schemas.device_config import DeviceConfig, config_text
+from gemelo.schemas.robot import Gripper, Motor, ServoGripper
+from gemelo.services.arm.model.gripper import opening_of, pulse_of
+from gemelo.services.runtime.serial_frames import LARGEST, JsonFrame
 
 LARGEST_OUTPUT = 1024
 UNCONFIGURED = DeviceConfig(name="", joints=())

@@ -6,7 +6,7 @@ import ctypes as c
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from firmware.bindings.library import REASON_SIZE, FirmwareCalls
+from gemelo.firmware.bindings.library import REASON_SIZE, FirmwareCalls
 
 DIGEST = 32  # [bytes] SHA-256
 

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 
 import msgspec
 
-from firmware.bindings.device import CoreDevice
-from schemas.device import InjectKind, InjectRequest
-from schemas.device_config import InputRole
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.schemas.device import InjectKind, InjectRequest
+from gemelo.schemas.device_config import InputRole
 
 LONGEST_FREEZE = 60.0  # [s]
 WIDEST_OBJECT = 1.0  # [m]

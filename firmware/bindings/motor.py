@@ -5,10 +5,10 @@ from __future__ import annotations
 import ctypes as c
 from collections.abc import Sequence
 
-from firmware.bindings.library import MAX_CURVE, HornRecord, MotorRecord, load_library
-from schemas.device_config import UNUSED, SensorConfig
-from schemas.robot import Motor, ServoGripper
-from services.arm.model.gripper import METRES, pulse_speed
+from gemelo.firmware.bindings.library import MAX_CURVE, HornRecord, MotorRecord, load_library
+from gemelo.schemas.device_config import UNUSED, SensorConfig
+from gemelo.schemas.robot import Motor, ServoGripper
+from gemelo.services.arm.model.gripper import METRES, pulse_speed
 
 MARGIN = 1.25  # a servo turns faster than it is asked to
 

@@ -6,8 +6,8 @@ import ctypes as c
 
 import msgspec
 
-from firmware.bindings.library import PART_SIZE, REASON_SIZE, load_library
-from schemas.device_config import DeviceConfig
+from gemelo.firmware.bindings.library import PART_SIZE, REASON_SIZE, load_library
+from gemelo.schemas.device_config import DeviceConfig
 
 LARGEST = 1 << 16  # [bytes] of what the core says it has read
 

@@ -33,13 +33,13 @@ from gemelo.api.session import Session
 from gemelo.api.targets import as_target, ik_request, joint_state, request_of
 from gemelo.api.units import Pose
 from gemelo.api.verification import OnVerifying, Verification, verify
-from schemas.deployment import Deployment
-from schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
-from schemas.gripper import GripperState
-from schemas.joints import JointState
-from schemas.ledger import StoppingDistance
-from schemas.planning import IkRequest, JogCommand, JogStatus, PlanRequest
-from schemas.topics import (
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
+from gemelo.schemas.gripper import GripperState
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.ledger import StoppingDistance
+from gemelo.schemas.planning import IkRequest, JogCommand, JogStatus, PlanRequest
+from gemelo.schemas.topics import (
     DEVICE_STATUS,
     GRIPPER_STATE,
     JOINT_STATES,
@@ -48,9 +48,9 @@ from schemas.topics import (
     STEP_LEDGER,
     STOPPING_DISTANCE,
 )
-from services.arm.errors import suggestion
-from services.arm.model.description import ArmDescription
-from services.runtime.node import Node
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.runtime.node import Node
 
 
 class Arm:
@@ -492,7 +492,7 @@ class Arm:
         >>> plan = arm.plan(named="left")
         >>> arm.execute(plan).status.name
         'SUCCEEDED'
-        >>> from schemas.planning import NamedGoal, PlanRequest
+        >>> from gemelo.schemas.planning import NamedGoal, PlanRequest
         >>> arm.plan(PlanRequest(goal=NamedGoal(name="ready"))).duration > 0.0
         True
         """

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 from gemelo.api.errors import Error
-from schemas.deployment import Deployment
+from gemelo.schemas.deployment import Deployment
 
 PATH_VARIABLE = "GEMELO_CONTROL"  # another file than the usual one, for a login that several people share
 

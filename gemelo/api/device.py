@@ -8,7 +8,7 @@ from gemelo.api.errors import BadArgument, Lost, Refused
 from gemelo.api.homing import joint_name
 from gemelo.api.session import PATIENCE, Session
 from gemelo.api.targets import number
-from schemas.device import (
+from gemelo.schemas.device import (
     ArmCommand,
     ConfigureRequest,
     DeviceCommand,
@@ -26,9 +26,9 @@ from schemas.device import (
     ResetCommand,
     StopKind,
 )
-from schemas.device_faults import fault_text
-from schemas.device_link import offline_text
-from schemas.topics import (
+from gemelo.schemas.device_faults import fault_text
+from gemelo.schemas.device_link import offline_text
+from gemelo.schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURATION,
     DEVICE_CONFIGURE,
@@ -37,8 +37,8 @@ from schemas.topics import (
     DEVICE_STATUS,
     DEVICE_STOP,
 )
-from services.arm.errors import suggestion
-from services.arm.model.description import ArmDescription
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.description import ArmDescription
 
 TO_ANSWER = 3.0  # [s] for a command
 TO_CONFIGURE = 10.0  # [s]: a board may write it to its flash first

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 from gemelo.api.arguments import Target
 from gemelo.api.homing_report import HomingReport
-from schemas.actions import GoalStatusCode
-from schemas.motion import FollowJointTrajectoryResult
-from schemas.planning import Refusal
-from schemas.scene import Contact
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.motion import FollowJointTrajectoryResult
+from gemelo.schemas.planning import Refusal
+from gemelo.schemas.scene import Contact
 
 
 class Error(Exception):

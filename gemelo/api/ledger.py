@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from gemelo.api.errors import BadArgument, Refused
 from gemelo.api.session import Session
-from schemas.ledger import StepLedger, VerifiedBy
-from schemas.topics import STEP_LEDGER
+from gemelo.schemas.ledger import StepLedger, VerifiedBy
+from gemelo.schemas.topics import STEP_LEDGER
 
 
 @dataclass(frozen=True)

@@ -9,16 +9,16 @@ from typing import Any
 from gemelo.api.errors import Aborted, Canceled, Error, Interrupted, Lost, Refused
 from gemelo.api.planning import Plan, words_of
 from gemelo.api.session import Session
-from schemas.actions import GoalStatusCode
-from schemas.motion import (
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.motion import (
     FollowErrorCode,
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
 )
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY
-from services.runtime import errors as runtime
-from services.runtime.actions import ActionClient, ActionOutcome, GoalHandle
+from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
+from gemelo.services.runtime import errors as runtime
+from gemelo.services.runtime.actions import ActionClient, ActionOutcome, GoalHandle
 
 Handle = GoalHandle[FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
 Client = ActionClient[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]

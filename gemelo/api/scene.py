@@ -12,8 +12,8 @@ from gemelo.api.errors import BadArgument, Lost, Refused
 from gemelo.api.scene_files import load_mesh, read_scene, write_scene
 from gemelo.api.session import PATIENCE, Session
 from gemelo.api.targets import number, point, quaternion, vector
-from schemas.frames import Transform
-from schemas.scene import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import (
     AllowedPair,
     BoxShape,
     CylinderShape,
@@ -37,8 +37,8 @@ from schemas.scene import (
     Shape,
     SphereShape,
 )
-from schemas.scene_meshes import digests_in, with_meshes
-from schemas.topics import SCENE, SCENE_EDIT, scene_mesh
+from gemelo.schemas.scene_meshes import digests_in, with_meshes
+from gemelo.schemas.topics import SCENE, SCENE_EDIT, scene_mesh
 
 TO_ANSWER = 10.0  # [s] a mesh of many triangles takes the planner some
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -170,9 +170,9 @@ class Scene:
         self.edit(SceneMove(name=name, pose=_pose(at, orientation), frame=frame))
 
     def resize(self, name: str, shape: Shape) -> None:
-        """Gives an object another shape: `schemas.scene.BoxShape(size=...)` and its kin, or `load_mesh(...)`.
+        """Gives an object another shape: `gemelo.schemas.scene.BoxShape(size=...)` and its kin, or `load_mesh(...)`.
 
-        >>> from schemas.scene import SphereShape
+        >>> from gemelo.schemas.scene import SphereShape
         >>> arm.scene.add_sphere("ball", radius=0.03, at=(0.3, 0.25, 0.1))
         >>> arm.scene.resize("ball", SphereShape(radius=0.02))
         >>> arm.scene.remove("ball")
@@ -245,7 +245,7 @@ class Scene:
     def edit(self, edit: SceneEdit) -> SceneResponse:
         """One change as the planner's own message; its answer has the new version. Raises `Refused`.
 
-        >>> from schemas.scene import SceneClear
+        >>> from gemelo.schemas.scene import SceneClear
         >>> arm.scene.edit(SceneClear()).version == arm.scene.present.version
         True
         """

@@ -9,9 +9,9 @@ import msgspec
 from gemelo.api.errors import BadArgument, Error
 from gemelo.api.targets import number
 from gemelo.api.whole_files import write_whole
-from schemas.scene import MeshShape, PlanningScene
-from schemas.text_file import read_text
-from services.runtime.deployment import project_root
+from gemelo.schemas.scene import MeshShape, PlanningScene
+from gemelo.schemas.text_file import read_text
+from gemelo.services.runtime.deployment import project_root
 
 LARGEST_MESH = 10.0  # [m]; what is larger was drawn in mm
 LARGEST_UNSAID = 3.0  # [m] of a mesh for which no scale is given: larger than what such arms reach
@@ -44,7 +44,7 @@ def load_mesh(path: str | Path, scale: float | None = None) -> MeshShape:
 
 def _require_size(path: Path, content: bytes, scale: float | None) -> None:
     """Refuses what is far too large; what is no mesh at all the planner says."""
-    from services.arm.stl import BadStl, read_stl  # numpy takes half of the time of `import gemelo`
+    from gemelo.services.arm.stl import BadStl, read_stl  # numpy takes half of the time of `import gemelo`
 
     try:
         vertices = read_stl(content).vertices

@@ -12,15 +12,15 @@ from itertools import count
 from typing import Any, TypeVar
 
 from gemelo.api.errors import Error, Lost, Refused
-from schemas.deployment import Deployment
-from schemas.message import Message
-from schemas.topics import Request, Topic
-from services.arm.model.description import ArmDescription
-from services.runtime import errors as runtime
-from services.runtime.node import Node
-from services.runtime.node_clock import NodeClock
-from services.runtime.requests.client import PendingCall
-from services.runtime.topics import Latest
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import Request, Topic
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.runtime import errors as runtime
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.node_clock import NodeClock
+from gemelo.services.runtime.requests.client import PendingCall
+from gemelo.services.runtime.topics import Latest
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)

@@ -26,17 +26,17 @@ from gemelo.api.errors import BadArgument, Error
 from gemelo.api.robot_files import Robot, load_robot
 from gemelo.api.session import Session
 from gemelo.api.targets import named_joints
-from schemas.robot import Motor
-from schemas.simulation import WireConditions
-from services.arm.errors import suggestion
-from services.arm.model.description import ArmDescription, Joint
-from services.runtime.node import Node
+from gemelo.schemas.robot import Motor
+from gemelo.schemas.simulation import WireConditions
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.services.runtime.node import Node
 
 if TYPE_CHECKING:
-    from services.simulation.twin import Twin
-    from services.simulation.virtual_clock import VirtualClock
+    from gemelo.services.simulation.twin import Twin
+    from gemelo.services.simulation.virtual_clock import VirtualClock
 
-ROOM = "services.simulation"  # imported when a simulation begins: it stands on all services
+ROOM = "gemelo.services.simulation"  # imported when a simulation begins: it stands on all services
 PROGRAM = "program"  # the node of a connection, if it is not named
 UNREFERENCED = "unreferenced"  # a start of which the board does not know where the joints stand
 

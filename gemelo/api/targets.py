@@ -14,8 +14,8 @@ from gemelo.api.arguments import ToolGoal
 from gemelo.api.arguments import Waypoint as Waypoint
 from gemelo.api.errors import BadArgument
 from gemelo.api.units import Pose
-from schemas.joints import JointState
-from schemas.planning import (
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import (
     MOST_ATTEMPTS,
     CircularMotion,
     FreeMotion,
@@ -31,10 +31,10 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
-from services.arm.errors import suggestion
-from services.arm.frames.transforms import from_rpy
-from services.arm.model.description import ArmDescription
+from gemelo.schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.frames.transforms import from_rpy
+from gemelo.services.arm.model.description import ArmDescription
 
 LookUp = Callable[[str, str], Pose]  # (target, source): where the frame `source` is in `target` now
 

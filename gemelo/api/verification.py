@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 from gemelo.api.errors import BadArgument, Refused
 from gemelo.api.ledger import Ledger
 from gemelo.api.planning import Plan
-from schemas.device_config import InputRole
-from schemas.ledger import VerifiedBy
-from schemas.robot import HomingDirection
-from services.arm.errors import suggestion
-from services.arm.model.description import ArmDescription, Joint
+from gemelo.schemas.device_config import InputRole
+from gemelo.schemas.ledger import VerifiedBy
+from gemelo.schemas.robot import HomingDirection
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.description import ArmDescription, Joint
 
 if TYPE_CHECKING:
     from gemelo.api.arm import Arm

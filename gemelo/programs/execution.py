@@ -17,7 +17,7 @@ from gemelo.programs.planning import plan_leg
 from gemelo.programs.points import Point
 from gemelo.programs.sequence import Leg
 from gemelo.programs.steps import Attach, Detach, Grip, Output, Pick, Wait, WaitFor
-from schemas.motion import FollowErrorCode
+from gemelo.schemas.motion import FollowErrorCode
 
 LOOK_AHEAD = 50  # legs that are looked through for the next motion
 HAND_OVER = 1.0  # [s] before the end of a motion that the next is handed over; the gateway sends 0.5 s ahead at most

@@ -10,8 +10,8 @@ from gemelo.api.errors import BadArgument
 from gemelo.programs.names import checked_folder, program_name
 from gemelo.programs.program import Program
 from gemelo.programs.reading import read_program
-from schemas.deployment import Deployment
-from services.arm.errors import suggestion
+from gemelo.schemas.deployment import Deployment
+from gemelo.services.arm.errors import suggestion
 
 
 def programs_folder(of: Arm | Deployment) -> Path:

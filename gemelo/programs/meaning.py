@@ -15,8 +15,8 @@ from gemelo.programs.program import Program
 from gemelo.programs.reading import parse_program, value_mistakes
 from gemelo.programs.steps import AnyStep, Attach, Call, Grip, MotionStep, Output, Pick, WaitFor
 from gemelo.programs.values import DEEPEST, Wrong, in_words_of_a_file
-from services.arm.errors import suggestion
-from services.arm.model.description import ArmDescription
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.description import ArmDescription
 
 PointsByName = Mapping[str, Point]
 ProgramsByName = Mapping[str, Program]

@@ -6,7 +6,7 @@ import unicodedata
 from pathlib import Path
 
 from gemelo.api.errors import BadArgument, Error
-from schemas import text_file
+from gemelo.schemas import text_file
 
 LONGEST = 64  # [characters] of a name
 LARGEST_FILE = 1_000_000  # [bytes] of a file of points or of a program

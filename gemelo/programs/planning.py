@@ -13,7 +13,7 @@ from gemelo.api.units import Pose
 from gemelo.programs.points import Point
 from gemelo.programs.sequence import Leg
 from gemelo.programs.steps import Arc, Line, MotionStep, goal_of
-from services.arm.errors import suggestion
+from gemelo.services.arm.errors import suggestion
 
 ALLOWED_TIME = 5.0  # [s] for one plan
 

@@ -18,8 +18,8 @@ from gemelo.programs.program import VERSION
 from gemelo.programs.reading import load_toml
 from gemelo.programs.toml_lines import toml_lines
 from gemelo.programs.toml_text import key_text, value_text
-from services.arm.errors import suggestion
-from services.arm.model.description import ArmDescription
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.description import ArmDescription
 
 LARGEST_PICTURE = 10_000_000  # [bytes]
 KINDS = {b"\x89PNG\r\n\x1a\n": "png", b"\xff\xd8\xff": "jpg"}  # of pictures, by how they begin

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-from schemas.errors import ConfigurationError
+from gemelo.schemas.errors import ConfigurationError
 
 
 class DescriptionError(ConfigurationError):

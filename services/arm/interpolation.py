@@ -5,8 +5,8 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from schemas.message import Vector
-from schemas.motion import JointTrajectory, TrajectoryPoint
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
 
 Coefficients = tuple[float, float, float, float, float, float]
 Sample = tuple[Vector, Vector, Vector]

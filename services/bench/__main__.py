@@ -1,5 +1,5 @@
-"""`python -m services.bench`."""
+"""`python -m gemelo.services.bench`."""
 
-from services.bench.main import main
+from gemelo.services.bench.main import main
 
 main()

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import psutil
 
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
-from services.bench.stack import has_mosquitto
-from services.stack.stack import free_ports
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
+from gemelo.services.bench.stack import has_mosquitto
+from gemelo.services.stack.stack import free_ports
 
 BROKERS = ("embedded", "mosquitto")
 BYTES, RATE, COUNT = 208, 100.0, 300  # of each echo [bytes], [Hz], [messages]
@@ -52,7 +52,7 @@ def broker(name: str) -> Iterator[tuple[int, psutil.Process]]:
     port = free_ports(1)[0]
     with tempfile.TemporaryDirectory() as folder:
         settings = {"GEMELO_MQTT_BROKER": name, "GEMELO_MQTT_PORT": str(port), "GEMELO_PATHS_RUN": folder}
-        command = [sys.executable, "-m", "services.broker.main", "--log-level", "warning"]
+        command = [sys.executable, "-m", "gemelo.services.broker.main", "--log-level", "warning"]
         process = subprocess.Popen(command, env=os.environ | settings)
         try:
             await_file(Path(folder, "broker.ready"), process)
@@ -75,7 +75,7 @@ def echoes(port: int) -> list[float]:
     """The round trips [ms] of one bare echo through the broker at `port`; raises NotMeasured if it fails."""
     numbers = {"port": port, "bytes-there": BYTES, "bytes-back": BYTES, "rate": RATE, "count": COUNT}
     options = [f"--{name}={value}" for name, value in numbers.items()]
-    command = [sys.executable, "-m", "services.bench.traffic", "echo", *options]
+    command = [sys.executable, "-m", "gemelo.services.bench.traffic", "echo", *options]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60.0, check=False)
     if done.returncode:
         raise NotMeasured(f"an echo failed: {done.stderr.strip()}")

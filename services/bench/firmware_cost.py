@@ -13,11 +13,11 @@ from functools import cache
 
 import msgspec
 
-from firmware.bindings.device import CoreDevice
-from schemas.device_config import DeviceConfig, JointConfig
-from services.bench.figures import Figure, NotMeasured, of_samples, quantile
-from services.runtime.deployment import project_root
-from services.runtime.serial_frames import packet
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.schemas.device_config import DeviceConfig, JointConfig
+from gemelo.services.bench.figures import Figure, NotMeasured, of_samples, quantile
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.serial_frames import packet
 
 RUN = "firmware/tests/rv32/run"
 

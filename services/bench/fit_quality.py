@@ -17,18 +17,18 @@ from typing import NamedTuple
 
 import trimesh
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import JointGoal, PlanRequest
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.arm.model.urdf_edit import with_collisions
-from services.bench.figures import Figure, FigureGoal, of_samples
-from services.collision_fitting.fit_writing import write_fits
-from services.collision_fitting.mesh_fit import LinkFit, fit_links
-from services.planner.collision.world import World
-from services.planner.core import Planner
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JointGoal, PlanRequest
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.arm.model.urdf_edit import with_collisions
+from gemelo.services.bench.figures import Figure, FigureGoal, of_samples
+from gemelo.services.collision_fitting.fit_writing import write_fits
+from gemelo.services.collision_fitting.mesh_fit import LinkFit, fit_links
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
 
 PROBLEMS, SEED = 8, 6
 ALLOWED = 1.0  # [s] for a plan
@@ -73,7 +73,7 @@ def imported(folder: Path, link: Callable[[int], trimesh.Trimesh]) -> ArmDescrip
     """The robot that `gemelo import` makes of an arm with such links."""
     source = export(folder / "six_description", link)
     words = ("import", str(source), "--yes", "--output", str(folder))
-    command = [sys.executable, "-m", "services.cli.main", *words]
+    command = [sys.executable, "-m", "gemelo.services.cli.main", *words]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return load_arm(folder / "six")
 
@@ -256,5 +256,5 @@ def _link(package: str, name: str) -> str:
 
 def _seconds(*words: str) -> float:
     began = time.monotonic()
-    subprocess.run([sys.executable, "-m", "services.cli.main", *words], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, "-m", "gemelo.services.cli.main", *words], check=True, stdout=subprocess.DEVNULL)
     return time.monotonic() - began

@@ -9,19 +9,19 @@ import time
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
-from schemas.device import DeviceState
-from schemas.frames import FrameTransform, FrameTransforms
-from schemas.topics import DEVICE_STATE, FRAMES
-from services.arm.frames.frame_buffer import FrameBuffer
-from services.arm.frames.transforms import to_message
-from services.arm.kinematics.chain import joint_transform
-from services.arm.model.description import ArmDescription
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
-from services.bench.scenes import rm1
-from services.bench.stack import Running, Stacks
-from services.bench.traffic import send_at_once
-from services.mqtt.client import stop_loop
-from services.stepper_gateway.links.frames import BadFrame, StateFrame, decode
+from gemelo.schemas.device import DeviceState
+from gemelo.schemas.frames import FrameTransform, FrameTransforms
+from gemelo.schemas.topics import DEVICE_STATE, FRAMES
+from gemelo.services.arm.frames.frame_buffer import FrameBuffer
+from gemelo.services.arm.frames.transforms import to_message
+from gemelo.services.arm.kinematics.chain import joint_transform
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
+from gemelo.services.bench.scenes import rm1
+from gemelo.services.bench.stack import Running, Stacks
+from gemelo.services.bench.traffic import send_at_once
+from gemelo.services.mqtt.client import stop_loop
+from gemelo.services.stepper_gateway.links.frames import BadFrame, StateFrame, decode
 
 LOOKUP_GOAL = FigureGoal(median=10.0)  # [us]
 SECOND = 1_000_000_000  # [ns]

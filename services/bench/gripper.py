@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
-from services.bench.scenes import rm1
-from services.bench.virtual_time import until
-from services.virtual_arm.virtual_arm import VirtualArm, tcp_wire
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
+from gemelo.services.bench.scenes import rm1
+from gemelo.services.bench.virtual_time import until
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, tcp_wire
 
 TRIES = 40
 REACTION_GOAL = FigureGoal(p99=10.0)  # [ms] the slowest frame of the wire, 8 ms, and two slots

@@ -9,13 +9,13 @@ import subprocess
 import sys
 import time
 
-from schemas.actions import GoalStatusCode
-from schemas.device import CommandAck, CommandChunk, DeviceEvent
-from schemas.joints import JointTargets
-from schemas.message import Vector
-from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from schemas.planning import JointGoal, PlanRequest
-from schemas.topics import (
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import CommandAck, CommandChunk, DeviceEvent
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.schemas.planning import JointGoal, PlanRequest
+from gemelo.schemas.topics import (
     COMMAND_ACKS,
     COMMANDS,
     DEVICE_EVENTS,
@@ -24,10 +24,10 @@ from schemas.topics import (
     JOINT_TARGETS,
     PLAN,
 )
-from services.arm.interpolation import TrajectorySampler
-from services.arm.model.description import ArmDescription
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
-from services.bench.stack import Running, Stacks
+from gemelo.services.arm.interpolation import TrajectorySampler
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
+from gemelo.services.bench.stack import Running, Stacks
 
 CHUNKS = 600
 CHUNK_RATE = 25.0  # [Hz] chunks of 2 knots of 20 ms
@@ -115,7 +115,7 @@ def start_echo(running: Running, size: int) -> subprocess.Popen[str]:
     """Starts the bare echo with frames of `size` [bytes]; it prints its round trips."""
     numbers = {"port": running.deployment.mqtt.port, "bytes-there": size, "bytes-back": ACK_BYTES, "count": CHUNKS}
     options = [f"--{name}={value}" for name, value in numbers.items()]
-    command = [sys.executable, "-m", "services.bench.traffic", "echo", *options, f"--rate={CHUNK_RATE}"]
+    command = [sys.executable, "-m", "gemelo.services.bench.traffic", "echo", *options, f"--rate={CHUNK_RATE}"]
     return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
 

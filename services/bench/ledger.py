@@ -1,6 +1,6 @@
 """The calibration of the step ledger: what it calls sure, against the shafts of motors of random weakness.
 
-`python -m services.bench.ledger --moves 10000` prints the table of docs/ledger.md: virtual time, equal for equal
+`python -m gemelo.services.bench.ledger --moves 10000` prints the table of docs/ledger.md: virtual time, equal for equal
 seeds. Motors give a random share of the torque that robot.toml states, which the ledger does not know. After every move
 its confidence is compared with the truth: whether a shaft stands half a cycle of its field or more from its counter.
 Now and then the joints are verified: that tells the ledger what a homing would tell it.
@@ -18,15 +18,15 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from schemas.robot import Motor
-from schemas.topics import STEP_LEDGER
-from services.arm.model.description import ArmDescription, Joint
-from services.bench.figures import Figure, rounded
-from services.bench.scenes import rm1
-from services.bench.stopping import random_place, smooth_move
-from services.cli.text_table import table
-from services.virtual_arm.gateway_driver import Kind
-from services.virtual_arm.virtual_arm import BOOTED, PERIOD, VirtualArm
+from gemelo.schemas.robot import Motor
+from gemelo.schemas.topics import STEP_LEDGER
+from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.services.bench.figures import Figure, rounded
+from gemelo.services.bench.scenes import rm1
+from gemelo.services.bench.stopping import random_place, smooth_move
+from gemelo.services.cli.text_table import table
+from gemelo.services.virtual_arm.gateway_driver import Kind
+from gemelo.services.virtual_arm.virtual_arm import BOOTED, PERIOD, VirtualArm
 
 MOVES = 10_000
 QUICK = 300  # moves of `make bench`

@@ -16,16 +16,16 @@ from typing import NamedTuple
 
 import msgspec
 
-from services.bench.figures import Figure, guarded, report_of, text_of
-from services.bench.stack import Stacks
-from services.runtime.deployment import project_root
-from services.runtime.process.ending import ended_by_signals
+from gemelo.services.bench.figures import Figure, guarded, report_of, text_of
+from gemelo.services.bench.stack import Stacks
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.process.ending import ended_by_signals
 
 
 class FigureRow(NamedTuple):
     """One figure."""
 
-    function: str  # module:function of services.bench
+    function: str  # module:function of gemelo.services.bench
     unit: str
     on_a_stack: bool = False
     broker: str = ""  # of that stack, if the figure depends on it
@@ -162,7 +162,7 @@ def measured(row: FigureRow, stacks: Stacks, problems: int, seed: int) -> Figure
 def function_of(row: FigureRow) -> Callable[..., Figure]:
     """The function that measures; its module is imported now, because pinocchio and yourdfpy are slow to load."""
     module, name = row.function.split(":")
-    function: Callable[..., Figure] = getattr(importlib.import_module(f"services.bench.{module}"), name)
+    function: Callable[..., Figure] = getattr(importlib.import_module(f"gemelo.services.bench.{module}"), name)
     return function
 
 

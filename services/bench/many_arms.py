@@ -19,16 +19,16 @@ from pathlib import Path
 
 import psutil
 
-from schemas.deployment import RouterSection
-from schemas.joints import JointState
-from schemas.message import decode
-from schemas.topics import JOINT_STATES
-from services.bench.figures import Figure, NotMeasured, quantile, rounded
-from services.bench.stack import cpu_seconds, has_mosquitto, rss_mb
-from services.runtime.bus.interface import Arrival
-from services.runtime.bus.zenoh_bus import ZenohBus
-from services.runtime.deployment import project_root
-from services.stack.stack import free_ports
+from gemelo.schemas.deployment import RouterSection
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import decode
+from gemelo.schemas.topics import JOINT_STATES
+from gemelo.services.bench.figures import Figure, NotMeasured, quantile, rounded
+from gemelo.services.bench.stack import cpu_seconds, has_mosquitto, rss_mb
+from gemelo.services.runtime.bus.interface import Arrival
+from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.stack.stack import free_ports
 
 COUNTS = (1, 2, 4, 8, 12, 16, 20, 24, 32, 40, 50)
 ROBOT = "urdf/rm1"
@@ -38,7 +38,7 @@ LATEST = 0.1  # [s] that one state in a hundred may be late: a fifth of the sile
 SETTLE, WINDOW = 3.0, 8.0  # [s]
 READY = 60.0  # [s] for what is started at once
 CORES, USABLE = 16, 0.8  # of the host that is calculated, and the share of it that may be used: chosen
-GATEWAY, DEVICE = "services.stepper_gateway.main", "firmware.platform.host.main"
+GATEWAY, DEVICE = "gemelo.services.stepper_gateway.main", "gemelo.firmware.platform.host.main"
 
 
 @dataclass
@@ -101,7 +101,9 @@ class ArmsOnOneRouter:
         with ExitStack() as opened:
             self._closing = opened
             run = self._folder / "run"
-            self._common = [self._start(module, run) for module in ("services.runtime.router", "services.broker.main")]
+            self._common = [
+                self._start(module, run) for module in ("gemelo.services.runtime.router", "gemelo.services.broker.main")
+            ]
             _wait(lambda: all((run / f"{name}.ready").exists() for name in ("router", "broker")), "router and broker")
             self._bus = opened.enter_context(closing(ZenohBus(RouterSection(port=self._router_port), "")))
             self._closing = opened.pop_all()

@@ -22,21 +22,21 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from firmware.bindings.device import CoreDevice
-from firmware.bindings.motor import VirtualMotor
-from firmware.platform.host.sketch import AustinStepper, HostSketch
-from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from schemas.robot import Dialect
-from services.arm.device.device_config import device_config
-from services.arm.model.description import ArmDescription, heard_by_the_board
-from services.arm.motors.relative_moves import ramp_of
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
-from services.bench.scenes import rm1
-from services.stepper_gateway.links.foreign.ra_messages import joints_message
-from services.stepper_gateway.links.foreign.text_exchange import TextExchange
-from services.stepper_gateway.links.foreign.text_messages import AnswerReader, line_of
-from services.stepper_gateway.links.serial_port import open_port
-from services.virtual_arm.virtual_arm import VirtualArm, tcp_wire
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.firmware.bindings.motor import VirtualMotor
+from gemelo.firmware.platform.host.sketch import AustinStepper, HostSketch
+from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.schemas.robot import Dialect
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.arm.model.description import ArmDescription, heard_by_the_board
+from gemelo.services.arm.motors.relative_moves import ramp_of
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
+from gemelo.services.bench.scenes import rm1
+from gemelo.services.stepper_gateway.links.foreign.ra_messages import joints_message
+from gemelo.services.stepper_gateway.links.foreign.text_exchange import TextExchange
+from gemelo.services.stepper_gateway.links.foreign.text_messages import AnswerReader, line_of
+from gemelo.services.stepper_gateway.links.serial_port import open_port
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, tcp_wire
 
 MESSAGES = 10_000
 LARGEST_MOVE = 20_000  # [steps] more than a turn of rm1's first joint

@@ -19,17 +19,17 @@ import psutil
 from playwright.sync_api import Page, sync_playwright
 
 import gemelo
-from schemas.joints import JointState
-from services.arm.model.description import load_arm
-from services.bench.bare_browser import Said, bare_browser
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
-from services.bench.stack import Stacks, has_mosquitto
-from services.bench.stops import StopWire
-from services.panel.model.goal import GoalSolver
-from services.panel.model.pace import UNSEEN
-from services.panel.view.browser import STOP_SIGN
-from services.runtime.deployment import load_deployment, project_root
-from services.stack.stack import Stack
+from gemelo.schemas.joints import JointState
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.bench.bare_browser import Said, bare_browser
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
+from gemelo.services.bench.stack import Stacks, has_mosquitto
+from gemelo.services.bench.stops import StopWire
+from gemelo.services.panel.model.goal import GoalSolver
+from gemelo.services.panel.model.pace import UNSEEN
+from gemelo.services.panel.view.browser import STOP_SIGN
+from gemelo.services.runtime.deployment import load_deployment, project_root
+from gemelo.services.stack.stack import Stack
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 SIZE = {"width": 1280, "height": 720}

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import msgspec
 
-from firmware.bindings.device import CoreDevice
-from firmware.bindings.frames import PinChange
-from schemas.device_config import DeviceConfig, JointConfig
-from services.bench.figures import NotMeasured
-from services.stepper_gateway.links.frames import Chunk, ChunkFlag, Code, Heartbeat, encode
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.firmware.bindings.frames import PinChange
+from gemelo.schemas.device_config import DeviceConfig, JointConfig
+from gemelo.services.bench.figures import NotMeasured
+from gemelo.services.stepper_gateway.links.frames import Chunk, ChunkFlag, Code, Heartbeat, encode
 
 BOOT = 1
 NEVER = (1 << 64) - 1

@@ -8,10 +8,10 @@ from itertools import pairwise
 import gemelo
 from gemelo.api.arm import Arm
 from gemelo.programs import Go, Point, Program, ProgramRun, Repeat, RunStatus
-from schemas.device import DeviceState
-from schemas.topics import DEVICE_STATE
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
-from services.bench.stack import Stacks
+from gemelo.schemas.device import DeviceState
+from gemelo.schemas.topics import DEVICE_STATE
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
+from gemelo.services.bench.stack import Stacks
 
 GOAL = FigureGoal(median=1.0, p99=5.0)  # [ms] it is 0 but for the error of the clock's synchronisation
 ROUNDS = 10  # of two legs

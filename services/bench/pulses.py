@@ -9,14 +9,14 @@ from itertools import pairwise
 
 import msgspec
 
-from firmware.bindings.device import CoreDevice
-from firmware.bindings.frames import PinChange
-from schemas.device import DeviceMode
-from schemas.device_config import DeviceConfig, InputConfig, InputRole
-from services.arm.device.device_config import device_config
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
-from services.bench.probe import BOOT, FINE, WireKnot, bench_config, chunk_of, joint_of, play, pulses_of
-from services.bench.scenes import parol6, rm1
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.firmware.bindings.frames import PinChange
+from gemelo.schemas.device import DeviceMode
+from gemelo.schemas.device_config import DeviceConfig, InputConfig, InputRole
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
+from gemelo.services.bench.probe import BOOT, FINE, WireKnot, bench_config, chunk_of, joint_of, play, pulses_of
+from gemelo.services.bench.scenes import parol6, rm1
 
 DT = 0.020  # [s] between knots
 TICK_RATES = (50_000, 80_000, 100_000)

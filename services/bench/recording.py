@@ -8,19 +8,19 @@ from pathlib import Path
 
 import msgspec
 
-from schemas.device import DeviceFault, DeviceMode, DeviceState
-from schemas.topics import DEVICE_STATE
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
-from services.bench.latency import swing
-from services.bench.stack import Running, Stacks, cpu_seconds, families
-from services.logger.black_box import BlackBox, write_black_box
-from services.recordings.channels import Entry
-from services.recordings.incidents import Incident
-from services.recordings.reader import RecordingReader
-from services.recordings.table import recorded_topics
-from services.replay.main import SERVICES, replay, text_of
-from services.replay.make_recordings import FOLDER
-from services.runtime.deployment import project_root
+from gemelo.schemas.device import DeviceFault, DeviceMode, DeviceState
+from gemelo.schemas.topics import DEVICE_STATE
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
+from gemelo.services.bench.latency import swing
+from gemelo.services.bench.stack import Running, Stacks, cpu_seconds, families
+from gemelo.services.logger.black_box import BlackBox, write_black_box
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.incidents import Incident
+from gemelo.services.recordings.reader import RecordingReader
+from gemelo.services.recordings.table import recorded_topics
+from gemelo.services.replay.main import SERVICES, replay, text_of
+from gemelo.services.replay.make_recordings import FOLDER
+from gemelo.services.runtime.deployment import project_root
 
 SETTLE = 3.0  # [s] of motion that are not counted
 WINDOW, WINDOWS = 5.0, 4  # [s]

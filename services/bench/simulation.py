@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 import gemelo
-from services.bench.figures import Figure, FigureGoal, of_samples
+from gemelo.services.bench.figures import Figure, FigureGoal, of_samples
 
 ROUNDS = 12
 TOUR = ("ready", "left", "right", "home")  # named states of rm1

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import psutil
 
-from schemas.deployment import Deployment
-from services.arm.model.description import ArmDescription, load_arm
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
-from services.runtime.deployment import load_deployment, project_root
-from services.runtime.node import Node
-from services.stack.stack import Stack
+from gemelo.schemas.deployment import Deployment
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
+from gemelo.services.runtime.deployment import load_deployment, project_root
+from gemelo.services.runtime.node import Node
+from gemelo.services.stack.stack import Stack
 
 IDLE_GOAL = FigureGoal(median=25.0)  # [% of one core]
 SETTLE, WINDOW, WINDOWS = 3.0, 2.0, 5  # [s], [s]
@@ -26,7 +26,7 @@ READY_ROUNDS = 3
 CLI_GOAL = FigureGoal(p99=500.0)  # [ms]
 CLI_ROUNDS = 15
 CPUCLOCK_SCHED = 2  # the kernel's include/linux/posix-timers.h: with ~pid above it, the CPU clock of a whole process
-GEMELO = (sys.executable, "-m", "services.cli.main")
+GEMELO = (sys.executable, "-m", "gemelo.services.cli.main")
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The figures of the stopping distance: what the gateway has said against what the device then did, in virtual time.
 
-`python -m services.bench.stopping` measures 1,000 holds.
+`python -m gemelo.services.bench.stopping` measures 1,000 holds.
 
 In a random moment of a random motion over a random wire all is lost: the gateway falls silent, and what is on its way
 arrives or not. The way of the tool from there until it rests is measured on the device's own path, slot by slot.
@@ -15,17 +15,17 @@ from typing import NamedTuple
 
 import msgspec
 
-from schemas.device import DeviceCommandKind
-from schemas.ledger import StoppingDistance
-from schemas.message import Vector
-from schemas.motion import JointTrajectory, TrajectoryPoint
-from schemas.topics import STOPPING_DISTANCE
-from services.arm.kinematics.tool_jacobian import ToolJacobian
-from services.arm.model.description import ArmDescription, Joint
-from services.bench.figures import Figure, NotMeasured, quantile, rounded
-from services.bench.scenes import rm1
-from services.virtual_arm.gateway_driver import asked
-from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
+from gemelo.schemas.device import DeviceCommandKind
+from gemelo.schemas.ledger import StoppingDistance
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
+from gemelo.schemas.topics import STOPPING_DISTANCE
+from gemelo.services.arm.kinematics.tool_jacobian import ToolJacobian
+from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.services.bench.figures import Figure, NotMeasured, quantile, rounded
+from gemelo.services.bench.scenes import rm1
+from gemelo.services.virtual_arm.gateway_driver import asked
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 
 HOLDS = 1000
 QUICK = 100  # holds of `make bench`

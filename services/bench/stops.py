@@ -16,7 +16,7 @@ from queue import Empty, SimpleQueue
 
 from paho.mqtt.client import Client, MQTTMessage
 
-from schemas.device import (
+from gemelo.schemas.device import (
     ConfigureRequest,
     DeviceCommandKind,
     DeviceCommandResponse,
@@ -25,17 +25,17 @@ from schemas.device import (
     InjectRequest,
     StopKind,
 )
-from schemas.joints import JointState
-from schemas.message import decode, encode
-from schemas.motion import FollowJointTrajectoryGoal
-from schemas.topics import DEVICE_CONFIGURE, DEVICE_INJECT, DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
-from services.bench.latency import sharp_start
-from services.bench.stack import Running, Stacks, families
-from services.bench.traffic import FORGED, GARBAGE, OURS, SESSIONS, connected, flood
-from services.mqtt.client import stop_loop
-from services.runtime.bus.interface import BusReply
-from services.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import decode, encode
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.topics import DEVICE_CONFIGURE, DEVICE_INJECT, DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
+from gemelo.services.bench.latency import sharp_start
+from gemelo.services.bench.stack import Running, Stacks, families
+from gemelo.services.bench.traffic import FORGED, GARBAGE, OURS, SESSIONS, connected, flood
+from gemelo.services.mqtt.client import stop_loop
+from gemelo.services.runtime.bus.interface import BusReply
+from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
 
 GOAL = FigureGoal(p99=20.0)  # [ms]
 CALLS = 200  # for each condition in which the device answers

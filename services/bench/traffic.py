@@ -1,8 +1,8 @@
 """MQTT and bus traffic from processes of its own: a bare MQTT echo as a reference, and floods against a stop.
 
-`python -m services.bench.traffic echo --port ... --bytes-there ...` prints round trips [ms] as JSON: QoS 1 there as
+`python -m gemelo.services.bench.traffic echo --port ... --bytes-there ...` prints round trips [ms] as JSON: QoS 1 there as
 chunks are sent, QoS 0 back as they are acknowledged, TCP_NODELAY on both sides.
-`python -m services.bench.traffic flood WHAT --port PORT --robot NAME --rate 5000 --seconds 10` ends by itself.
+`python -m gemelo.services.bench.traffic flood WHAT --port PORT --robot NAME --rate 5000 --seconds 10` ends by itself.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ import msgspec
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
-from schemas.actions import GoalRequest
-from schemas.deployment import RouterSection
-from schemas.device import (
+from gemelo.schemas.actions import GoalRequest
+from gemelo.schemas.deployment import RouterSection
+from gemelo.schemas.device import (
     ConfigureRequest,
     DeviceCommandRequest,
     DeviceStopRequest,
@@ -37,11 +37,11 @@ from schemas.device import (
     SpeedCommand,
     StopKind,
 )
-from schemas.joints import JointTargets
-from schemas.message import Message, encode
-from schemas.motion import FollowJointTrajectoryGoal
-from schemas.planning import PlanRequest
-from schemas.topics import (
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.message import Message, encode
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.planning import PlanRequest
+from gemelo.schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURE,
     DEVICE_INJECT,
@@ -50,10 +50,10 @@ from schemas.topics import (
     JOINT_TARGETS,
     PLAN,
 )
-from services.mqtt.client import stop_loop
-from services.runtime.bus.pace import Pace, Rate
-from services.runtime.bus.zenoh_bus import ZenohBus
-from services.runtime.errors import BusError
+from gemelo.services.mqtt.client import stop_loop
+from gemelo.services.runtime.bus.pace import Pace, Rate
+from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.services.runtime.errors import BusError
 
 THERE, BACK = "gemelo-bench/there", "gemelo-bench/back"
 PATIENCE = 5.0  # [s] for a connection
@@ -182,7 +182,7 @@ def flood(what: str, port: int, robot: str, seconds: float) -> Iterator[None]:
     rate = RATES.get(what, RATE)
     options = ["--port", str(port), "--robot", robot, "--rate", str(rate), "--seconds", str(seconds)]
     process = subprocess.Popen(
-        [sys.executable, "-m", "services.bench.traffic", "flood", what, *options], stdout=subprocess.PIPE
+        [sys.executable, "-m", "gemelo.services.bench.traffic", "flood", what, *options], stdout=subprocess.PIPE
     )
     try:
         assert process.stdout is not None

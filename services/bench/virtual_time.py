@@ -6,14 +6,14 @@ import math
 import random
 from collections.abc import Callable, Iterator
 
-from schemas.device import CommandAck, CommandChunk, DeviceMode
-from schemas.message import Message
-from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from services.arm.model.description import ArmDescription
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
-from services.bench.scenes import rm1
-from services.stepper_gateway.device.clock import ClockSync
-from services.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire
+from gemelo.schemas.device import CommandAck, CommandChunk, DeviceMode
+from gemelo.schemas.message import Message
+from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
+from gemelo.services.bench.scenes import rm1
+from gemelo.services.stepper_gateway.device.clock import ClockSync
+from gemelo.services.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire
 
 CHUNKS = 45_000
 SECONDS = 60.0  # of one goal; one after another until all chunks are sent

@@ -12,7 +12,7 @@ import ssl
 import sys
 from collections.abc import Callable, Sequence
 
-from schemas.deployment import MqttSection
+from gemelo.schemas.deployment import MqttSection
 
 BEAT = 1.0  # [s]
 PATIENCE = 1.5  # [s] for the handshake, and again for the answer: with BEAT less than the watchdog of its unit

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import cv2
 
-from schemas.camera import CameraCondition, CameraImage
-from schemas.cell import CameraRecord, FileSource, FolderSource, V4l2Source, VirtualSource
-from schemas.topics import (
+from gemelo.schemas.camera import CameraCondition, CameraImage
+from gemelo.schemas.cell import CameraRecord, FileSource, FolderSource, V4l2Source, VirtualSource
+from gemelo.schemas.topics import (
     GATEWAY,
     GRIPPER_STATE,
     JOINT_STATES,
@@ -16,20 +16,20 @@ from schemas.topics import (
     camera_status,
     camera_truth,
 )
-from services.arm.cell.camera_model import believed_info, exact_info
-from services.arm.cell.cell_file import Cell
-from services.arm.model.description import ArmDescription
-from services.camera.core import CameraCore
-from services.camera.reader import ClockedReader, ImageReader
-from services.camera.sources.source import CameraFault, CameraSource, EncodedImage
-from services.camera.sources.stored import FolderOfImages, Video
-from services.camera.sources.v4l2 import V4l2Camera
-from services.camera.virtual.virtual_camera import VirtualCamera, true_detections
-from services.camera.virtual.world import CameraWorld
-from services.runtime.bus.wire import TooLarge
-from services.runtime.node import Node
-from services.runtime.node_clock import NodeClock
-from services.runtime.scene_meshes import SceneMeshes
+from gemelo.services.arm.cell.camera_model import believed_info, exact_info
+from gemelo.services.arm.cell.cell_file import Cell
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.camera.core import CameraCore
+from gemelo.services.camera.reader import ClockedReader, ImageReader
+from gemelo.services.camera.sources.source import CameraFault, CameraSource, EncodedImage
+from gemelo.services.camera.sources.stored import FolderOfImages, Video
+from gemelo.services.camera.sources.v4l2 import V4l2Camera
+from gemelo.services.camera.virtual.virtual_camera import VirtualCamera, true_detections
+from gemelo.services.camera.virtual.world import CameraWorld
+from gemelo.services.runtime.bus.wire import TooLarge
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.node_clock import NodeClock
+from gemelo.services.runtime.scene_meshes import SceneMeshes
 
 REOPEN = 3_000_000_000  # [ns] between two attempts to wake a camera that gives the same image again and again
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
-from schemas.camera import CameraCondition, CameraImage, CameraStatus
-from services.camera.sources.source import CameraFault, EncodedImage
+from gemelo.schemas.camera import CameraCondition, CameraImage, CameraStatus
+from gemelo.services.camera.sources.source import CameraFault, EncodedImage
 
 SILENT = 1.5  # [s] without a new image before it counts as frozen
 SILENT_PERIODS = 4.0  # and as many of its periods at least

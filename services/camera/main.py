@@ -6,16 +6,16 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from schemas.cell import CellTexts
-from schemas.deployment import Deployment
-from schemas.topics import CELL
-from services.arm.cell.camera_file import CAMERA_FILE
-from services.arm.cell.cell_file import Cell, load_cell, read_cell_texts
-from services.arm.errors import DescriptionError
-from services.arm.model.description import ArmDescription, load_arm
-from services.runtime.application import service
-from services.runtime.deployment import project_root
-from services.runtime.node import Node
+from gemelo.schemas.cell import CellTexts
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.topics import CELL
+from gemelo.services.arm.cell.camera_file import CAMERA_FILE
+from gemelo.services.arm.cell.cell_file import Cell, load_cell, read_cell_texts
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.runtime.application import service
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.node import Node
 
 RATE = 10.0  # [Hz] of the watch over the cameras
 ASIDE_RATE = 1.0  # [Hz]
@@ -35,7 +35,7 @@ def run(node: Node, deployment: Deployment) -> None:
         return
     # A device that hangs gives up after this time instead of OpenCV's 10 s; read when cv2 is loaded.
     os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "2")
-    from services.camera.cameras import Cameras  # OpenCV: 60 MB that only a cell with cameras is worth
+    from gemelo.services.camera.cameras import Cameras  # OpenCV: 60 MB that only a cell with cameras is worth
 
     cameras = Cameras(node, arm, cell)
 

@@ -1,5 +1,5 @@
-"""`python -m services.chaos`."""
+"""`python -m gemelo.services.chaos`."""
 
-from services.chaos.main import main
+from gemelo.services.chaos.main import main
 
 main()

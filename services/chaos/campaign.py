@@ -9,14 +9,14 @@ from random import Random
 import msgspec
 
 import gemelo
-from services.arm.device.device_config import device_config
-from services.chaos.faults import BYSTANDERS, FAULTS, READY, Fault
-from services.chaos.invariants import is_starved, jerks, jumps, misses, moved, segments
-from services.chaos.person import quietly_cancel
-from services.chaos.site import ChaosSite
-from services.chaos.slots import steps_in
-from services.chaos.slots import violations as slot_violations
-from services.stack.stack import StackError
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.chaos.faults import BYSTANDERS, FAULTS, READY, Fault
+from gemelo.services.chaos.invariants import is_starved, jerks, jumps, misses, moved, segments
+from gemelo.services.chaos.person import quietly_cancel
+from gemelo.services.chaos.site import ChaosSite
+from gemelo.services.chaos.slots import steps_in
+from gemelo.services.chaos.slots import violations as slot_violations
+from gemelo.services.stack.stack import StackError
 
 TO_END = 25.0  # [s] beyond the move's own time in which its client must know its end
 TO_BEGIN = 5.0  # [s] for a move to get under way

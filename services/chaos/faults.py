@@ -5,9 +5,9 @@ from __future__ import annotations
 import signal
 from dataclasses import dataclass
 
-from schemas.deployment import Wire
-from services.chaos.flutters import fluttering_holds, fluttering_stops, goal_and_stop
-from services.chaos.injections import (
+from gemelo.schemas.deployment import Wire
+from gemelo.services.chaos.flutters import fluttering_holds, fluttering_stops, goal_and_stop
+from gemelo.services.chaos.injections import (
     Begin,
     Heal,
     changed_frames,
@@ -56,7 +56,7 @@ from services.chaos.injections import (
     without_descriptors,
     worker_killed,
 )
-from services.chaos.replays import (
+from gemelo.services.chaos.replays import (
     by_another_client,
     by_the_same_client,
     replayed_after_a_restart,

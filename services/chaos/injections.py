@@ -13,12 +13,12 @@ from random import Random
 import psutil
 
 import gemelo
-from services.chaos.descriptors import give_descriptors, take_descriptors
-from services.chaos.noisy_line import NoisyLine
-from services.chaos.site import ChaosSite, program
-from services.chaos.slow_link import OneWay, Way
-from services.chaos.twins import TwinClient, TwinProcess
-from services.stack.stack import StackError
+from gemelo.services.chaos.descriptors import give_descriptors, take_descriptors
+from gemelo.services.chaos.noisy_line import NoisyLine
+from gemelo.services.chaos.site import ChaosSite, program
+from gemelo.services.chaos.slow_link import OneWay, Way
+from gemelo.services.chaos.twins import TwinClient, TwinProcess
+from gemelo.services.stack.stack import StackError
 
 Begin = Callable[[ChaosSite, Random], str]  # does it; the words for what was chosen
 Heal = Callable[[ChaosSite], None]

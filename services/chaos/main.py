@@ -18,18 +18,18 @@ import msgspec
 from mcap.exceptions import EndOfFile, McapError
 from mcap.stream_reader import StreamReader
 
-from schemas.deployment import DeviceKind
-from schemas.topics import JOINT_STATES
-from services.chaos.campaign import Campaign, Episode, order
-from services.chaos.faults import FAULTS, Fault
-from services.chaos.invariants import missing_records
-from services.chaos.options import add_chaos_options
-from services.chaos.report import ChaosReport, page_of, text_of
-from services.chaos.site import ChaosSite, installed_broker, processes_of
-from services.runtime.deployment import load_deployment
-from services.runtime.process.ending import ended_by_signals
-from services.stack.results import new_results
-from services.stack.stack import StackError
+from gemelo.schemas.deployment import DeviceKind
+from gemelo.schemas.topics import JOINT_STATES
+from gemelo.services.chaos.campaign import Campaign, Episode, order
+from gemelo.services.chaos.faults import FAULTS, Fault
+from gemelo.services.chaos.invariants import missing_records
+from gemelo.services.chaos.options import add_chaos_options
+from gemelo.services.chaos.report import ChaosReport, page_of, text_of
+from gemelo.services.chaos.site import ChaosSite, installed_broker, processes_of
+from gemelo.services.runtime.deployment import load_deployment
+from gemelo.services.runtime.process.ending import ended_by_signals
+from gemelo.services.stack.results import new_results
+from gemelo.services.stack.stack import StackError
 
 Order = Iterator[tuple[int, Fault, Random]]  # number, fault and chance of each episode
 LAST_WORDS = 2.0  # [s] at the end of a run of which records may still be on their way

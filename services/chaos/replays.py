@@ -7,14 +7,14 @@ from contextlib import suppress
 from random import Random
 
 import gemelo
-from schemas.actions import GoalRequest, GoalResponse
-from schemas.message import decode, encode
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY
-from services.chaos.invariants import STEPS, is_starved
-from services.chaos.site import ChaosSite
-from services.runtime.actions import keys
-from services.runtime.errors import NoAnswer, RequestRefused
-from services.stack.stack import StackError
+from gemelo.schemas.actions import GoalRequest, GoalResponse
+from gemelo.schemas.message import decode, encode
+from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
+from gemelo.services.chaos.invariants import STEPS, is_starved
+from gemelo.services.chaos.site import ChaosSite
+from gemelo.services.runtime.actions import keys
+from gemelo.services.runtime.errors import NoAnswer, RequestRefused
+from gemelo.services.stack.stack import StackError
 
 Send = Callable[[ChaosSite, GoalRequest], str]  # again; how it was answered
 

@@ -14,28 +14,28 @@ from pathlib import Path
 from types import TracebackType
 
 import gemelo
-from firmware.platform.host.slot_record import VARIABLE
-from schemas.actions import GoalRequest
-from schemas.deployment import Deployment, Wire
-from schemas.message import BadMessage, decode
-from schemas.system import Exchange
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY
-from services.arm.cell.cell_file import deployed_cell
-from services.broker import mosquitto
-from services.broker.replacement import NotInstalled
-from services.chaos.clocks import ClockError, SteppingClocks
-from services.chaos.noisy_line import NoisyLine
-from services.chaos.person import Person
-from services.chaos.slots import SlotFile, steps_in
-from services.chaos.slow_link import SlowLink
-from services.chaos.small_disk import SmallDisk, may_mount
-from services.chaos.strangers import BusStranger, WireStranger
-from services.chaos.twins import TwinClient, TwinProcess
-from services.runtime.actions.keys import goal_request
-from services.runtime.deployment import deployment_file, load_deployment, project_root
-from services.runtime.requests.exchanges import exchange_topic
-from services.runtime.saved_parameters import SavedParameters
-from services.stack.stack import PROCESSES, Stack, StackError, free_ports
+from gemelo.firmware.platform.host.slot_record import VARIABLE
+from gemelo.schemas.actions import GoalRequest
+from gemelo.schemas.deployment import Deployment, Wire
+from gemelo.schemas.message import BadMessage, decode
+from gemelo.schemas.system import Exchange
+from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
+from gemelo.services.arm.cell.cell_file import deployed_cell
+from gemelo.services.broker import mosquitto
+from gemelo.services.broker.replacement import NotInstalled
+from gemelo.services.chaos.clocks import ClockError, SteppingClocks
+from gemelo.services.chaos.noisy_line import NoisyLine
+from gemelo.services.chaos.person import Person
+from gemelo.services.chaos.slots import SlotFile, steps_in
+from gemelo.services.chaos.slow_link import SlowLink
+from gemelo.services.chaos.small_disk import SmallDisk, may_mount
+from gemelo.services.chaos.strangers import BusStranger, WireStranger
+from gemelo.services.chaos.twins import TwinClient, TwinProcess
+from gemelo.services.runtime.actions.keys import goal_request
+from gemelo.services.runtime.deployment import deployment_file, load_deployment, project_root
+from gemelo.services.runtime.requests.exchanges import exchange_topic
+from gemelo.services.runtime.saved_parameters import SavedParameters
+from gemelo.services.stack.stack import PROCESSES, Stack, StackError, free_ports
 
 EYES = ("camera", "detector")
 KEPT_GOALS = 20  # that can be sent again

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware.platform.host.slot_record import JOINTS, ROW, SLOT, STOOD
-from schemas.device_config import DeviceConfig, JointConfig
+from gemelo.firmware.platform.host.slot_record import JOINTS, ROW, SLOT, STOOD
+from gemelo.schemas.device_config import DeviceConfig, JointConfig
 
 ROWS = np.dtype([("time", "<i8"), ("boot", "<u8"), ("steps", "<i4", (JOINTS,))])
 SPANS = (1, 2, 5, 10, 20, 40, 80)  # slots over which velocity and acceleration are taken

@@ -21,16 +21,16 @@ import numpy as np
 import psutil
 
 import gemelo
-from schemas.deployment import DeviceKind
-from schemas.system import SetParameter
-from services.chaos.options import add_soak_options
-from services.chaos.site import ChaosSite, installed_broker
-from services.runtime.deployment import load_deployment
-from services.runtime.endpoints import parameter_request
-from services.runtime.errors import NoAnswer
-from services.runtime.process.ending import ended_by_signals
-from services.stack.results import new_results
-from services.stack.stack import StackError
+from gemelo.schemas.deployment import DeviceKind
+from gemelo.schemas.system import SetParameter
+from gemelo.services.chaos.options import add_soak_options
+from gemelo.services.chaos.site import ChaosSite, installed_broker
+from gemelo.services.runtime.deployment import load_deployment
+from gemelo.services.runtime.endpoints import parameter_request
+from gemelo.services.runtime.errors import NoAnswer
+from gemelo.services.runtime.process.ending import ended_by_signals
+from gemelo.services.stack.results import new_results
+from gemelo.services.stack.stack import StackError
 
 EVERY = 5.0  # [s] between two samples
 TOLD_EVERY = 300.0  # [s] between two lines about how far it is

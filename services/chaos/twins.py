@@ -11,8 +11,8 @@ import psutil
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
-from services.mqtt.client import stop_loop
-from services.stack.stack import Stack, StackError
+from gemelo.services.mqtt.client import stop_loop
+from gemelo.services.stack.stack import Stack, StackError
 
 TO_BEGIN = 60.0  # [s] until a second process has loaded all and shows itself, on a machine without time
 TO_GIVE_WAY = 20.0  # [s] from there until it has looked around and ended

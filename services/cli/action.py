@@ -6,18 +6,18 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from schemas.actions import GoalStatusCode
-from schemas.message import Message
-from schemas.text_file import NotUtf8, decode_text
-from schemas.topics import ACTIONS, Action
-from services.cli.errors import CommandError, ExitCode, unknown, usage
-from services.cli.forms import json_line, print_value
-from services.cli.messages import dump, fields_of, message_of
-from services.cli.parser import Choices, Options, Parser, json_option
-from services.cli.session import CommandSession, connect, share_control
-from services.cli.terminal import CANCELLING, two_stage_interrupt
-from services.cli.text_table import table
-from services.runtime.errors import GoalRefused
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.message import Message
+from gemelo.schemas.text_file import NotUtf8, decode_text
+from gemelo.schemas.topics import ACTIONS, Action
+from gemelo.services.cli.errors import CommandError, ExitCode, unknown, usage
+from gemelo.services.cli.forms import json_line, print_value
+from gemelo.services.cli.messages import dump, fields_of, message_of
+from gemelo.services.cli.parser import Choices, Options, Parser, json_option
+from gemelo.services.cli.session import CommandSession, connect, share_control
+from gemelo.services.cli.terminal import CANCELLING, two_stage_interrupt
+from gemelo.services.cli.text_table import table
+from gemelo.services.runtime.errors import GoalRefused
 
 if TYPE_CHECKING:
     from gemelo import Robot

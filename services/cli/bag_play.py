@@ -13,22 +13,22 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from schemas.deployment import Deployment
-from services.cli.bag import file_option, one_sentence
-from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.jog_keys import keyboard
-from services.cli.parser import Options, Parser
-from services.cli.session import load_robot, require_router
-from services.recordings.export import chosen, topics_in
-from services.recordings.player import NODE, Player, Roles
-from services.recordings.reader import RecordingReader
-from services.recordings.shadow import NAME, recorded_robot, shadow_folder, write_shadow
-from services.runtime.bus.connection import connect
-from services.runtime.bus.interface import Bus
-from services.runtime.deployment import project_root
-from services.runtime.errors import NodeNameTaken
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
+from gemelo.schemas.deployment import Deployment
+from gemelo.services.cli.bag import file_option, one_sentence
+from gemelo.services.cli.errors import CommandError, ExitCode, usage
+from gemelo.services.cli.jog_keys import keyboard
+from gemelo.services.cli.parser import Options, Parser
+from gemelo.services.cli.session import load_robot, require_router
+from gemelo.services.recordings.export import chosen, topics_in
+from gemelo.services.recordings.player import NODE, Player, Roles
+from gemelo.services.recordings.reader import RecordingReader
+from gemelo.services.recordings.shadow import NAME, recorded_robot, shadow_folder, write_shadow
+from gemelo.services.runtime.bus.connection import connect
+from gemelo.services.runtime.bus.interface import Bus
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.errors import NodeNameTaken
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
 
 RATE = 100.0  # [Hz] of looks at what is due
 LEAVE = ("q", "x", "\x03", "\x04")

@@ -9,18 +9,18 @@ from typing import Any
 
 from mcap.writer import CompressionType
 
-from schemas.message import Message
-from schemas.topics import DESCRIPTION, Delivery, Topic
-from services.cli.bag import one_sentence
-from services.cli.errors import ExitCode, unknown
-from services.cli.parser import Options, Parser, positive_number
-from services.cli.session import CommandSession, connect
-from services.recordings.channels import Entry
-from services.recordings.mcap_file import McapFile
-from services.recordings.origin import metadata_of
-from services.recordings.subscriptions import Subscriptions
-from services.recordings.table import recorded_topics
-from services.runtime.deployment import project_root
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import DESCRIPTION, Delivery, Topic
+from gemelo.services.cli.bag import one_sentence
+from gemelo.services.cli.errors import ExitCode, unknown
+from gemelo.services.cli.parser import Options, Parser, positive_number
+from gemelo.services.cli.session import CommandSession, connect
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.mcap_file import McapFile
+from gemelo.services.recordings.origin import metadata_of
+from gemelo.services.recordings.subscriptions import Subscriptions
+from gemelo.services.recordings.table import recorded_topics
+from gemelo.services.runtime.deployment import project_root
 
 COMPRESSIONS = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4, "none": CompressionType.NONE}
 WRITE_RATE = 2.0  # [Hz]

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import msgspec
 
-from services.cli.bag import one_sentence
-from services.cli.errors import CommandError, ExitCode
-from services.cli.parser import Options, Parser, json_option
-from services.cli.session import load_robot
-from services.cli.text_table import table
-from services.recordings.incidents import (
+from gemelo.services.cli.bag import one_sentence
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.parser import Options, Parser, json_option
+from gemelo.services.cli.session import load_robot
+from gemelo.services.cli.text_table import table
+from gemelo.services.recordings.incidents import (
     FOLDER,
     BlackBoxFile,
     Incident,
@@ -23,7 +23,7 @@ from services.recordings.incidents import (
     read_incident,
     time_of,
 )
-from services.runtime.deployment import project_root
+from gemelo.services.runtime.deployment import project_root
 
 SAVING = "a black box of what has just happened is being saved: `gemelo blackbox list` has it in a few seconds"
 
@@ -76,7 +76,7 @@ def run_open(options: Options) -> ExitCode:
     print(story(incident), flush=True)
     wanted = {"--save": options.save, "--picture": options.picture}
     said = [text for name, value in wanted.items() if value is not None for text in (name, str(value))]
-    command = [sys.executable, "-m", "services.visualizer.recorded", str(path), *said]
+    command = [sys.executable, "-m", "gemelo.services.visualizer.recorded", str(path), *said]
     os.execv(sys.executable, command)
 
 

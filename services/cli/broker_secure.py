@@ -5,17 +5,17 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from schemas.deployment import Deployment
-from services.arm.model.description import load_arm
-from services.cli.credentials import WIFI_PASSWORD, CredentialsChange, certificate, password, require_sound
-from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.parser import Options, Parser, positive_integer
-from services.cli.provision import BAUD, PASSWORDS, provision
-from services.credentials.private_files import AccessError
-from services.mqtt import secure_folder
-from services.mqtt.access import AUTHORITY
-from services.runtime.deployment import project_root
-from services.runtime.started import load_started
+from gemelo.schemas.deployment import Deployment
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.cli.credentials import WIFI_PASSWORD, CredentialsChange, certificate, password, require_sound
+from gemelo.services.cli.errors import CommandError, ExitCode, usage
+from gemelo.services.cli.parser import Options, Parser, positive_integer
+from gemelo.services.cli.provision import BAUD, PASSWORDS, provision
+from gemelo.services.credentials.private_files import AccessError
+from gemelo.services.mqtt import secure_folder
+from gemelo.services.mqtt.access import AUTHORITY
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.started import load_started
 
 FOLDER = ".gemelo/broker"
 PLAIN_PORT, TLS_PORT = 1883, 8883

@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from schemas.camera import CameraCondition, CameraImage, CameraInfo, CameraStatus
-from schemas.cell import CameraRecord
-from schemas.detections import Detections
-from schemas.topics import camera_detections, camera_image, camera_info, camera_status
-from services.arm.cell.cell_file import Cell, deployed_cell
-from services.arm.errors import DescriptionError
-from services.cli.cells import cell_of
-from services.cli.errors import CommandError, ExitCode, require_folder, unknown, usage
-from services.cli.output import print_coloured
-from services.cli.parser import Choices, Options, Parser, json_option
-from services.cli.session import CommandSession, connect, load_robot
-from services.cli.text_table import table
+from gemelo.schemas.camera import CameraCondition, CameraImage, CameraInfo, CameraStatus
+from gemelo.schemas.cell import CameraRecord
+from gemelo.schemas.detections import Detections
+from gemelo.schemas.topics import camera_detections, camera_image, camera_info, camera_status
+from gemelo.services.arm.cell.cell_file import Cell, deployed_cell
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.cli.cells import cell_of
+from gemelo.services.cli.errors import CommandError, ExitCode, require_folder, unknown, usage
+from gemelo.services.cli.output import print_coloured
+from gemelo.services.cli.parser import Choices, Options, Parser, json_option
+from gemelo.services.cli.session import CommandSession, connect, load_robot
+from gemelo.services.cli.text_table import table
 
 if TYPE_CHECKING:
     from gemelo import Robot

@@ -12,20 +12,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import gemelo
-from services.arm.frames.transforms import compose
-from services.cli import camera_poses
-from services.cli.camera_boards import bar_option, tag_board
-from services.cli.camera_images import from_bus, info_of, subject
-from services.cli.camera_tip import ask_offset, step_floor, tip_length, tip_option
-from services.cli.errors import CommandError, ExitCode, in_commands, usage
-from services.cli.parser import Options, Parser, positive_integer
-from services.cli.session import connect, connect_arm, load_robot
-from services.vision.boards import Sighting
-from services.vision.calibration.shots import one_of
-from services.vision.calibration.touches import FEWEST_TOUCHES, TouchFit, fit_touches, spread_points
-from services.vision.camera_model import CameraModel, model_of
-from services.vision.other_boards import other_board, remedy
-from services.vision.rigid import Array
+from gemelo.services.arm.frames.transforms import compose
+from gemelo.services.cli import camera_poses
+from gemelo.services.cli.camera_boards import bar_option, tag_board
+from gemelo.services.cli.camera_images import from_bus, info_of, subject
+from gemelo.services.cli.camera_tip import ask_offset, step_floor, tip_length, tip_option
+from gemelo.services.cli.errors import CommandError, ExitCode, in_commands, usage
+from gemelo.services.cli.parser import Options, Parser, positive_integer
+from gemelo.services.cli.session import connect, connect_arm, load_robot
+from gemelo.services.vision.boards import Sighting
+from gemelo.services.vision.calibration.shots import one_of
+from gemelo.services.vision.calibration.touches import FEWEST_TOUCHES, TouchFit, fit_touches, spread_points
+from gemelo.services.vision.camera_model import CameraModel, model_of
+from gemelo.services.vision.other_boards import other_board, remedy
+from gemelo.services.vision.rigid import Array
 
 if TYPE_CHECKING:
     from gemelo import Arm

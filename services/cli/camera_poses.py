@@ -13,30 +13,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import gemelo
-from schemas.camera import CameraInfo
-from services.arm.cell.camera_file import MOUNT_BOARD
-from services.arm.model.urdf import JointKind
-from services.cli.camera_boards import tag_board
-from services.cli.camera_images import Eye, Subject
-from services.cli.errors import CommandError, ExitCode, in_commands, unknown, usage
-from services.cli.parser import Options, Parser, positive_integer
-from services.cli.request_text import joints_text
-from services.cli.session import connect_arm, load_robot
-from services.cli.terminal import confirm
-from services.cli.units import LENGTH, parse_quantity
-from services.vision.boards import Sighting, TagBoard
-from services.vision.calibration.link_pose import link_pose
-from services.vision.calibration.mount import FEWEST_POSES, MountFit, fit_mount
-from services.vision.calibration.poses import Belief, Chosen, choose_poses
-from services.vision.calibration.reprojection import BoardView, Carrier
-from services.vision.calibration.shots import one_of, without_hidden
-from services.vision.camera_model import model_of
-from services.vision.other_boards import other_board, remedy
-from services.vision.rigid import Array, from_transform, rigid, to_transform
+from gemelo.schemas.camera import CameraInfo
+from gemelo.services.arm.cell.camera_file import MOUNT_BOARD
+from gemelo.services.arm.model.urdf import JointKind
+from gemelo.services.cli.camera_boards import tag_board
+from gemelo.services.cli.camera_images import Eye, Subject
+from gemelo.services.cli.errors import CommandError, ExitCode, in_commands, unknown, usage
+from gemelo.services.cli.parser import Options, Parser, positive_integer
+from gemelo.services.cli.request_text import joints_text
+from gemelo.services.cli.session import connect_arm, load_robot
+from gemelo.services.cli.terminal import confirm
+from gemelo.services.cli.units import LENGTH, parse_quantity
+from gemelo.services.vision.boards import Sighting, TagBoard
+from gemelo.services.vision.calibration.link_pose import link_pose
+from gemelo.services.vision.calibration.mount import FEWEST_POSES, MountFit, fit_mount
+from gemelo.services.vision.calibration.poses import Belief, Chosen, choose_poses
+from gemelo.services.vision.calibration.reprojection import BoardView, Carrier
+from gemelo.services.vision.calibration.shots import one_of, without_hidden
+from gemelo.services.vision.camera_model import model_of
+from gemelo.services.vision.other_boards import other_board, remedy
+from gemelo.services.vision.rigid import Array, from_transform, rigid, to_transform
 
 if TYPE_CHECKING:
     from gemelo import Arm
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 POSES, MOST_POSES = 15, 60
 IMAGES = 3  # of each pose

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import gemelo
-from services.cli.errors import CommandError
-from services.cli.parser import Parser
-from services.cli.units import LENGTH, parse_quantity
+from gemelo.services.cli.errors import CommandError
+from gemelo.services.cli.parser import Parser
+from gemelo.services.cli.units import LENGTH, parse_quantity
 
 if TYPE_CHECKING:
     from gemelo import Arm

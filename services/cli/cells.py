@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from services.arm.cell.cell_file import Cell, deployed_cell
-from services.arm.cell.cell_file import cell_of as cell_in
-from services.arm.errors import DescriptionError
-from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.session import connect
+from gemelo.services.arm.cell.cell_file import Cell, deployed_cell
+from gemelo.services.arm.cell.cell_file import cell_of as cell_in
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.cli.errors import CommandError, ExitCode, usage
+from gemelo.services.cli.session import connect
 
 if TYPE_CHECKING:
     from gemelo import Robot
@@ -26,7 +26,7 @@ def cell_of(robot: Robot) -> Cell:
 
 
 def _published(robot: Robot) -> Cell:
-    from schemas.topics import CELL  # slow to load: the table
+    from gemelo.schemas.topics import CELL  # slow to load: the table
 
     try:
         with connect(robot) as session:

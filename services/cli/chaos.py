@@ -5,18 +5,18 @@ from __future__ import annotations
 import os
 import sys
 
-from services.chaos.options import add_chaos_options, add_soak_options
-from services.cli.errors import ExitCode
-from services.cli.parser import Options
+from gemelo.services.chaos.options import add_chaos_options, add_soak_options
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.parser import Options
 
 __all__ = ["add_chaos_options", "add_soak_options", "run_chaos", "run_soak"]
 
 
 def run_chaos(options: Options) -> ExitCode:
-    """Becomes `python -m services.chaos` with the same options."""
-    os.execv(sys.executable, [sys.executable, "-m", "services.chaos", *sys.argv[2:]])
+    """Becomes `python -m gemelo.services.chaos` with the same options."""
+    os.execv(sys.executable, [sys.executable, "-m", "gemelo.services.chaos", *sys.argv[2:]])
 
 
 def run_soak(options: Options) -> ExitCode:
-    """Becomes `python -m services.chaos.soak` with the same options."""
-    os.execv(sys.executable, [sys.executable, "-m", "services.chaos.soak", *sys.argv[2:]])
+    """Becomes `python -m gemelo.services.chaos.soak` with the same options."""
+    os.execv(sys.executable, [sys.executable, "-m", "gemelo.services.chaos.soak", *sys.argv[2:]])

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from schemas.plain_text import escaped
+from gemelo.schemas.plain_text import escaped
 
 BLANK = 0x2800  # the braille character without a dot; each dot is a bit of its number
 DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # of a character, by row and column

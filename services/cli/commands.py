@@ -1,8 +1,8 @@
-"""The table of commands: words, help, and functions (`module:function` in services.cli), loaded when used."""
+"""The table of commands: words, help, and functions (`module:function` in gemelo.services.cli), loaded when used."""
 
 from __future__ import annotations
 
-from services.cli.parser import Command
+from gemelo.services.cli.parser import Command
 
 GROUPS = {
     "bag": "recordings: writing one, what is in it, playing, exporting and repairing it",

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from services.cli.commands import COMMANDS
-from services.cli.errors import CommandError, ExitCode
-from services.cli.parser import Command, Options, Parser, complete
-from services.cli.session import load_robot
+from gemelo.services.cli.commands import COMMANDS
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.parser import Command, Options, Parser, complete
+from gemelo.services.cli.session import load_robot
 
 if TYPE_CHECKING:
     from gemelo import Robot

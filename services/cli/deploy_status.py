@@ -8,26 +8,26 @@ from pathlib import Path
 import msgspec
 
 import gemelo
-from schemas.deployment import Deployment
-from schemas.errors import ConfigurationError
-from schemas.roles import ROLE_OF_NODE
-from schemas.site import Site
-from schemas.topics import DEVICE_STATUS
-from services.cli.deploy import made_here, said_folder, site_named, site_option
-from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.node import is_command
-from services.cli.parser import Options, Parser, json_option
-from services.cli.session import own_name, require_router
-from services.cli.text_table import table
-from services.credentials.expiry import expiry
-from services.hosts.certificates import Certificate, days_by_host, endings, in_days, older, renewal, shown_at
-from services.hosts.layout import BROKER, ROUTER
-from services.hosts.status import SeenNode, SeenRobot, ServiceState, ServiceStatus, is_well, site_status
-from services.runtime.clock_offset import ClockOffset
-from services.runtime.errors import BusError, NoAnswer, RequestRefused
-from services.runtime.node import Node
-from services.runtime.node_clock import ask_about
-from services.runtime.started import load_started
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.roles import ROLE_OF_NODE
+from gemelo.schemas.site import Site
+from gemelo.schemas.topics import DEVICE_STATUS
+from gemelo.services.cli.deploy import made_here, said_folder, site_named, site_option
+from gemelo.services.cli.errors import CommandError, ExitCode, usage
+from gemelo.services.cli.node import is_command
+from gemelo.services.cli.parser import Options, Parser, json_option
+from gemelo.services.cli.session import own_name, require_router
+from gemelo.services.cli.text_table import table
+from gemelo.services.credentials.expiry import expiry
+from gemelo.services.hosts.certificates import Certificate, days_by_host, endings, in_days, older, renewal, shown_at
+from gemelo.services.hosts.layout import BROKER, ROUTER
+from gemelo.services.hosts.status import SeenNode, SeenRobot, ServiceState, ServiceStatus, is_well, site_status
+from gemelo.services.runtime.clock_offset import ClockOffset
+from gemelo.services.runtime.errors import BusError, NoAnswer, RequestRefused
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.node_clock import ask_about
+from gemelo.services.runtime.started import load_started
 
 HEADINGS = ("host", "robot", "service", "is", "machine", "version", "clock", "certificate", "why")
 TO_ANSWER = 2.0  # [s] of one node

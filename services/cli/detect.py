@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from services.arm.cell.cell_file import deployed_cell
-from services.arm.errors import DescriptionError
-from services.cli.errors import CommandError, ExitCode, in_commands
-from services.cli.parser import Choices, Options, Parser, json_option
-from services.cli.session import connect_arm, load_robot
+from gemelo.services.arm.cell.cell_file import deployed_cell
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.cli.errors import CommandError, ExitCode, in_commands
+from gemelo.services.cli.parser import Choices, Options, Parser, json_option
+from gemelo.services.cli.session import connect_arm, load_robot
 
 if TYPE_CHECKING:
     from gemelo import Robot

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import gemelo
-from schemas.device import (
+from gemelo.schemas.device import (
     ArmCommand,
     DeviceCommand,
     OutputCommand,
@@ -16,14 +16,14 @@ from schemas.device import (
     SpeedCommand,
     StopKind,
 )
-from services.cli.errors import CommandError, ExitCode, require_name, usage
-from services.cli.parser import Choices, Options, Parser
-from services.cli.session import connect_arm, load_robot
-from services.cli.units import parse_joints, share, show
+from gemelo.services.cli.errors import CommandError, ExitCode, require_name, usage
+from gemelo.services.cli.parser import Choices, Options, Parser
+from gemelo.services.cli.session import connect_arm, load_robot
+from gemelo.services.cli.units import parse_joints, share, show
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 BY_NAME: dict[str, DeviceCommand | StopKind] = {
     "arm": ArmCommand(),
@@ -49,7 +49,7 @@ def stop_options(parser: Parser) -> None:
 def run_stop(options: Options) -> ExitCode:
     """Stops the arm, now or at each key."""
     if options.ready:
-        from services.cli.stop_ready import wait_ready  # for this one alone
+        from gemelo.services.cli.stop_ready import wait_ready  # for this one alone
 
         with connect_arm() as arm:
             return wait_ready(arm)

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from schemas.device import DeviceConfiguration
-from services.cli.errors import CommandError, ExitCode, in_commands
-from services.cli.parser import Options, Parser, json_option
-from services.cli.session import connect_arm
-from services.cli.terminal import confirm
+from gemelo.schemas.device import DeviceConfiguration
+from gemelo.services.cli.errors import CommandError, ExitCode, in_commands
+from gemelo.services.cli.parser import Options, Parser, json_option
+from gemelo.services.cli.session import connect_arm
+from gemelo.services.cli.terminal import confirm
 
 if TYPE_CHECKING:
     from gemelo import Arm

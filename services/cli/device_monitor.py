@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from gemelo.api.homing import joint_name
-from schemas.device import DeviceConfiguration, DeviceEvent, DeviceState, DeviceStatus
-from schemas.device_faults import fault_text
-from schemas.topics import DEVICE_CONFIGURATION, DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
-from services.cli.device_snapshot import DeviceView, snapshot_of
-from services.cli.device_status import text_of
-from services.cli.errors import ExitCode
-from services.cli.forms import Form, count_options, form_of, form_options
-from services.cli.parser import Options, Parser
-from services.cli.session import CommandSession, connect
-from services.cli.terminal import LiveBlock
-from services.cli.units import positive_seconds
+from gemelo.schemas.device import DeviceConfiguration, DeviceEvent, DeviceState, DeviceStatus
+from gemelo.schemas.device_faults import fault_text
+from gemelo.schemas.topics import DEVICE_CONFIGURATION, DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
+from gemelo.services.cli.device_snapshot import DeviceView, snapshot_of
+from gemelo.services.cli.device_status import text_of
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.forms import Form, count_options, form_of, form_options
+from gemelo.services.cli.parser import Options, Parser
+from gemelo.services.cli.session import CommandSession, connect
+from gemelo.services.cli.terminal import LiveBlock
+from gemelo.services.cli.units import positive_seconds
 
 if TYPE_CHECKING:
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 REFRESH = 5.0  # [Hz]
 

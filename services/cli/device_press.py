@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import gemelo
-from schemas.device import InjectKind, InjectRequest
-from services.cli.errors import CommandError, ExitCode, joint_of, require_name, unknown, usage
-from services.cli.parser import Choices, Options, Parser
-from services.cli.session import connect_arm, load_robot
-from services.cli.units import LENGTH, TIME, parse_quantity
+from gemelo.schemas.device import InjectKind, InjectRequest
+from gemelo.services.cli.errors import CommandError, ExitCode, joint_of, require_name, unknown, usage
+from gemelo.services.cli.parser import Choices, Options, Parser
+from gemelo.services.cli.session import connect_arm, load_robot
+from gemelo.services.cli.units import LENGTH, TIME, parse_quantity
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 HELD = {"on": 1.0, "off": 0.0, "auto": -1.0}
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from gemelo.api.homing import joint_name
-from schemas.device import DeviceConfiguration, DeviceState, DeviceStatus, SensorReadings
-from schemas.device_faults import FaultDescription, explain
-from schemas.device_link import offline_text
-from schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATE, DEVICE_STATUS, SENSORS
-from services.cli.errors import CommandError, ExitCode
-from services.cli.session import CommandSession, other_robots
+from gemelo.schemas.device import DeviceConfiguration, DeviceState, DeviceStatus, SensorReadings
+from gemelo.schemas.device_faults import FaultDescription, explain
+from gemelo.schemas.device_link import offline_text
+from gemelo.schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATE, DEVICE_STATUS, SENSORS
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.session import CommandSession, other_robots
 
 if TYPE_CHECKING:
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 PATIENCE = 2.0  # [s] for the first messages
 POLL = 0.02  # [s]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import msgspec
 
-from schemas.device import DeviceMode, DeviceState, DeviceStatus
-from schemas.device_link import offline_word, reason_text, round_trip_text
-from services.cli.device_snapshot import (
+from gemelo.schemas.device import DeviceMode, DeviceState, DeviceStatus
+from gemelo.schemas.device_link import offline_word, reason_text, round_trip_text
+from gemelo.services.cli.device_snapshot import (
     OPEN_LOOP,
     DeviceJoint,
     DeviceSnapshot,
@@ -15,10 +15,10 @@ from services.cli.device_snapshot import (
     readings,
     snapshot_of,
 )
-from services.cli.errors import CommandError, ExitCode
-from services.cli.parser import Options
-from services.cli.session import CommandSession, connect
-from services.cli.text_table import table
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.parser import Options
+from gemelo.services.cli.session import CommandSession, connect
+from gemelo.services.cli.text_table import table
 
 FOR_SENSORS = 0.5  # [s] that `gemelo device status` waits for readings
 HINTS = {

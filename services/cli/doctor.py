@@ -15,26 +15,26 @@ from pathlib import Path
 
 import msgspec
 
-from schemas.deployment import Deployment, MqttSection, RouterSection, Wire
-from schemas.device import DeviceState, DeviceStatus
-from schemas.device_faults import fault_text
-from schemas.device_link import offline_text, round_trip_text
-from schemas.errors import ConfigurationError
-from schemas.system import NodeInfo
-from schemas.topics import DEVICE_STATE, DEVICE_STATUS
-from services.cli.errors import CommandError, ExitCode
-from services.cli.node import TIMEOUT, living
-from services.cli.parser import Options
-from services.cli.session import CommandSession, connect
-from services.cli.text_table import table
-from services.cli.version import gemelo_version, version_text
-from services.credentials.private_files import AccessError
-from services.mqtt.access import gateway_access
-from services.runtime.clock_offset import ClockOffset
-from services.runtime.deployment import project_root, when_silent
-from services.runtime.process.priority import may_step_ahead
-from services.runtime.process.unwritten import remedy_of
-from services.runtime.started import load_started
+from gemelo.schemas.deployment import Deployment, MqttSection, RouterSection, Wire
+from gemelo.schemas.device import DeviceState, DeviceStatus
+from gemelo.schemas.device_faults import fault_text
+from gemelo.schemas.device_link import offline_text, round_trip_text
+from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.system import NodeInfo
+from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.node import TIMEOUT, living
+from gemelo.services.cli.parser import Options
+from gemelo.services.cli.session import CommandSession, connect
+from gemelo.services.cli.text_table import table
+from gemelo.services.cli.version import gemelo_version, version_text
+from gemelo.services.credentials.private_files import AccessError
+from gemelo.services.mqtt.access import gateway_access
+from gemelo.services.runtime.clock_offset import ClockOffset
+from gemelo.services.runtime.deployment import project_root, when_silent
+from gemelo.services.runtime.process.priority import may_step_ahead
+from gemelo.services.runtime.process.unwritten import remedy_of
+from gemelo.services.runtime.started import load_started
 
 BROKER_PAGE = "docs/my_broker.md has every such sentence with what to do"
 # Tuning constants: chosen.
@@ -105,7 +105,7 @@ def diagnoses() -> Iterator[Diagnosis]:
 
 def deployment_here() -> Deployment:
     """That of the robot that runs; where several do and none is chosen, that of this folder."""
-    from services.runtime.running import SeveralRobots, find_deployment  # slow to load: the bus
+    from gemelo.services.runtime.running import SeveralRobots, find_deployment  # slow to load: the bus
 
     try:
         return find_deployment()
@@ -115,7 +115,7 @@ def deployment_here() -> Deployment:
 
 def runs(router: RouterSection) -> Iterator[Diagnosis]:
     """Every robot on the router, and the files that its twin was started with."""
-    from services.runtime.running import ask_files, running_robots  # slow to load: the bus
+    from gemelo.services.runtime.running import ask_files, running_robots  # slow to load: the bus
 
     for robot, nodes in sorted(running_robots(router).items()):
         info = ask_files(router, robot, nodes)
@@ -183,7 +183,7 @@ def _refusal(folder: Path) -> OSError | None:
 
 
 def _robot(deployment: Deployment) -> Diagnosis:
-    from services.arm.checks.check import Severity, check  # half a second
+    from gemelo.services.arm.checks.check import Severity, check  # half a second
 
     errors = [each for each in check(project_root() / deployment.robot) if each.severity is Severity.ERROR]
     if errors:
@@ -213,7 +213,7 @@ def _listener(name: str, host: str, port: int) -> Diagnosis:
 
 def broker(section: MqttSection) -> Diagnosis:
     """Of the broker: whether it is there, and lets the gateway in."""
-    from services.mqtt.check import problem  # 50 ms
+    from gemelo.services.mqtt.check import problem  # 50 ms
 
     try:
         access = gateway_access(section)
@@ -265,8 +265,8 @@ def twins(borne: Mapping[str, tuple[str, ...]]) -> Iterator[Diagnosis]:
 
 def _told(session: CommandSession, nodes: Iterable[str]) -> dict[str, tuple[NodeInfo, ClockOffset | None]]:
     """What each node says of itself, and its clock."""
-    from services.runtime.errors import NoAnswer  # 0.1 s, for a twin that runs
-    from services.runtime.node_clock import ask_about
+    from gemelo.services.runtime.errors import NoAnswer  # 0.1 s, for a twin that runs
+    from gemelo.services.runtime.node_clock import ask_about
 
     found = {}
     for name in nodes:

@@ -10,8 +10,8 @@ from typing import get_args
 
 import msgspec
 
-from schemas.message import Message
-from services.cli.errors import CommandError, nearest, usage
+from gemelo.schemas.message import Message
+from gemelo.services.cli.errors import CommandError, nearest, usage
 
 _UNIT = re.compile(r"\[[^\]]+\](?: or \[[^\]]+\])*")
 _PART = re.compile(r"([A-Za-z_][A-Za-z_0-9]*)((?:\[-?\d+\])*)")

@@ -9,10 +9,10 @@ from typing import Any
 
 import msgspec
 
-from services.cli.errors import ExitCode
-from services.cli.field_path import leaves
-from services.cli.messages import dump
-from services.cli.parser import Options, Parser, positive_integer
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.field_path import leaves
+from gemelo.services.cli.messages import dump
+from gemelo.services.cli.parser import Options, Parser, positive_integer
 
 Form = Callable[[Any], str]  # of one value, or of a table's rows
 

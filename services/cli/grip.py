@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from services.cli.errors import CommandError, ExitCode, in_commands, usage
-from services.cli.output import control
-from services.cli.parser import Choices, Options, Parser, json_option
-from services.cli.session import connect_arm, load_robot
-from services.cli.units import LENGTH, parse_quantity
+from gemelo.services.cli.errors import CommandError, ExitCode, in_commands, usage
+from gemelo.services.cli.output import control
+from gemelo.services.cli.parser import Choices, Options, Parser, json_option
+from gemelo.services.cli.session import connect_arm, load_robot
+from gemelo.services.cli.units import LENGTH, parse_quantity
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
     from gemelo.api.arguments import Grip
-    from schemas.gripper import GripperCommandFeedback
+    from gemelo.schemas.gripper import GripperCommandFeedback
 
 WORDS = ("open", "close")
 STATE = "state"

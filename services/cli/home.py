@@ -9,10 +9,10 @@ import msgspec
 
 import gemelo
 from gemelo.api.homing_report import HOME, WAITS
-from services.cli.errors import CommandError, ExitCode, in_commands, joint_of
-from services.cli.parser import Choices, Options, Parser, json_option
-from services.cli.session import connect_arm, load_robot
-from services.cli.terminal import LiveBlock
+from gemelo.services.cli.errors import CommandError, ExitCode, in_commands, joint_of
+from gemelo.services.cli.parser import Choices, Options, Parser, json_option
+from gemelo.services.cli.session import connect_arm, load_robot
+from gemelo.services.cli.terminal import LiveBlock
 
 if TYPE_CHECKING:
     from gemelo import Arm, HomingProgress, HomingReport, Robot

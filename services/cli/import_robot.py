@@ -6,8 +6,8 @@ import shlex
 from argparse import ArgumentTypeError
 from pathlib import Path
 
-from services.cli.errors import CommandError, ExitCode
-from services.cli.parser import Options, Parser
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.parser import Options, Parser
 
 EXAMPLES = """examples:
   gemelo import ~/Downloads/my_arm_description
@@ -53,8 +53,8 @@ def xacro_argument(text: str) -> tuple[str, str]:
 
 def run(options: Options) -> ExitCode:
     """Imports, and ends with the line that starts the twin."""
-    from services.arm.errors import DescriptionError  # slow to load, with all below
-    from services.robot_import.importing import ImportOptions, import_robot
+    from gemelo.services.arm.errors import DescriptionError  # slow to load, with all below
+    from gemelo.services.robot_import.importing import ImportOptions, import_robot
 
     wanted = ImportOptions(
         options.source, options.output, options.name, options.yes, options.force,

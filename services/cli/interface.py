@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import msgspec.structs
 
-import schemas
-from schemas.message import Message
-from schemas.topics import ACTIONS, REQUESTS, TOPICS
-from services.cli.errors import ExitCode, unknown
-from services.cli.forms import print_value
-from services.cli.parser import Choices, Options, Parser
+import gemelo.schemas
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import ACTIONS, REQUESTS, TOPICS
+from gemelo.services.cli.errors import ExitCode, unknown
+from gemelo.services.cli.forms import print_value
+from gemelo.services.cli.parser import Choices, Options, Parser
 
 if TYPE_CHECKING:
     from gemelo import Robot
@@ -43,8 +43,10 @@ def choices(robot: Robot | None) -> Choices:
 
 def messages() -> dict[str, type[Message]]:
     """Every message of `schemas` by its name."""
-    folder = Path(schemas.__path__[0])
-    modules = [import_module(f"schemas.{file.stem}") for file in sorted(folder.glob("*.py")) if file.stem != "__init__"]
+    folder = Path(gemelo.schemas.__path__[0])
+    modules = [
+        import_module(f"gemelo.schemas.{file.stem}") for file in sorted(folder.glob("*.py")) if file.stem != "__init__"
+    ]
     return {
         name: value
         for module in modules

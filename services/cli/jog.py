@@ -10,19 +10,19 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import gemelo
-from schemas.planning import JogCommand, JogLimit, JogStatus
-from schemas.topics import JOG_STATUS, JOINT_STATES
-from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.jog_keys import JogKeys, keyboard, require_terminal
-from services.cli.parser import Choices, Options, Parser
-from services.cli.request_text import degrees, joints_text, millimetres
-from services.cli.session import connect_arm, load_robot
-from services.cli.terminal import LiveBlock, two_stage_interrupt
-from services.cli.units import SPEED_OF, angular_speed, parse_joints, positive_seconds, show, speed
+from gemelo.schemas.planning import JogCommand, JogLimit, JogStatus
+from gemelo.schemas.topics import JOG_STATUS, JOINT_STATES
+from gemelo.services.cli.errors import CommandError, ExitCode, usage
+from gemelo.services.cli.jog_keys import JogKeys, keyboard, require_terminal
+from gemelo.services.cli.parser import Choices, Options, Parser
+from gemelo.services.cli.request_text import degrees, joints_text, millimetres
+from gemelo.services.cli.session import connect_arm, load_robot
+from gemelo.services.cli.terminal import LiveBlock, two_stage_interrupt
+from gemelo.services.cli.units import SPEED_OF, angular_speed, parse_joints, positive_seconds, show, speed
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 PERIOD = 0.02  # [s] between two commands while a key is held
 DRAWN = 0.1  # [s] between two drawings
@@ -115,7 +115,7 @@ class Position:
     """The newest position of tool and joints, as a line."""
 
     def __init__(self, arm: Arm) -> None:
-        from services.arm.kinematics.kinematics import Kinematics  # loads numpy
+        from gemelo.services.arm.kinematics.kinematics import Kinematics  # loads numpy
 
         self._arm, self._kinematics = arm.description, Kinematics(arm.description)
         self._states = arm.node.latest(JOINT_STATES)

@@ -17,9 +17,9 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Protocol
 
-from schemas.planning import JogCommand
-from services.cli.errors import usage
-from services.cli.units import NamedJoint
+from gemelo.schemas.planning import JogCommand
+from gemelo.services.cli.errors import usage
+from gemelo.services.cli.units import NamedJoint
 
 HELD = 0.15  # [s] after which a key that does not repeat has been let go
 FASTER = 1.25

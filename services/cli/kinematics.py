@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import FkResponse, IkRequest, IkResponse, PlanCode, PoseGoal
-from services.cli.errors import ExitCode
-from services.cli.move_request import oriented
-from services.cli.parser import Choices, Options, Parser, finite_number, json_option, positive_integer
-from services.cli.request_text import goal_text, joints_text, refusal_error
-from services.cli.session import connect_arm, load_robot
-from services.cli.text_table import table
-from services.cli.units import SHOWN, angle, length, parse_joints, rotation
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import FkResponse, IkRequest, IkResponse, PlanCode, PoseGoal
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.move_request import oriented
+from gemelo.services.cli.parser import Choices, Options, Parser, finite_number, json_option, positive_integer
+from gemelo.services.cli.request_text import goal_text, joints_text, refusal_error
+from gemelo.services.cli.session import connect_arm, load_robot
+from gemelo.services.cli.text_table import table
+from gemelo.services.cli.units import SHOWN, angle, length, parse_joints, rotation
 
 if TYPE_CHECKING:
     from gemelo import Arm, Configurations, Pose, Robot
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 XYZ = ("X", "Y", "Z")
 IK_EXAMPLES = """examples:

@@ -11,15 +11,15 @@ from pathlib import Path
 
 import msgspec
 
-from schemas.device import EchoRequest, EchoResponse
-from schemas.joints import JointTargets
-from schemas.topics import DEVICE_ECHO, JOINT_STATES, JOINT_TARGETS
-from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.parser import Options, Parser, positive_integer, positive_number
-from services.cli.session import CommandSession, connect
-from services.cli.text_table import table
-from services.cli.units import parse_joints
-from services.runtime.deployment import project_root
+from gemelo.schemas.device import EchoRequest, EchoResponse
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.topics import DEVICE_ECHO, JOINT_STATES, JOINT_TARGETS
+from gemelo.services.cli.errors import CommandError, ExitCode, usage
+from gemelo.services.cli.parser import Options, Parser, positive_integer, positive_number
+from gemelo.services.cli.session import CommandSession, connect
+from gemelo.services.cli.text_table import table
+from gemelo.services.cli.units import parse_joints
+from gemelo.services.runtime.deployment import project_root
 
 SILENCE = "nothing heard of the arm: is stepper_gateway running? `gemelo node list`"
 PATIENCE = 2.0  # [s] for one answer, the bus included

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import datetime
 
-from schemas.system import LogLevel, LogRecord
-from schemas.topics import LOG
-from services.cli.errors import ExitCode, unknown
-from services.cli.forms import Form, count_options, form_of, form_options
-from services.cli.parser import Options, Parser
-from services.cli.session import CommandSession, connect
+from gemelo.schemas.system import LogLevel, LogRecord
+from gemelo.schemas.topics import LOG
+from gemelo.services.cli.errors import ExitCode, unknown
+from gemelo.services.cli.forms import Form, count_options, form_of, form_options
+from gemelo.services.cli.parser import Options, Parser
+from gemelo.services.cli.session import CommandSession, connect
 
 
 def log_options(parser: Parser) -> None:

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from services.cli.commands import COMMANDS, GROUPS
-from services.cli.errors import CommandError, ExitCode, unknown, usage
-from services.cli.output import escaped_output
-from services.cli.parser import Options, build
-from services.runtime.process.leaving import end_process
+from gemelo.services.cli.commands import COMMANDS, GROUPS
+from gemelo.services.cli.errors import CommandError, ExitCode, unknown, usage
+from gemelo.services.cli.output import escaped_output
+from gemelo.services.cli.parser import Options, build
+from gemelo.services.runtime.process.leaving import end_process
 
 ABOUT = "The twin's command line: move the arm, and see everything that is said about it."
 EPILOG = (
@@ -32,7 +32,7 @@ def with_simulation(arguments: list[str]) -> list[str]:
     """Without `--simulate` or `--simulate=START` before the command, which is for a twin of its own then."""
     if not arguments or arguments[0].partition("=")[0] != "--simulate":
         return arguments
-    from services.cli.simulated import choose  # slow to load, for --simulate alone
+    from gemelo.services.cli.simulated import choose  # slow to load, for --simulate alone
 
     choose(arguments[0])
     return arguments[1:]
@@ -53,8 +53,8 @@ def choose_robot(name: str) -> None:
 
     Raises `CommandError` where there is no such robot.
     """
-    from services.runtime.deployment import overriding  # slow to load, for --robot alone
-    from services.runtime.started import deployment_of_arm
+    from gemelo.services.runtime.deployment import overriding  # slow to load, for --robot alone
+    from gemelo.services.runtime.started import deployment_of_arm
 
     file = deployment_of_arm(name)
     if file is None:
@@ -68,9 +68,9 @@ def choose_robot(name: str) -> None:
 def robot_folder(name: str) -> str:
     """The folder of an arm, of a shadow that `gemelo bag play` has made, or of a robot that runs with files elsewhere;
     raises `CommandError` for none of them."""
-    from services.runtime.deployment import project_root  # slow to load, for --robot alone
-    from services.runtime.running import files_of, running_robots
-    from services.runtime.started import load_started
+    from gemelo.services.runtime.deployment import project_root  # slow to load, for --robot alone
+    from gemelo.services.runtime.running import files_of, running_robots
+    from gemelo.services.runtime.started import load_started
 
     root, deployment = project_root(), load_started()
     out = Path(deployment.paths.out)
@@ -107,7 +107,7 @@ def _run(given: list[str]) -> ExitCode:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ExitCode.OK
     finally:
-        if (simulated := sys.modules.get("services.cli.simulated")) is not None:
+        if (simulated := sys.modules.get("gemelo.services.cli.simulated")) is not None:
             simulated.end()
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import msgspec
 
-from schemas.message import Message
-from services.cli.errors import nearest, usage
+from gemelo.schemas.message import Message
+from gemelo.services.cli.errors import nearest, usage
 
 INDENT = "  "
 _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")

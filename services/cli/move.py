@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING
 from msgspec.structs import replace
 
 import gemelo
-from schemas.planning import PlanProgress, PlanRequest
-from services.cli.errors import CommandError, ExitCode
-from services.cli.move_report import MoveReport, PlanReport, report_of, summary
-from services.cli.move_request import request_from, require_alone
-from services.cli.parser import Choices, Options, Parser, finite_number
-from services.cli.plan_file import read_plan
-from services.cli.request_text import refusal_error, request_text
-from services.cli.session import connect_arm, load_robot
-from services.cli.terminal import CANCELLING, LiveBlock, motion_progress
-from services.cli.units import acceleration, angle, length, rotation, seconds, share, speed
+from gemelo.schemas.planning import PlanProgress, PlanRequest
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.move_report import MoveReport, PlanReport, report_of, summary
+from gemelo.services.cli.move_request import request_from, require_alone
+from gemelo.services.cli.parser import Choices, Options, Parser, finite_number
+from gemelo.services.cli.plan_file import read_plan
+from gemelo.services.cli.request_text import refusal_error, request_text
+from gemelo.services.cli.session import connect_arm, load_robot
+from gemelo.services.cli.terminal import CANCELLING, LiveBlock, motion_progress
+from gemelo.services.cli.units import acceleration, angle, length, rotation, seconds, share, speed
 
 if TYPE_CHECKING:
     from argparse import _ArgumentGroup as Group
 
     from gemelo import Arm, Motion, Plan, Robot
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 XYZ = ("X", "Y", "Z")
 EXAMPLES = """examples:

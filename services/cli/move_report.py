@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from schemas.actions import GoalStatusCode
-from schemas.motion import FollowJointTrajectoryResult, JointTrajectory
-from schemas.planning import PlanResponse
-from services.cli.errors import ExitCode
-from services.cli.units import show
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.motion import FollowJointTrajectoryResult, JointTrajectory
+from gemelo.schemas.planning import PlanResponse
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.units import show
 
 if TYPE_CHECKING:
     from gemelo import Plan
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 
 class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -108,7 +108,7 @@ def tool_error(arm: ArmDescription, trajectory: JointTrajectory, errors: Mapping
 
     Forward kinematics of both: the goal, and the goal minus the error.
     """
-    from services.arm.kinematics.chain import link_transforms  # slow to load: numpy
+    from gemelo.services.arm.kinematics.chain import link_transforms  # slow to load: numpy
 
     goals = dict(zip(trajectory.joint_names, trajectory.points[-1].positions, strict=True))
     reached = {

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import asdict, replace
 
-from schemas.planning import (
+from gemelo.schemas.planning import (
     MOST_ATTEMPTS,
     CircularMotion,
     FreeMotion,
@@ -22,14 +22,14 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
-from services.arm.frames.transforms import from_rpy
-from services.cli.errors import unknown, usage
-from services.cli.parser import Options
-from services.cli.units import parse_joints
+from gemelo.schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
+from gemelo.services.arm.frames.transforms import from_rpy
+from gemelo.services.cli.errors import unknown, usage
+from gemelo.services.cli.parser import Options
+from gemelo.services.cli.units import parse_joints
 
 if TYPE_CHECKING:
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 DEFAULT_TIME = 1.0  # [s] that planning may take if nothing is said
 LONGEST_TIME = 3600.0  # [s] that planning may be allowed

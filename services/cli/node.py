@@ -7,14 +7,14 @@ from collections.abc import Sequence
 
 import msgspec
 
-from schemas.system import Empty, NodeInfo
-from services.cli.errors import CommandError, ExitCode, unknown
-from services.cli.forms import print_value
-from services.cli.messages import dump
-from services.cli.parser import Options, Parser, json_option
-from services.cli.session import CommandSession, connect
-from services.cli.text_table import table
-from services.runtime.clock_offset import ClockOffset
+from gemelo.schemas.system import Empty, NodeInfo
+from gemelo.services.cli.errors import CommandError, ExitCode, unknown
+from gemelo.services.cli.forms import print_value
+from gemelo.services.cli.messages import dump
+from gemelo.services.cli.parser import Options, Parser, json_option
+from gemelo.services.cli.session import CommandSession, connect
+from gemelo.services.cli.text_table import table
+from gemelo.services.runtime.clock_offset import ClockOffset
 
 TIMEOUT = 2.0  # [s]
 
@@ -46,7 +46,7 @@ def run_info(options: Options) -> ExitCode:
 
 def information_of(session: CommandSession, name: str) -> NodeInfo:
     """The keys that a node publishes, subscribes to and serves; raises `CommandError` if no such node is alive."""
-    from services.runtime.endpoints import info_request  # slow to load: all that a node has on the bus
+    from gemelo.services.runtime.endpoints import info_request  # slow to load: all that a node has on the bus
 
     require_alive(session, name)
     return session.node.call(info_request(name), Empty(), timeout=TIMEOUT)
@@ -54,7 +54,7 @@ def information_of(session: CommandSession, name: str) -> NodeInfo:
 
 def told_information_of(session: CommandSession, name: str) -> NodeInfo | None:
     """As `information_of`; None of a node that does not answer, or has just ended."""
-    from services.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
+    from gemelo.services.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
 
     try:
         return information_of(session, name)
@@ -90,8 +90,8 @@ class NodeState(msgspec.Struct, frozen=True, kw_only=True):
 
 def standings(session: CommandSession) -> list[NodeState]:
     """Of every living node."""
-    from services.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
-    from services.runtime.node_clock import ask_about
+    from gemelo.services.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
+    from gemelo.services.runtime.node_clock import ask_about
 
     found = []
     for name in living(session):

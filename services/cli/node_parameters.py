@@ -7,14 +7,14 @@ import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
-from schemas.system import Parameter, ParameterValue
-from schemas.text_file import NotUtf8, decode_text
-from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.node import living
-from services.cli.param import change_parameter, parameter_of, parameters_of, require_in_range, value_of, written
-from services.cli.parser import Options, Parser
-from services.cli.session import CommandSession, connect
-from services.runtime.saved_parameters import toml
+from gemelo.schemas.system import Parameter, ParameterValue
+from gemelo.schemas.text_file import NotUtf8, decode_text
+from gemelo.services.cli.errors import CommandError, ExitCode, usage
+from gemelo.services.cli.node import living
+from gemelo.services.cli.param import change_parameter, parameter_of, parameters_of, require_in_range, value_of, written
+from gemelo.services.cli.parser import Options, Parser
+from gemelo.services.cli.session import CommandSession, connect
+from gemelo.services.runtime.saved_parameters import toml
 
 
 class NewValue(NamedTuple):

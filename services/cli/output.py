@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO, cast
 
-from schemas.plain_text import escaped, escaped_but_colours
+from gemelo.schemas.plain_text import escaped, escaped_but_colours
 
 
 class EscapedStream:

@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import msgspec
 
-from schemas.system import Empty, Parameter, ParameterValue, SetParameter
-from services.cli.errors import CommandError, ExitCode, nearest, usage
-from services.cli.forms import print_value
-from services.cli.messages import dump
-from services.cli.node import TIMEOUT, living, node_option, require_alive
-from services.cli.parser import Options, Parser, json_option
-from services.cli.session import CommandSession, connect
-from services.cli.text_table import table
+from gemelo.schemas.system import Empty, Parameter, ParameterValue, SetParameter
+from gemelo.services.cli.errors import CommandError, ExitCode, nearest, usage
+from gemelo.services.cli.forms import print_value
+from gemelo.services.cli.messages import dump
+from gemelo.services.cli.node import TIMEOUT, living, node_option, require_alive
+from gemelo.services.cli.parser import Options, Parser, json_option
+from gemelo.services.cli.session import CommandSession, connect
+from gemelo.services.cli.text_table import table
 
 
 def parameters_options(parser: Parser) -> None:
@@ -73,7 +73,7 @@ def run_set(options: Options) -> ExitCode:
 
 def parameters_of(session: CommandSession, name: str) -> tuple[Parameter, ...]:
     """The declared parameters of a node."""
-    from services.runtime.endpoints import parameters_request  # 0.1 s, for a command that connects
+    from gemelo.services.runtime.endpoints import parameters_request  # 0.1 s, for a command that connects
 
     require_alive(session, name)
     return session.node.call(parameters_request(name), Empty(), timeout=TIMEOUT).parameters
@@ -128,7 +128,7 @@ def change_parameter(
     session: CommandSession, node: str, parameter: Parameter, value: ParameterValue, save: bool = False
 ) -> str:
     """Sets `parameter` of `node` to `value`, also for later starts if `save`, and returns a line about it."""
-    from services.runtime.endpoints import parameter_request  # 0.1 s, for a command that connects
+    from gemelo.services.runtime.endpoints import parameter_request  # 0.1 s, for a command that connects
 
     question = SetParameter(name=parameter.name, value=value, save=save)
     after = session.node.call(parameter_request(node), question, timeout=TIMEOUT)

@@ -13,7 +13,7 @@ from difflib import get_close_matches
 from importlib import import_module
 from typing import Any, NamedTuple, NoReturn
 
-from services.cli.errors import ExitCode, nearest
+from gemelo.services.cli.errors import ExitCode, nearest
 
 Options = argparse.Namespace
 Choices = Mapping[str, Iterable[str]]  # words that may follow, by the arguments so far (joined by a blank)
@@ -23,7 +23,7 @@ _NEGATIVE_NUMBER = re.compile(r"^-(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?(?:[A-
 
 
 class Command(NamedTuple):
-    """A row of the table of commands; `module:function` names a function below services.cli."""
+    """A row of the table of commands; `module:function` names a function below gemelo.services.cli."""
 
     words: tuple[str, ...]  # one, or a group and one
     about: str
@@ -35,7 +35,7 @@ class Command(NamedTuple):
     def load(self, name: str) -> Callable[..., Any]:
         """Imports the module and returns the function that the field `name` refers to."""
         module, function = getattr(self, name).split(":")
-        found: Callable[..., Any] = getattr(import_module(f"services.cli.{module}"), function)
+        found: Callable[..., Any] = getattr(import_module(f"gemelo.services.cli.{module}"), function)
         return found
 
 

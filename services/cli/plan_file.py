@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from schemas.planning import PlanResponse
-from schemas.text_file import decode_text
-from services.cli.errors import CommandError, usage
+from gemelo.schemas.planning import PlanResponse
+from gemelo.schemas.text_file import decode_text
+from gemelo.services.cli.errors import CommandError, usage
 
 if TYPE_CHECKING:
     from gemelo import Plan
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 STANDARD_INPUT = "-"
 LARGEST_FILE = 100_000_000  # [bytes] a trajectory of an hour has a tenth of it

@@ -8,16 +8,16 @@ from collections.abc import Callable, Iterator
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from schemas.message import Message
-from schemas.topics import TOPICS, Topic
-from services.cli.chart import COLOURS, ChartCurve, chart
-from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.field_path import FieldPath, leaves
-from services.cli.living_topics import connected, known_topic, topic_on
-from services.cli.parser import Choices, Options, Parser, positive_integer
-from services.cli.session import CommandSession
-from services.cli.terminal import LiveBlock
-from services.cli.units import positive_seconds
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import TOPICS, Topic
+from gemelo.services.cli.chart import COLOURS, ChartCurve, chart
+from gemelo.services.cli.errors import CommandError, ExitCode, usage
+from gemelo.services.cli.field_path import FieldPath, leaves
+from gemelo.services.cli.living_topics import connected, known_topic, topic_on
+from gemelo.services.cli.parser import Choices, Options, Parser, positive_integer
+from gemelo.services.cli.session import CommandSession
+from gemelo.services.cli.terminal import LiveBlock
+from gemelo.services.cli.units import positive_seconds
 
 if TYPE_CHECKING:
     from gemelo import Robot

@@ -27,10 +27,10 @@ from gemelo.programs import (
     path_text,
     programs_folder,
 )
-from services.cli.errors import ExitCode, unknown, usage
-from services.cli.parser import Choices, Options, Parser, json_option
-from services.cli.session import connect_arm, load_robot, reported
-from services.cli.text_table import table
+from gemelo.services.cli.errors import ExitCode, unknown, usage
+from gemelo.services.cli.parser import Choices, Options, Parser, json_option
+from gemelo.services.cli.session import connect_arm, load_robot, reported
+from gemelo.services.cli.text_table import table
 
 PLAIN = re.compile(r"[\w.-]+")
 BRAKING = 10.0  # [s] that the arm may take to come to rest after Ctrl-C

@@ -11,7 +11,7 @@ from typing import Protocol, TypeVar
 
 import msgspec
 
-from services.cli.credentials import (
+from gemelo.services.cli.credentials import (
     MQTT_DEVICE_PASSWORD,
     MQTT_PASSWORD,
     WIFI_PASSWORD,
@@ -22,10 +22,17 @@ from services.cli.credentials import (
     require_sound,
     update_key,
 )
-from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.parser import Options, Parser, positive_integer
-from services.cli.terminal import confirm
-from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame, sync_frame
+from gemelo.services.cli.errors import CommandError, ExitCode, usage
+from gemelo.services.cli.parser import Options, Parser, positive_integer
+from gemelo.services.cli.terminal import confirm
+from gemelo.services.runtime.serial_frames import (
+    JsonFrame,
+    PacketDecoder,
+    json_frame,
+    packet,
+    parse_json_frame,
+    sync_frame,
+)
 
 T = TypeVar("T", bound=msgspec.Struct)
 

@@ -9,9 +9,9 @@ import secrets
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
-from schemas.device import DeviceCommandRequest, DeviceEvent, OutputCommand
-from schemas.joints import JointTargets
-from schemas.topics import (
+from gemelo.schemas.device import DeviceCommandRequest, DeviceEvent, OutputCommand
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_EVENTS,
     DEVICE_STATE,
@@ -19,12 +19,12 @@ from schemas.topics import (
     JOINT_TARGETS,
     SENSORS,
 )
-from services.cli.errors import CommandError, ExitCode
-from services.cli.parser import Options
-from services.cli.ra_intake import OUTPUT, RaIntake, RefusedMessage
-from services.cli.session import CommandSession, connect, share_control
-from services.mqtt.client import stop_loop
-from services.runtime.errors import NoAnswer, RequestRefused
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.parser import Options
+from gemelo.services.cli.ra_intake import OUTPUT, RaIntake, RefusedMessage
+from gemelo.services.cli.session import CommandSession, connect, share_control
+from gemelo.services.mqtt.client import stop_loop
+from gemelo.services.runtime.errors import NoAnswer, RequestRefused
 
 JOINTS, STATES, READINGS = "ra/juntas", "ra/estados", "ra/sensores"
 PERIOD = 0.05  # [s] between two targets; the gateway brakes after 0.5 s without one

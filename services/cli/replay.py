@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import sys
 
-from services.cli.errors import ExitCode
-from services.cli.parser import Options
-from services.replay.options import add_options
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.parser import Options
+from gemelo.services.replay.options import add_options
 
 __all__ = ["add_options", "run"]
 
 
 def run(options: Options) -> ExitCode:
-    """Becomes `python -m services.replay` with the same options."""
-    os.execv(sys.executable, [sys.executable, "-m", "services.replay", *sys.argv[2:]])
+    """Becomes `python -m gemelo.services.replay` with the same options."""
+    os.execv(sys.executable, [sys.executable, "-m", "gemelo.services.replay", *sys.argv[2:]])

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from schemas.message import Message
-from schemas.topics import ACTIONS, DEVICE_COMMAND, REQUESTS, Request
-from services.cli.errors import ExitCode, unknown
-from services.cli.field_path import FieldPath
-from services.cli.forms import count_options, form_of, form_options, print_value, yaml_document
-from services.cli.messages import dump, message_of
-from services.cli.node import information_of, living
-from services.cli.parser import Choices, Options, Parser, json_option
-from services.cli.session import CommandSession, connect, share_control
-from services.cli.text_table import table
-from services.cli.topic import echo
-from services.recordings.table import exchanges_of, goal_request_of
-from services.runtime.actions import keys
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import ACTIONS, DEVICE_COMMAND, REQUESTS, Request
+from gemelo.services.cli.errors import ExitCode, unknown
+from gemelo.services.cli.field_path import FieldPath
+from gemelo.services.cli.forms import count_options, form_of, form_options, print_value, yaml_document
+from gemelo.services.cli.messages import dump, message_of
+from gemelo.services.cli.node import information_of, living
+from gemelo.services.cli.parser import Choices, Options, Parser, json_option
+from gemelo.services.cli.session import CommandSession, connect, share_control
+from gemelo.services.cli.text_table import table
+from gemelo.services.cli.topic import echo
+from gemelo.services.recordings.table import exchanges_of, goal_request_of
+from gemelo.services.runtime.actions import keys
 
 if TYPE_CHECKING:
     from gemelo import Robot

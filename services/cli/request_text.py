@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from schemas.planning import (
+from gemelo.schemas.planning import (
     CircularMotion,
     FreeMotion,
     Goal,
@@ -21,12 +21,12 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from services.cli.errors import CommandError
-from services.cli.units import DEGREE, SHOWN
+from gemelo.services.cli.errors import CommandError
+from gemelo.services.cli.units import DEGREE, SHOWN
 
 if TYPE_CHECKING:
     from gemelo import Refused
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 
 def request_text(request: PlanRequest, arm: ArmDescription) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from schemas.scene import (
+from gemelo.schemas.scene import (
     AllowedPair,
     PlanningScene,
     SceneAdd,
@@ -23,11 +23,11 @@ from schemas.scene import (
     SceneReplace,
     SceneResize,
 )
-from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.parser import Choices, Options, Parser, positive_number
-from services.cli.request_text import millimetres
-from services.cli.scene_object import listing, object_of, place_text, pose_of, shape_of, sized_text
-from services.cli.session import connect_arm
+from gemelo.services.cli.errors import CommandError, ExitCode, usage
+from gemelo.services.cli.parser import Choices, Options, Parser, positive_number
+from gemelo.services.cli.request_text import millimetres
+from gemelo.services.cli.scene_object import listing, object_of, place_text, pose_of, shape_of, sized_text
+from gemelo.services.cli.session import connect_arm
 
 if TYPE_CHECKING:
     from gemelo import Robot
@@ -215,7 +215,7 @@ def pair_choices(robot: Robot | None) -> Choices:
 
 def _object_names(robot: Robot | None) -> list[str]:
     """Those that the shell can complete, from the planner's file; none if it cannot be read."""
-    from services.runtime.deployment import project_root  # slow to load
+    from gemelo.services.runtime.deployment import project_root  # slow to load
 
     if robot is None:
         return []

@@ -5,15 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import gemelo
-from schemas.frames import Transform
-from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, PlanningScene, SceneObject, Shape, SphereShape
-from services.arm.frames.transforms import from_rpy
-from services.cli.errors import usage
-from services.cli.parser import Options
-from services.cli.request_text import millimetres, rotation_text
-from services.cli.text_table import table
-from services.cli.units import LENGTH, parse_quantity, parse_rotation
-from services.runtime.deployment import project_root
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import (
+    BoxShape,
+    CylinderShape,
+    MeshShape,
+    PlaneShape,
+    PlanningScene,
+    SceneObject,
+    Shape,
+    SphereShape,
+)
+from gemelo.services.arm.frames.transforms import from_rpy
+from gemelo.services.cli.errors import usage
+from gemelo.services.cli.parser import Options
+from gemelo.services.cli.request_text import millimetres, rotation_text
+from gemelo.services.cli.text_table import table
+from gemelo.services.cli.units import LENGTH, parse_quantity, parse_rotation
+from gemelo.services.runtime.deployment import project_root
 
 
 def object_of(options: Options) -> SceneObject:
@@ -109,7 +118,7 @@ def sized_text(shape: Shape) -> str:
 
 def _mesh_size(shape: MeshShape) -> str:
     """Empty for what is no mesh, which the planner says."""
-    from services.arm.stl import BadStl, read_stl  # slow to load: numpy
+    from gemelo.services.arm.stl import BadStl, read_stl  # slow to load: numpy
 
     try:
         vertices = read_stl(shape.data or (project_root() / shape.path).read_bytes()).vertices

@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
 import gemelo
-from services.cli import simulated
-from services.cli.errors import CommandError, ExitCode, in_commands, usage
+from gemelo.services.cli import simulated
+from gemelo.services.cli.errors import CommandError, ExitCode, in_commands, usage
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
-    from schemas.deployment import Deployment
-    from services.arm.model.description import ArmDescription
-    from services.runtime.node import Node
+    from gemelo.schemas.deployment import Deployment
+    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.services.runtime.node import Node
 
 
 class CommandSession(NamedTuple):
@@ -80,8 +80,8 @@ def connect(robot: Robot | None = None) -> Iterator[CommandSession]:
     robot, twin = robot or load_robot(), simulated.chosen()
     deployment, arm = robot
     require_router(deployment)
-    from services.runtime.errors import BusError, NoAnswer, RequestRefused, ServerLost  # slow to load: the bus
-    from services.runtime.node import Node
+    from gemelo.services.runtime.errors import BusError, NoAnswer, RequestRefused, ServerLost  # slow to load: the bus
+    from gemelo.services.runtime.node import Node
 
     try:
         if twin is None:

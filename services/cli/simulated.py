@@ -8,11 +8,11 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 import gemelo
-from services.cli.errors import usage
+from gemelo.services.cli.errors import usage
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot, SimulatedArm
-    from services.runtime.node import Node
+    from gemelo.services.runtime.node import Node
 
 OPTION = "--simulate"
 KEEPER = "cli-simulation"  # the node that keeps the twin; `gemelo node list` leaves it out

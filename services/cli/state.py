@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from schemas.control import ControlState
-from schemas.device import DeviceState, DeviceStatus
-from schemas.device_link import offline_word, reason_text, round_trip_text
-from schemas.joints import JointState, StepErrors
-from schemas.ledger import StepLedger, StoppingDistance
-from schemas.topics import (
+from gemelo.schemas.control import ControlState
+from gemelo.schemas.device import DeviceState, DeviceStatus
+from gemelo.schemas.device_link import offline_word, reason_text, round_trip_text
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.ledger import StepLedger, StoppingDistance
+from gemelo.schemas.topics import (
     CONTROL,
     DEVICE_STATE,
     DEVICE_STATUS,
@@ -23,17 +23,17 @@ from schemas.topics import (
     STEP_LEDGER,
     STOPPING_DISTANCE,
 )
-from services.arm.frames.frame_buffer import FrameBuffer, FrameError
-from services.cli.device_snapshot import OPEN_LOOP
-from services.cli.errors import CommandError, ExitCode
-from services.cli.output import control
-from services.cli.parser import Options, Parser
-from services.cli.session import CommandSession, connect, other_robots
-from services.cli.text_table import table
-from services.cli.units import SHOWN
+from gemelo.services.arm.frames.frame_buffer import FrameBuffer, FrameError
+from gemelo.services.cli.device_snapshot import OPEN_LOOP
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.output import control
+from gemelo.services.cli.parser import Options, Parser
+from gemelo.services.cli.session import CommandSession, connect, other_robots
+from gemelo.services.cli.text_table import table
+from gemelo.services.cli.units import SHOWN
 
 if TYPE_CHECKING:
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 PATIENCE = 2.0  # [s] for the first messages
 TO_HEAR_OF_CONTROL = 0.5  # [s] for what the gateway keeps for late joiners

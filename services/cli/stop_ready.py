@@ -8,9 +8,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import gemelo
-from schemas.device import StopKind
-from schemas.topics import DEVICE_STOP
-from services.cli.errors import CommandError, ExitCode
+from gemelo.schemas.device import StopKind
+from gemelo.schemas.topics import DEVICE_STOP
+from gemelo.services.cli.errors import CommandError, ExitCode
 
 if TYPE_CHECKING:
     from gemelo import Arm
@@ -23,7 +23,7 @@ Read = Callable[[float], str]
 
 def wait_ready(arm: Arm) -> ExitCode:
     """Stops the arm at each key until q; raises `CommandError` where the connection has ended for good."""
-    from services.cli.jog_keys import keyboard, require_terminal  # for commands with keys
+    from gemelo.services.cli.jog_keys import keyboard, require_terminal  # for commands with keys
 
     require_terminal("`gemelo stop` stops the arm at once")
     with keyboard() as read:

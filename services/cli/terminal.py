@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from schemas.plain_text import COLOUR
-from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.output import control, print_coloured, unescaped
+from gemelo.schemas.plain_text import COLOUR
+from gemelo.services.cli.errors import CommandError, ExitCode, usage
+from gemelo.services.cli.output import control, print_coloured, unescaped
 
 UP_AND_CLEAR = "\x1b[{}F\x1b[J"
 PLAIN_EVERY = 0.25  # of the whole motion

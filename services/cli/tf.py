@@ -12,16 +12,24 @@ from xml.sax.saxutils import escape
 
 import msgspec
 
-from schemas.frames import FrameTransform, FrameTransforms
-from schemas.topics import FRAMES, STATIC_FRAMES
-from services.arm.frames.frame_buffer import FrameBuffer, FrameError
-from services.arm.frames.transforms import to_rpy
-from services.cli.errors import CommandError, ExitCode, unknown
-from services.cli.field_path import FieldPath
-from services.cli.forms import Form, count_options, form_of, form_options, print_value, rows_form_of, yaml_document
-from services.cli.parser import Choices, Options, Parser, json_option, positive_number
-from services.cli.session import CommandSession, connect
-from services.cli.text_table import table
+from gemelo.schemas.frames import FrameTransform, FrameTransforms
+from gemelo.schemas.topics import FRAMES, STATIC_FRAMES
+from gemelo.services.arm.frames.frame_buffer import FrameBuffer, FrameError
+from gemelo.services.arm.frames.transforms import to_rpy
+from gemelo.services.cli.errors import CommandError, ExitCode, unknown
+from gemelo.services.cli.field_path import FieldPath
+from gemelo.services.cli.forms import (
+    Form,
+    count_options,
+    form_of,
+    form_options,
+    print_value,
+    rows_form_of,
+    yaml_document,
+)
+from gemelo.services.cli.parser import Choices, Options, Parser, json_option, positive_number
+from gemelo.services.cli.session import CommandSession, connect
+from gemelo.services.cli.text_table import table
 
 if TYPE_CHECKING:
     from gemelo import Robot

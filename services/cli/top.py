@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import msgspec
 
-from schemas.system import NodeInfo, NodeStatistics
-from schemas.topics import STATISTICS, TOPICS
-from services.cli.errors import ExitCode
-from services.cli.forms import Form, count_options, csv_rows, form_options, json_line
-from services.cli.node import is_command, told_information_of
-from services.cli.parser import Options, Parser
-from services.cli.session import CommandSession, connect
-from services.cli.text_table import table
+from gemelo.schemas.system import NodeInfo, NodeStatistics
+from gemelo.schemas.topics import STATISTICS, TOPICS
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.forms import Form, count_options, csv_rows, form_options, json_line
+from gemelo.services.cli.node import is_command, told_information_of
+from gemelo.services.cli.parser import Options, Parser
+from gemelo.services.cli.session import CommandSession, connect
+from gemelo.services.cli.text_table import table
 
 EVERY = 1.0  # [s] every node tells its figures once a second
 FIRST = 2.5  # [s] until two of every node have come

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from schemas.message import Message
-from schemas.topics import TOPICS, Topic
-from services.cli.errors import CommandError, ExitCode, unknown
-from services.cli.field_path import FieldPath
-from services.cli.forms import Form, count_options, form_of, form_options, print_value, yaml_document
-from services.cli.living_topics import all_topics, connected, known_topic, router_listens
-from services.cli.messages import dump, fields_of, message_of
-from services.cli.parser import Choices, Options, Parser, json_option, positive_integer, positive_number
-from services.cli.session import CommandSession, connect
-from services.cli.text_table import table
-from services.cli.topic_ends import Ends, ends
-from services.recordings.living_topic import LivingTopic
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import TOPICS, Topic
+from gemelo.services.cli.errors import CommandError, ExitCode, unknown
+from gemelo.services.cli.field_path import FieldPath
+from gemelo.services.cli.forms import Form, count_options, form_of, form_options, print_value, yaml_document
+from gemelo.services.cli.living_topics import all_topics, connected, known_topic, router_listens
+from gemelo.services.cli.messages import dump, fields_of, message_of
+from gemelo.services.cli.parser import Choices, Options, Parser, json_option, positive_integer, positive_number
+from gemelo.services.cli.session import CommandSession, connect
+from gemelo.services.cli.text_table import table
+from gemelo.services.cli.topic_ends import Ends, ends
+from gemelo.services.recordings.living_topic import LivingTopic
 
 if TYPE_CHECKING:
     from gemelo import Robot

@@ -6,12 +6,12 @@ from typing import Any
 
 import msgspec
 
-from schemas.message import Message
-from schemas.system import NodeInfo
-from schemas.topics import Topic
-from services.cli.node import living, told_information_of
-from services.cli.session import CommandSession
-from services.cli.top import FIRST, Figures, figures_by_node
+from gemelo.schemas.message import Message
+from gemelo.schemas.system import NodeInfo
+from gemelo.schemas.topics import Topic
+from gemelo.services.cli.node import living, told_information_of
+from gemelo.services.cli.session import CommandSession
+from gemelo.services.cli.top import FIRST, Figures, figures_by_node
 
 
 class Writer(msgspec.Struct, frozen=True, kw_only=True):

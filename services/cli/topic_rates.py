@@ -10,14 +10,14 @@ from typing import Any
 
 import msgspec
 
-from schemas.message import Message, encode
-from schemas.topics import Topic
-from services.cli.errors import ExitCode, usage
-from services.cli.forms import Form, count_options, form_of, form_options
-from services.cli.living_topics import connected
-from services.cli.parser import Options, Parser, positive_integer
-from services.cli.session import CommandSession
-from services.cli.topic import listen, topic_option
+from gemelo.schemas.message import Message, encode
+from gemelo.schemas.topics import Topic
+from gemelo.services.cli.errors import ExitCode, usage
+from gemelo.services.cli.forms import Form, count_options, form_of, form_options
+from gemelo.services.cli.living_topics import connected
+from gemelo.services.cli.parser import Options, Parser, positive_integer
+from gemelo.services.cli.session import CommandSession
+from gemelo.services.cli.topic import listen, topic_option
 
 REPORT_EVERY = 1.0  # [s]
 

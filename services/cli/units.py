@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple, Protocol
 
 import gemelo
-from services.cli.errors import CommandError, unknown, usage
-from services.cli.parser import comma_hint
+from gemelo.services.cli.errors import CommandError, unknown, usage
+from gemelo.services.cli.parser import comma_hint
 
 DEGREE = gemelo.deg(1.0)
 MILLIMETRE = gemelo.mm(1.0)
@@ -54,7 +54,7 @@ VERB_OF = {"rad": "turns", "m": "slides"}
 
 
 class NamedJoint(Protocol):
-    """The properties of a joint that are needed here; `services.arm` has them."""
+    """The properties of a joint that are needed here; `gemelo.services.arm` has them."""
 
     @property
     def name(self) -> str: ...

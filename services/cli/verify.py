@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from services.cli.errors import CommandError, ExitCode, in_commands, joint_of
-from services.cli.home import home_text
-from services.cli.parser import Options, Parser, json_option
-from services.cli.session import connect_arm, load_robot
+from gemelo.services.cli.errors import CommandError, ExitCode, in_commands, joint_of
+from gemelo.services.cli.home import home_text
+from gemelo.services.cli.parser import Options, Parser, json_option
+from gemelo.services.cli.session import connect_arm, load_robot
 
 if TYPE_CHECKING:
     from gemelo import Arm

@@ -5,8 +5,8 @@ from __future__ import annotations
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
-from services.cli.errors import ExitCode
-from services.cli.parser import Options
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.parser import Options
 
 WIRE_PROTOCOL = 1  # firmware/PROTOCOL.md
 

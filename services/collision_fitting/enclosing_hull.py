@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
-from services.arm.model.urdf import Origin
-from services.collision_fitting.fitted_shape import Fitted, FittedKind
-from services.collision_fitting.hull import corners_and_sides
+from gemelo.services.arm.model.urdf import Origin
+from gemelo.services.collision_fitting.fitted_shape import Fitted, FittedKind
+from gemelo.services.collision_fitting.hull import corners_and_sides
 
 Array = NDArray[np.float64]
 

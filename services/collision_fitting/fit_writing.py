@@ -9,16 +9,16 @@ from pathlib import Path
 
 import trimesh
 
-from services.arm.errors import DescriptionError
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.arm.model.urdf import Triple
-from services.arm.model.urdf_edit import with_collisions
-from services.collision_fitting.excess import depth_in
-from services.collision_fitting.link_meshes import HULLS
-from services.collision_fitting.mesh_fit import LinkFit
-from services.planner.collision_geometry.link_shapes import link_shapes
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.arm.model.urdf import Triple
+from gemelo.services.arm.model.urdf_edit import with_collisions
+from gemelo.services.collision_fitting.excess import depth_in
+from gemelo.services.collision_fitting.link_meshes import HULLS
+from gemelo.services.collision_fitting.mesh_fit import LinkFit
+from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 OUTSIDE = 1e-6  # [m] that a corner may be outside the shapes as they are loaded again: a rounding

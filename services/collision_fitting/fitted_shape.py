@@ -9,10 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
-from services.arm.frames.transforms import compose, from_rpy
-from services.arm.model.urdf import Origin, Triple
-from services.planner.collision_geometry.link_shapes import hull_mesh
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
+from gemelo.services.arm.frames.transforms import compose, from_rpy
+from gemelo.services.arm.model.urdf import Origin, Triple
+from gemelo.services.planner.collision_geometry.link_shapes import hull_mesh
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 
 class FittedKind(StrEnum):

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.checks.meshes import IN_MILLIMETRES, MOST_TRIANGLES, scene_of
-from services.arm.errors import DescriptionError
-from services.arm.frames.transforms import from_rpy
-from services.arm.model.urdf import Geometry, UrdfLink
-from services.planner.collision_geometry.shapes import TriangleMesh, matrix_of
+from gemelo.services.arm.checks.meshes import IN_MILLIMETRES, MOST_TRIANGLES, scene_of
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.frames.transforms import from_rpy
+from gemelo.services.arm.model.urdf import Geometry, UrdfLink
+from gemelo.services.planner.collision_geometry.shapes import TriangleMesh, matrix_of
 
 Array = NDArray[np.float64]
 

@@ -14,14 +14,14 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.description import ArmDescription
-from services.collision_fitting.excess import SHARE, Excess, excess_of
-from services.collision_fitting.fitted_shape import Fitted
-from services.collision_fitting.link_meshes import link_mesh
-from services.collision_fitting.mesh_surface import MeshSurface
-from services.collision_fitting.parts import shapes_around
-from services.planner.collision_geometry.shapes import TriangleMesh
+from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.collision_fitting.excess import SHARE, Excess, excess_of
+from gemelo.services.collision_fitting.fitted_shape import Fitted
+from gemelo.services.collision_fitting.link_meshes import link_mesh
+from gemelo.services.collision_fitting.mesh_surface import MeshSurface
+from gemelo.services.collision_fitting.parts import shapes_around
+from gemelo.services.planner.collision_geometry.shapes import TriangleMesh
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 WITHIN = 0.005  # [m] of the mesh, where `SHARE` of the shapes' outer surface is to be

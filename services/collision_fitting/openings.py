@@ -13,7 +13,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from services.planner.collision_geometry.shapes import TriangleMesh
+from gemelo.services.planner.collision_geometry.shapes import TriangleMesh
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]

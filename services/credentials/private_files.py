@@ -6,7 +6,7 @@ import os
 import stat
 from pathlib import Path
 
-from schemas.errors import ConfigurationError
+from gemelo.schemas.errors import ConfigurationError
 
 
 class AccessError(ConfigurationError):

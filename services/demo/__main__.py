@@ -1,5 +1,5 @@
-"""`python -m services.demo`."""
+"""`python -m gemelo.services.demo`."""
 
-from services.demo.main import main
+from gemelo.services.demo.main import main
 
 main()

@@ -12,8 +12,8 @@ device has emitted. Nothing is taken from the goals of the demonstration.
 
 from __future__ import annotations
 
-from schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState
-from schemas.joints import StepErrors
+from gemelo.schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState
+from gemelo.schemas.joints import StepErrors
 
 OK, DUPLICATE = 0, 1  # firmware/PROTOCOL.md, codes of ACK
 SAME_TIME = 1e-4  # [s]

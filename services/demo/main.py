@@ -17,12 +17,12 @@ from pathlib import Path
 import msgspec
 
 import gemelo
-from services.demo.performance import Performance
-from services.demo.report import complaints, report_of, text_of
-from services.runtime.deployment import load_deployment, project_root
-from services.runtime.process.ending import ended_by_signals
-from services.stack.results import new_results
-from services.stack.stack import Stack, StackError
+from gemelo.services.demo.performance import Performance
+from gemelo.services.demo.report import complaints, report_of, text_of
+from gemelo.services.runtime.deployment import load_deployment, project_root
+from gemelo.services.runtime.process.ending import ended_by_signals
+from gemelo.services.stack.results import new_results
+from gemelo.services.stack.stack import Stack, StackError
 
 DRIVER = "sudo apt-get install mesa-vulkan-drivers libvulkan1"
 MOSQUITTO = (shutil.which("mosquitto"), shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin"))
@@ -106,7 +106,7 @@ def take_picture(recording: Path, png: Path) -> list[str]:
 
     Where no driver draws it there is none: that is said with its remedy, and fails nothing.
     """
-    from services.visualizer.program.screenshot import NoGraphics, save_screenshot  # slow to load: rerun
+    from gemelo.services.visualizer.program.screenshot import NoGraphics, save_screenshot  # slow to load: rerun
 
     try:
         save_screenshot(recording, png)

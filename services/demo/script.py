@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 from gemelo import Target
-from services.arm.frames.transforms import compose, inverse
-from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import ArmDescription, Joint
+from gemelo.services.arm.frames.transforms import compose, inverse
+from gemelo.services.arm.kinematics.chain import link_transforms
+from gemelo.services.arm.model.description import ArmDescription, Joint
 
 SINE_RATE = 10.0  # [Hz] of the targets
 SINE_TIME = 10.0  # [s]

@@ -9,14 +9,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from schemas.camera import CameraInfo
-from schemas.cell import BoxThing, Colour, ColourThing, OnnxThing, TagRecord, TagThing
-from schemas.detections import Detection, DetectionKind, Detections, Unclear
-from schemas.frames import Transform
-from services.arm.cell.cell_file import Cell, Tagged, height_of_frame
-from services.arm.cell.colours import RGB, nearest_colour
-from services.arm.frames.transforms import from_rpy
-from services.detector.regions import (
+from gemelo.schemas.camera import CameraInfo
+from gemelo.schemas.cell import BoxThing, Colour, ColourThing, OnnxThing, TagRecord, TagThing
+from gemelo.schemas.detections import Detection, DetectionKind, Detections, Unclear
+from gemelo.schemas.frames import Transform
+from gemelo.services.arm.cell.cell_file import Cell, Tagged, height_of_frame
+from gemelo.services.arm.cell.colours import RGB, nearest_colour
+from gemelo.services.arm.frames.transforms import from_rpy
+from gemelo.services.detector.regions import (
     DetectorView,
     distances_from,
     in_base,
@@ -26,8 +26,8 @@ from services.detector.regions import (
     rows_of,
     unclear_region,
 )
-from services.detector.user_models import BadModel, Found, PlacedThing, UserModel, standing
-from services.vision.boxes import (
+from gemelo.services.detector.user_models import BadModel, Found, PlacedThing, UserModel, standing
+from gemelo.services.vision.boxes import (
     BoxFit,
     ColourImage,
     colour_strength,
@@ -35,11 +35,11 @@ from services.vision.boxes import (
     coloured_windows,
     fit_box,
 )
-from services.vision.camera_model import model_of
-from services.vision.rigid import Array, from_transform, inverse, to_transform
-from services.vision.tag_pose import plane_pose, tag_pose
-from services.vision.tags import Tag, find_tags
-from services.vision.windows import Mask, Window, regions_of, windows_around
+from gemelo.services.vision.camera_model import model_of
+from gemelo.services.vision.rigid import Array, from_transform, inverse, to_transform
+from gemelo.services.vision.tag_pose import plane_pose, tag_pose
+from gemelo.services.vision.tags import Tag, find_tags
+from gemelo.services.vision.windows import Mask, Window, regions_of, windows_around
 
 # Tuning constants: chosen, where a line does not say measured.
 FLAT = 0.003  # [m] a tag so near to the height at which it would lie is taken to lie there

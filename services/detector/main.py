@@ -11,25 +11,25 @@ import msgspec
 from msgspec import Meta
 from msgspec.structs import replace
 
-from schemas.camera import CameraImage, CameraInfo
-from schemas.cell import OnnxThing
-from schemas.deployment import Deployment
-from schemas.joints import JointState
-from schemas.topics import CAMERA, GATEWAY, JOINT_STATES, camera_detections, camera_image, camera_info
-from services.arm.cell.cell_file import Cell, load_cell
-from services.arm.frames.transforms import compose, inverse, to_message
-from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import ArmDescription, load_arm
-from services.runtime.application import service
-from services.runtime.deployment import project_root
-from services.runtime.node import Node
-from services.runtime.node_clock import NodeClock
-from services.runtime.process.priority import step_behind
+from gemelo.schemas.camera import CameraImage, CameraInfo
+from gemelo.schemas.cell import OnnxThing
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.topics import CAMERA, GATEWAY, JOINT_STATES, camera_detections, camera_image, camera_info
+from gemelo.services.arm.cell.cell_file import Cell, load_cell
+from gemelo.services.arm.frames.transforms import compose, inverse, to_message
+from gemelo.services.arm.kinematics.chain import link_transforms
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.runtime.application import service
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.node_clock import NodeClock
+from gemelo.services.runtime.process.priority import step_behind
 
 if TYPE_CHECKING:
-    from services.detector.core import Detector
-    from services.detector.user_models import UserModel
-    from services.vision.rigid import Array
+    from gemelo.services.detector.core import Detector
+    from gemelo.services.detector.user_models import UserModel
+    from gemelo.services.vision.rigid import Array
 
 RATE = 1.0  # [Hz] of its own step, which does nothing: images wake it
 SLACK = 0.02  # [s] that an image may come too early
@@ -53,7 +53,7 @@ def run(node: Node, deployment: Deployment) -> None:
     if cell.cameras:
         import cv2  # slow to load: OpenCV, which only a cell with cameras is worth
 
-        from services.detector.core import Detector  # OpenCV: 60 MB that only a cell with cameras is worth
+        from gemelo.services.detector.core import Detector  # OpenCV: 60 MB that only a cell with cameras is worth
 
         cv2.setNumThreads(1)
         models = read_models(cell, node.log.warning)
@@ -73,7 +73,7 @@ def run(node: Node, deployment: Deployment) -> None:
 
 def read_models(cell: Cell, warn: Callable[[str], object]) -> dict[Path, UserModel]:
     """The models of the cell's things, each once; what cannot be read is said to `warn`, and not looked for."""
-    from services.detector.user_models import BadModel, UserModel  # slow to load: OpenCV
+    from gemelo.services.detector.user_models import BadModel, UserModel  # slow to load: OpenCV
 
     found: dict[Path, UserModel] = {}
     for thing in cell.things:
@@ -110,7 +110,7 @@ class Places:
 
         `stamp` is None where the camera's clock is not known: then only for a camera that the arm does not carry.
         """
-        from services.vision.rigid import from_transform  # slow to load: OpenCV
+        from gemelo.services.vision.rigid import from_transform  # slow to load: OpenCV
 
         if not info.is_mounted:
             return None
@@ -150,7 +150,7 @@ class CameraWatch:
     def _on_image(self, image: CameraImage) -> None:
         import cv2  # slow to load: OpenCV, which only a cell with cameras is worth
 
-        from services.detector.images import NoPicture, decoded
+        from gemelo.services.detector.images import NoPicture, decoded
 
         now = self._node.monotonic()
         if self._info is None or now < self._due - SLACK:

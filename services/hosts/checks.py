@@ -9,18 +9,18 @@ from collections import defaultdict
 from pathlib import Path, PurePosixPath
 
 from gemelo.programs.toml_lines import Where
-from schemas.deployment import DeviceKind, Wire
-from schemas.errors import ConfigurationError
-from schemas.roles import ROLES
-from schemas.site import Site
-from services.arm.cell.cell_file import load_cell
-from services.arm.model.description import ArmDescription, load_arm
-from services.credentials.authority import DAYS
-from services.hosts.certificates import AUTHORITY_FOLDER
-from services.hosts.deployments import HOST
-from services.hosts.layout import BROKER, OF_A_ROBOT, ROUTER
-from services.hosts.site_file import Problems, nearest, read_site
-from services.runtime.deployment import is_loopback
+from gemelo.schemas.deployment import DeviceKind, Wire
+from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.roles import ROLES
+from gemelo.schemas.site import Site
+from gemelo.services.arm.cell.cell_file import load_cell
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.credentials.authority import DAYS
+from gemelo.services.hosts.certificates import AUTHORITY_FOLDER
+from gemelo.services.hosts.deployments import HOST
+from gemelo.services.hosts.layout import BROKER, OF_A_ROBOT, ROUTER
+from gemelo.services.hosts.site_file import Problems, nearest, read_site
+from gemelo.services.runtime.deployment import is_loopback
 
 USER = re.compile(r"[a-z_][a-z0-9_-]{0,31}")  # as useradd takes it
 ZONE = re.compile(r"[A-Za-z0-9_.-]{1,15}")  # an interface's name after the % of an IPv6 address (RFC 4007)

@@ -6,10 +6,10 @@ import json
 import shlex
 from typing import Any
 
-from schemas.deployment import Wire
-from schemas.site import Site
-from services.hosts.deployments import HOST, environment
-from services.hosts.layout import FILES, TASKS, Process, extras, processes
+from gemelo.schemas.deployment import Wire
+from gemelo.schemas.site import Site
+from gemelo.services.hosts.deployments import HOST, environment
+from gemelo.services.hosts.layout import FILES, TASKS, Process, extras, processes
 
 IN_IMAGE = "/opt/gemelo"  # where the Containerfile puts the project
 CONTAINERFILE = """\

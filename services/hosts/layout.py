@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from schemas.roles import ROLE_OF_NODE
-from schemas.site import Site
+from gemelo.schemas.roles import ROLE_OF_NODE
+from gemelo.schemas.site import Site
 
 ROUTER, BROKER = "router", "broker"
 TASKS, FILES = 256, 4096  # that one process may have, beside its memory: what leaks ends itself, and not the host

@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from schemas.site import Site
-from services.hosts import deployments
-from services.hosts.containers import compose, containerfile, process_compose
-from services.hosts.firewall import FILE, firewall, ports
-from services.hosts.layout import listening, principals, robots
-from services.hosts.units import units
-from services.mqtt.secure_folder import lines, mosquitto_conf
-from services.runtime.bus.zenoh_config import locked_router
-from services.runtime.permissions import access_control
+from gemelo.schemas.site import Site
+from gemelo.services.hosts import deployments
+from gemelo.services.hosts.containers import compose, containerfile, process_compose
+from gemelo.services.hosts.firewall import FILE, firewall, ports
+from gemelo.services.hosts.layout import listening, principals, robots
+from gemelo.services.hosts.units import units
+from gemelo.services.mqtt.secure_folder import lines, mosquitto_conf
+from gemelo.services.runtime.bus.zenoh_config import locked_router
+from gemelo.services.runtime.permissions import access_control
 
 OF_A_PLACE = ("router.json5", "mosquitto.conf", FILE)  # of a host where router or broker run
 

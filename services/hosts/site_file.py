@@ -13,9 +13,9 @@ from typing import Any, TypeVar, get_args
 import msgspec
 
 from gemelo.programs.toml_lines import Where, toml_lines
-from schemas.errors import ConfigurationError
-from schemas.site import Site, SiteBroker, SiteHost, SiteRecord, SiteRobot, SiteRouter
-from schemas.text_file import NotUtf8, read_text
+from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.site import Site, SiteBroker, SiteHost, SiteRecord, SiteRobot, SiteRouter
+from gemelo.schemas.text_file import NotUtf8, read_text
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,30}")  # of a host or a site: part of file names, units and certificates
 PLAIN = '1 to 31 lower-case letters, digits, "_" or "-"'

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from schemas.deployment import Wire
-from schemas.site import Site
-from services.hosts import firewall
-from services.hosts.deployments import environment
-from services.hosts.firewall import FILE, UNIT_NAME, ports
-from services.hosts.layout import FILES, TASKS, Process, processes
-from services.hosts.quoting import systemd
-from services.runtime.process.priority import AHEAD
+from gemelo.schemas.deployment import Wire
+from gemelo.schemas.site import Site
+from gemelo.services.hosts import firewall
+from gemelo.services.hosts.deployments import environment
+from gemelo.services.hosts.firewall import FILE, UNIT_NAME, ports
+from gemelo.services.hosts.layout import FILES, TASKS, Process, processes
+from gemelo.services.hosts.quoting import systemd
+from gemelo.services.runtime.process.priority import AHEAD
 
 TARGET = "gemelo.target"
 UNIT = """\

@@ -10,15 +10,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from schemas.message import Message, encode
-from schemas.scene import PlanningScene
-from schemas.topics import Delivery, Topic
-from services.logger.core import is_past_mesh
-from services.logger.files import MCAP, prune, stem_of
-from services.logger.incident_story import incident_of
-from services.logger.incident_watch import IncidentWatch, Trigger
-from services.recordings.channels import Entry
-from services.recordings.incidents import (
+from gemelo.schemas.message import Message, encode
+from gemelo.schemas.scene import PlanningScene
+from gemelo.schemas.topics import Delivery, Topic
+from gemelo.services.logger.core import is_past_mesh
+from gemelo.services.logger.files import MCAP, prune, stem_of
+from gemelo.services.logger.incident_story import incident_of
+from gemelo.services.logger.incident_watch import IncidentWatch, Trigger
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.incidents import (
     BLACK_BOX,
     Incident,
     IncidentKind,
@@ -26,11 +26,11 @@ from services.recordings.incidents import (
     incident_metadata,
     saving_mark,
 )
-from services.recordings.mcap_file import McapFile
-from services.recordings.reader import BadRecording, RecordingReader
-from services.recordings.view_layout import layout_metadata, layout_of
-from services.runtime.bus.wire import MAX_PAYLOAD_OF
-from services.runtime.process.own_files import own_folder
+from gemelo.services.recordings.mcap_file import McapFile
+from gemelo.services.recordings.reader import BadRecording, RecordingReader
+from gemelo.services.recordings.view_layout import layout_metadata, layout_of
+from gemelo.services.runtime.bus.wire import MAX_PAYLOAD_OF
+from gemelo.services.runtime.process.own_files import own_folder
 
 SECOND = 1_000_000_000  # [ns]
 AFTERWARDS = 3 * SECOND  # [ns] that are waited for what follows an incident

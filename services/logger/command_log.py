@@ -6,7 +6,7 @@ import struct
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from schemas.device import CommandAck, CommandChunk
+from gemelo.schemas.device import CommandAck, CommandChunk
 
 ACK_TIMEOUT = 2_000_000_000  # [ns] after which an unanswered chunk counts as lost
 LOST, RESENT, UNANSWERED = "lost", "resent", "unanswered"

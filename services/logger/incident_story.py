@@ -8,22 +8,22 @@ from typing import Any
 
 import msgspec
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceEvent, DeviceMode, DeviceState
-from schemas.frames import RobotDescription
-from schemas.joints import JointState, StepErrors
-from schemas.ledger import StepLedger, StoppingDistance
-from schemas.message import Message
-from schemas.planning import PlanResponse
-from schemas.system import LogLevel, LogRecord, ParameterChange
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, JOINT_STATES
-from services.arm.errors import DescriptionError
-from services.arm.model.urdf import JointKind, UrdfJoint, urdf_of
-from services.logger.incident_watch import STOPPED, Trigger
-from services.recordings.channels import Entry
-from services.recordings.incidents import BLACK_BOX, Happening, Incident, time_of
-from services.runtime.actions import keys
-from services.runtime.requests.exchanges import PREFIX
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceEvent, DeviceMode, DeviceState
+from gemelo.schemas.frames import RobotDescription
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.ledger import StepLedger, StoppingDistance
+from gemelo.schemas.message import Message
+from gemelo.schemas.planning import PlanResponse
+from gemelo.schemas.system import LogLevel, LogRecord, ParameterChange
+from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, JOINT_STATES
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.urdf import JointKind, UrdfJoint, urdf_of
+from gemelo.services.logger.incident_watch import STOPPED, Trigger
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.incidents import BLACK_BOX, Happening, Incident, time_of
+from gemelo.services.runtime.actions import keys
+from gemelo.services.runtime.requests.exchanges import PREFIX
 
 SECOND = 1_000_000_000  # [ns]
 BEFORE, AFTER = 20, 20  # happenings that are told at most

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceEvent, DeviceFault, DeviceMode, DeviceState
-from schemas.device_faults import fault_text
-from schemas.message import Message
-from schemas.roles import SERVICES
-from schemas.system import NodeStatistics
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY, Topic
-from services.recordings.incidents import IncidentKind
-from services.runtime.actions import keys
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceEvent, DeviceFault, DeviceMode, DeviceState
+from gemelo.schemas.device_faults import fault_text
+from gemelo.schemas.message import Message
+from gemelo.schemas.roles import SERVICES
+from gemelo.schemas.system import NodeStatistics
+from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, Topic
+from gemelo.services.recordings.incidents import IncidentKind
+from gemelo.services.runtime.actions import keys
 
 STOPPED = (DeviceMode.FAULT, DeviceMode.ESTOP)
 ENDED = keys.ended_topic(FOLLOW_JOINT_TRAJECTORY).key

@@ -5,22 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from schemas.deployment import Deployment
-from schemas.message import Message
-from schemas.topics import Topic
-from services.arm.cell.cell_file import deployed_cell
-from services.logger.black_box import BlackBox, BlackBoxWriter, SavingMark
-from services.logger.core import Batch, Logger
-from services.logger.disk import LoggerParameters, RecordingWriter
-from services.logger.images import record_cameras
-from services.recordings.channels import Entry
-from services.recordings.incidents import FOLDER, Incident
-from services.recordings.origin import metadata_of
-from services.recordings.subscriptions import Subscriptions
-from services.runtime.application import service
-from services.runtime.deployment import project_root
-from services.runtime.node import Node
-from services.runtime.process.priority import step_behind
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import Topic
+from gemelo.services.arm.cell.cell_file import deployed_cell
+from gemelo.services.logger.black_box import BlackBox, BlackBoxWriter, SavingMark
+from gemelo.services.logger.core import Batch, Logger
+from gemelo.services.logger.disk import LoggerParameters, RecordingWriter
+from gemelo.services.logger.images import record_cameras
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.incidents import FOLDER, Incident
+from gemelo.services.recordings.origin import metadata_of
+from gemelo.services.recordings.subscriptions import Subscriptions
+from gemelo.services.runtime.application import service
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.priority import step_behind
 
 # With those who supervise it the logger has 5 s to end. On a busy machine it comes after all others: 2 s are too few.
 GRACE = 4.0  # [s] to end the recording, the black box and the session

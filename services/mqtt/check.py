@@ -8,9 +8,9 @@ import secrets
 
 from paho.mqtt import client as paho
 
-from services.mqtt.access import BrokerAccess
-from services.mqtt.client import OLD_BROKER, MqttClient, code_of, is_failure
-from services.mqtt.failures import failure, refusal, silence
+from gemelo.services.mqtt.access import BrokerAccess
+from gemelo.services.mqtt.client import OLD_BROKER, MqttClient, code_of, is_failure
+from gemelo.services.mqtt.failures import failure, refusal, silence
 
 PATIENCE = 3.0  # [s] for an answer to CONNECT
 

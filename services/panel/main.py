@@ -15,19 +15,19 @@ from pathlib import Path
 import viser
 
 import gemelo
-from schemas.deployment import Deployment
-from services.panel.model.operator import Operator
-from services.panel.model.readings import Readings
-from services.panel.view.arm_pages import arm_pages
-from services.panel.view.broken_connections import BrokenConnections
-from services.panel.view.own_pages import OwnServer, own_pages_only
-from services.panel.view.page import Page
-from services.panel.view.world import DrawnWorld
-from services.runtime.deployment import DeploymentError, exposure, load_deployment
-from services.runtime.process.logs import LEVELS, line_logger
-from services.runtime.process.ports import PortTaken, require_free
-from services.runtime.process.readiness import tell_alive
-from services.runtime.process.shutdown import ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
+from gemelo.schemas.deployment import Deployment
+from gemelo.services.panel.model.operator import Operator
+from gemelo.services.panel.model.readings import Readings
+from gemelo.services.panel.view.arm_pages import arm_pages
+from gemelo.services.panel.view.broken_connections import BrokenConnections
+from gemelo.services.panel.view.own_pages import OwnServer, own_pages_only
+from gemelo.services.panel.view.page import Page
+from gemelo.services.panel.view.world import DrawnWorld
+from gemelo.services.runtime.deployment import DeploymentError, exposure, load_deployment
+from gemelo.services.runtime.process.logs import LEVELS, line_logger
+from gemelo.services.runtime.process.ports import PortTaken, require_free
+from gemelo.services.runtime.process.readiness import tell_alive
+from gemelo.services.runtime.process.shutdown import ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
 
 NAME = "panel"
 APART = 0.02  # [s] at least from the beginning of one picture to the next, however much is dragged

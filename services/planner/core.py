@@ -8,9 +8,9 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.joints import JointState
-from schemas.motion import MOST_POINTS, JointTrajectory
-from schemas.planning import (
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.motion import MOST_POINTS, JointTrajectory
+from gemelo.schemas.planning import (
     MOST_ATTEMPTS,
     CircularMotion,
     FreeMotion,
@@ -21,21 +21,21 @@ from schemas.planning import (
     PlanResponse,
     WaypointGoal,
 )
-from schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.cartesian.tool_motions import ToolMotions
-from services.planner.collision.checker import CollisionChecker
-from services.planner.collision.world import World
-from services.planner.kinematics.goals import Goals
-from services.planner.path.path import STRAIGHT, PathNotFound, Start
-from services.planner.path.search import Search, require_known
-from services.planner.pipeline.collision_refusals import CollisionRefusals
-from services.planner.pipeline.planning_context import PlanningContext
-from services.planner.pipeline.trajectory_builder import TrajectoryBuilder, TrajectoryTouches, VerifiedTrajectory
-from services.planner.pipeline.waypoints import WaypointPlanner
-from services.planner.request.deadline import NEVER, CancelFlag, Deadline, DeadlinePassed, Stopwatch, endless
-from services.planner.request.refusals import (
+from gemelo.schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.cartesian.tool_motions import ToolMotions
+from gemelo.services.planner.collision.checker import CollisionChecker
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.kinematics.goals import Goals
+from gemelo.services.planner.path.path import STRAIGHT, PathNotFound, Start
+from gemelo.services.planner.path.search import Search, require_known
+from gemelo.services.planner.pipeline.collision_refusals import CollisionRefusals
+from gemelo.services.planner.pipeline.planning_context import PlanningContext
+from gemelo.services.planner.pipeline.trajectory_builder import TrajectoryBuilder, TrajectoryTouches, VerifiedTrajectory
+from gemelo.services.planner.pipeline.waypoints import WaypointPlanner
+from gemelo.services.planner.request.deadline import NEVER, CancelFlag, Deadline, DeadlinePassed, Stopwatch, endless
+from gemelo.services.planner.request.refusals import (
     LEAST_SCALING,
     PlanRefused,
     SearchFailure,
@@ -46,9 +46,9 @@ from services.planner.request.refusals import (
     timed_out,
     too_long,
 )
-from services.planner.request.start_state import resolve_start
-from services.planner.timing.profile import JointLimits, joint_limits
-from services.planner.verification.verify import sample
+from gemelo.services.planner.request.start_state import resolve_start
+from gemelo.services.planner.timing.profile import JointLimits, joint_limits
+from gemelo.services.planner.verification.verify import sample
 
 Array = NDArray[np.float64]
 

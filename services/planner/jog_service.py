@@ -4,18 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from schemas.joints import JointState
-from schemas.planning import JogCommand, JogStatus
-from schemas.topics import CONTROL, DEVICE_STATUS, FOLLOW_JOINT_TRAJECTORY, JOG, JOG_INPUTS, JOG_STATUS, JOINT_TARGETS
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.collision.world import World
-from services.planner.jog.jog import NEVER, PERIOD, SILENCE, STATUS_PERIOD, Jog, signed
-from services.planner.jog.jog_log import JogLog, digest_of
-from services.planner.scene.standing import version_of
-from services.runtime.actions.keys import status_topic
-from services.runtime.node import Node
-from services.runtime.topics import Latest
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JogCommand, JogStatus
+from gemelo.schemas.topics import (
+    CONTROL,
+    DEVICE_STATUS,
+    FOLLOW_JOINT_TRAJECTORY,
+    JOG,
+    JOG_INPUTS,
+    JOG_STATUS,
+    JOINT_TARGETS,
+)
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.jog.jog import NEVER, PERIOD, SILENCE, STATUS_PERIOD, Jog, signed
+from gemelo.services.planner.jog.jog_log import JogLog, digest_of
+from gemelo.services.planner.scene.standing import version_of
+from gemelo.services.runtime.actions.keys import status_topic
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.topics import Latest
 
 
 class JogService:

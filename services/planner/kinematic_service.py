@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from schemas.joints import JointState
-from schemas.message import Message
-from schemas.topics import FK, IK, STATE_VALIDITY, Request
-from services.arm.model.description import ArmDescription
-from services.planner.collision.world import World
-from services.planner.kinematics.kinematic_requests import KinematicRequests
-from services.planner.scene.answer_log import AnswerLog
-from services.planner.scene.standing import version_of
-from services.runtime.node import Node
-from services.runtime.topics import Latest
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import FK, IK, STATE_VALIDITY, Request
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
+from gemelo.services.planner.scene.answer_log import AnswerLog
+from gemelo.services.planner.scene.standing import version_of
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.topics import Latest
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)

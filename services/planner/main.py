@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from schemas.deployment import Deployment
-from schemas.topics import JOINT_STATES
-from services.arm.model.description import load_arm
-from services.planner.core import Planner
-from services.planner.jog_service import JogService
-from services.planner.kinematic_service import KinematicService
-from services.planner.parameters import PlannerParameters
-from services.planner.request.start_state import STALE_AFTER
-from services.planner.scene.answer_log import AnswerLog
-from services.planner.scene.scene_keeper import SceneKeeper
-from services.planner.workers.in_process import PlansInProcess
-from services.planner.workers.plan_service import PlanMaker, PlanService
-from services.planner.workers.workers import Present, Workers
-from services.runtime.application import service
-from services.runtime.deployment import project_root
-from services.runtime.node import Node
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.topics import JOINT_STATES
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.jog_service import JogService
+from gemelo.services.planner.kinematic_service import KinematicService
+from gemelo.services.planner.parameters import PlannerParameters
+from gemelo.services.planner.request.start_state import STALE_AFTER
+from gemelo.services.planner.scene.answer_log import AnswerLog
+from gemelo.services.planner.scene.scene_keeper import SceneKeeper
+from gemelo.services.planner.workers.in_process import PlansInProcess
+from gemelo.services.planner.workers.plan_service import PlanMaker, PlanService
+from gemelo.services.planner.workers.workers import Present, Workers
+from gemelo.services.runtime.application import service
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.node import Node
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 RATE = 10.0  # [Hz] at which it says how plans stand; chosen: smooth for a person's eye

@@ -1,6 +1,6 @@
 """The end of `gemelo check`: random configurations of a robot, and plans between the free ones.
 
-`python -m services.planner.trial ROBOT_FOLDER` prints its findings as JSON, one a line; none if plans succeed.
+`python -m gemelo.services.planner.trial ROBOT_FOLDER` prints its findings as JSON, one a line; none if plans succeed.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.joints import JointState
-from schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse
-from services.arm.checks.findings import Finding, error, warning
-from services.arm.kinematics.self_collisions import LinkPair
-from services.arm.model.description import ArmDescription, load_arm
-from services.arm.model.urdf import JointKind
-from services.planner.core import Planner
-from services.planner.native import assembly
-from services.planner.request.deadline import Deadline
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse
+from gemelo.services.arm.checks.findings import Finding, error, warning
+from gemelo.services.arm.kinematics.self_collisions import LinkPair
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.arm.model.urdf import JointKind
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.native import assembly
+from gemelo.services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import msgspec
 from mcap.reader import make_reader
 
-from services.recordings.mcap_file import CLOCKS
-from services.recordings.reader import UNREADABLE, Damage, RecordingReader
+from gemelo.services.recordings.mcap_file import CLOCKS
+from gemelo.services.recordings.reader import UNREADABLE, Damage, RecordingReader
 
 
 class TopicContents(msgspec.Struct, frozen=True, kw_only=True):

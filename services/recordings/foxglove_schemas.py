@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from services.recordings.channels import LAST_STAMP
+from gemelo.services.recordings.channels import LAST_STAMP
 
 Empty = tuple[Any, ...]  # of primitives that are never drawn here
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
-from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, Shape, SphereShape
-from services.arm.frames.transforms import from_rpy
-from services.arm.stl import BadStl, read_stl
-from services.recordings import foxglove_schemas as fox
+from gemelo.schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, Shape, SphereShape
+from gemelo.services.arm.frames.transforms import from_rpy
+from gemelo.services.arm.stl import BadStl, read_stl
+from gemelo.services.recordings import foxglove_schemas as fox
 
 LINK = fox.Color(r=0.85, g=0.85, b=0.87, a=1.0)
 OBJECT = fox.Color(r=0.35, g=0.55, b=0.85, a=0.7)

@@ -7,9 +7,9 @@ from typing import Any
 
 import msgspec
 
-from schemas.message import Message
-from schemas.system import TopicInterface
-from schemas.topics import Delivery, Topic
+from gemelo.schemas.message import Message
+from gemelo.schemas.system import TopicInterface
+from gemelo.schemas.topics import Delivery, Topic
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from schemas.message import Message
-from schemas.system import NodeRecord
-from schemas.topics import SCENE, Topic
-from services.recordings.census import Census
-from services.recordings.table import NODES, recorded_topics, topics_of_node
-from services.runtime.node import Node
-from services.runtime.scene_meshes import SceneMeshes
-from services.runtime.topics import Subscription
+from gemelo.schemas.message import Message
+from gemelo.schemas.system import NodeRecord
+from gemelo.schemas.topics import SCENE, Topic
+from gemelo.services.recordings.census import Census
+from gemelo.services.recordings.table import NODES, recorded_topics, topics_of_node
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.scene_meshes import SceneMeshes
+from gemelo.services.runtime.topics import Subscription
 
 MAX_OTHERS = 512  # topics besides those of the table: what a node tells of itself is not to be trusted for more
 ALL = 0.0  # [s] of a LATEST topic too no message is left out while a file is written

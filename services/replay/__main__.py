@@ -1,5 +1,5 @@
-"""`python -m services.replay`."""
+"""`python -m gemelo.services.replay`."""
 
-from services.replay.main import main
+from gemelo.services.replay.main import main
 
 main()

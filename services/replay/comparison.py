@@ -9,8 +9,8 @@ from typing import Any
 
 import msgspec
 
-from schemas.message import Message, encode
-from services.replay.recorded import Heard
+from gemelo.schemas.message import Message, encode
+from gemelo.services.replay.recorded import Heard
 
 ABSENT = "(nothing)"
 LONGEST = 200  # characters of a value that are shown

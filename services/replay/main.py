@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from schemas.errors import ConfigurationError
-from schemas.topics import Topic
-from services.recordings.origin import PACKAGES, processor, version_of
-from services.recordings.reader import BadRecording
-from services.replay import planner, state_publisher, stepper_gateway
-from services.replay.comparison import Comparison, Difference
-from services.replay.options import add_options
-from services.replay.recorded import NotReplayable, Recorded
+from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.topics import Topic
+from gemelo.services.recordings.origin import PACKAGES, processor, version_of
+from gemelo.services.recordings.reader import BadRecording
+from gemelo.services.replay import planner, state_publisher, stepper_gateway
+from gemelo.services.replay.comparison import Comparison, Difference
+from gemelo.services.replay.options import add_options
+from gemelo.services.replay.recorded import NotReplayable, Recorded
 
 CANNOT = 2  # the exit code of a recording that cannot be replayed
 

@@ -21,13 +21,13 @@ from mcap.records import Channel, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 import gemelo
-from schemas.topics import Topic
-from services.recordings.foreign import METADATA, PROFILE
-from services.recordings.mcap_file import DEPLOYMENT
-from services.recordings.reader import RecordingReader
-from services.replay.main import SERVICES, Replayed, replay, text_of
-from services.runtime.deployment import project_root
-from services.stack.stack import Stack, StackError
+from gemelo.schemas.topics import Topic
+from gemelo.services.recordings.foreign import METADATA, PROFILE
+from gemelo.services.recordings.mcap_file import DEPLOYMENT
+from gemelo.services.recordings.reader import RecordingReader
+from gemelo.services.replay.main import SERVICES, Replayed, replay, text_of
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.stack.stack import Stack, StackError
 
 FOLDER = "tests/replay/recordings"
 CHUNK = 256 * 1024  # [B] uncompressed: larger ones are smaller together

@@ -12,18 +12,18 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from schemas.planning import PlanCode, PlanInputs, PlanningTimes, PlanRequest, PlanResponse, SceneVersion
-from schemas.topics import JOG_INPUTS, PLAN, PLAN_INPUTS, PLANNED_PATH, SCENE
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.core import LONGEST, Planner
-from services.recordings.table import exchanges_of
-from services.replay import planner_answers, planner_jog
-from services.replay.comparison import Comparison
-from services.replay.planner_answers import AnswersAgain
-from services.replay.planner_jog import JogAgain
-from services.replay.recorded import Heard, NotReplayable, Recorded
-from services.replay.scenes import Scenes
+from gemelo.schemas.planning import PlanCode, PlanInputs, PlanningTimes, PlanRequest, PlanResponse, SceneVersion
+from gemelo.schemas.topics import JOG_INPUTS, PLAN, PLAN_INPUTS, PLANNED_PATH, SCENE
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.core import LONGEST, Planner
+from gemelo.services.recordings.table import exchanges_of
+from gemelo.services.replay import planner_answers, planner_jog
+from gemelo.services.replay.comparison import Comparison
+from gemelo.services.replay.planner_answers import AnswersAgain
+from gemelo.services.replay.planner_jog import JogAgain
+from gemelo.services.replay.recorded import Heard, NotReplayable, Recorded
+from gemelo.services.replay.scenes import Scenes
 
 PLANS = exchanges_of(PLAN)
 TOPICS = tuple(dict.fromkeys((PLANS, PLAN_INPUTS, SCENE, PLANNED_PATH, *planner_answers.TOPICS, *planner_jog.TOPICS)))

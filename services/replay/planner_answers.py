@@ -8,20 +8,20 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from schemas.message import Message
-from schemas.planning import AnswerInputs
-from schemas.scene import SceneResponse
-from schemas.scene_meshes import by_digest
-from schemas.topics import ANSWER_INPUTS, FK, IK, SCENE, SCENE_EDIT, STATE_VALIDITY
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.kinematics.kinematic_requests import KinematicRequests
-from services.planner.scene.scene_store import SceneStore, changed
-from services.planner.scene.standing import link_poses, standing
-from services.recordings.table import exchanges_of
-from services.replay.comparison import Comparison
-from services.replay.recorded import Heard, Recorded
-from services.replay.scenes import Scenes
+from gemelo.schemas.message import Message
+from gemelo.schemas.planning import AnswerInputs
+from gemelo.schemas.scene import SceneResponse
+from gemelo.schemas.scene_meshes import by_digest
+from gemelo.schemas.topics import ANSWER_INPUTS, FK, IK, SCENE, SCENE_EDIT, STATE_VALIDITY
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
+from gemelo.services.planner.scene.scene_store import SceneStore, changed
+from gemelo.services.planner.scene.standing import link_poses, standing
+from gemelo.services.recordings.table import exchanges_of
+from gemelo.services.replay.comparison import Comparison
+from gemelo.services.replay.recorded import Heard, Recorded
+from gemelo.services.replay.scenes import Scenes
 
 REQUESTS = (FK, IK, STATE_VALIDITY, SCENE_EDIT)
 EXCHANGES = {request: exchanges_of(request) for request in REQUESTS}

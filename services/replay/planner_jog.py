@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from schemas.planning import JogTaken, JogTick
-from schemas.topics import JOG_INPUTS, JOG_STATUS, JOINT_TARGETS, SCENE
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.jog.jog import Jog, signed
-from services.planner.jog.jog_log import digest_of
-from services.replay.comparison import ABSENT, Comparison
-from services.replay.recorded import Heard, Recorded
-from services.replay.scenes import Scenes
+from gemelo.schemas.planning import JogTaken, JogTick
+from gemelo.schemas.topics import JOG_INPUTS, JOG_STATUS, JOINT_TARGETS, SCENE
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.jog.jog import Jog, signed
+from gemelo.services.planner.jog.jog_log import digest_of
+from gemelo.services.replay.comparison import ABSENT, Comparison
+from gemelo.services.replay.recorded import Heard, Recorded
+from gemelo.services.replay.scenes import Scenes
 
 TOPICS = (JOG_INPUTS, JOINT_TARGETS, JOG_STATUS, SCENE)
 PERIODS = "targets and statuses of one period of a jog"

@@ -13,17 +13,17 @@ from typing import Any, Generic, TypeVar, cast
 
 import msgspec
 
-from schemas.message import Message
-from schemas.scene import SceneMesh
-from schemas.text_file import read_text
-from schemas.topics import Topic, scene_mesh
-from services.arm.model.description import ArmDescription, load_arm
-from services.recordings.channels import schema_of
-from services.recordings.foreign import METADATA
-from services.recordings.mcap_file import DEPLOYMENT, ROBOT
-from services.recordings.reader import RecordingReader, Row
-from services.recordings.table import described
-from services.runtime.deployment import project_root
+from gemelo.schemas.message import Message
+from gemelo.schemas.scene import SceneMesh
+from gemelo.schemas.text_file import read_text
+from gemelo.schemas.topics import Topic, scene_mesh
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.recordings.channels import schema_of
+from gemelo.services.recordings.foreign import METADATA
+from gemelo.services.recordings.mcap_file import DEPLOYMENT, ROBOT
+from gemelo.services.recordings.reader import RecordingReader, Row
+from gemelo.services.recordings.table import described
+from gemelo.services.runtime.deployment import project_root
 
 M = TypeVar("M", bound=Message)
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from schemas.planning import SceneVersion
-from schemas.scene import PlanningScene
-from schemas.scene_meshes import with_meshes
-from schemas.topics import SCENE
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.collision.scene_shapes import SceneError
-from services.planner.collision.world import World
-from services.replay.recorded import Heard, NotReplayable, Recorded
-from services.runtime.deployment import project_root
+from gemelo.schemas.planning import SceneVersion
+from gemelo.schemas.scene import PlanningScene
+from gemelo.schemas.scene_meshes import with_meshes
+from gemelo.schemas.topics import SCENE
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.scene_shapes import SceneError
+from gemelo.services.planner.collision.world import World
+from gemelo.services.replay.recorded import Heard, NotReplayable, Recorded
+from gemelo.services.runtime.deployment import project_root
 
 
 class Scenes:

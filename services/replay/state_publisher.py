@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from schemas.topics import FRAMES, JOINT_STATES, STATIC_FRAMES
-from services.replay.comparison import Comparison
-from services.replay.recorded import NotReplayable, Recorded
-from services.state_publisher.core import StatePublisher
+from gemelo.schemas.topics import FRAMES, JOINT_STATES, STATIC_FRAMES
+from gemelo.services.replay.comparison import Comparison
+from gemelo.services.replay.recorded import NotReplayable, Recorded
+from gemelo.services.state_publisher.core import StatePublisher
 
 TOPICS = (JOINT_STATES, FRAMES, STATIC_FRAMES)
 UNHEARD = "joint_states without recorded frames: of a LATEST topic a reader may leave messages out"

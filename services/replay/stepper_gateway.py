@@ -11,9 +11,9 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from schemas.device import GatewayInputs
-from schemas.message import Message
-from schemas.topics import (
+from gemelo.schemas.device import GatewayInputs
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import (
     FOLLOW_JOINT_TRAJECTORY,
     GATEWAY,
     GATEWAY_INPUTS,
@@ -22,13 +22,13 @@ from schemas.topics import (
     Delivery,
     Topic,
 )
-from services.arm.model.description import ArmDescription
-from services.recordings.table import action_topics, recorded_topics
-from services.replay.comparison import ABSENT, Comparison
-from services.replay.recorded import AGAIN, Heard, NotReplayable, Recorded
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import BeganInput, Given, Input, Reply, digest_of, give, unpacked
-from services.stepper_gateway.outputs import GoalFinished, GripperFinished, Output, Publish, SendFrame
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.recordings.table import action_topics, recorded_topics
+from gemelo.services.replay.comparison import ABSENT, Comparison
+from gemelo.services.replay.recorded import AGAIN, Heard, NotReplayable, Recorded
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.inputs import BeganInput, Given, Input, Reply, digest_of, give, unpacked
+from gemelo.services.stepper_gateway.outputs import GoalFinished, GripperFinished, Output, Publish, SendFrame
 
 SAID = tuple(
     topic for topic in recorded_topics() if topic in TOPICS and topic.writer == GATEWAY and topic is not GATEWAY_INPUTS

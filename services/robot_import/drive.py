@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from services.arm.model.description import ArmDescription
-from services.arm.model.urdf import JointKind, UrdfJoint
-from services.arm.motors.speed import speed_limits
-from services.arm.motors.steps import exact_ratio
-from services.arm.motors.tick import fastest_steps
-from services.robot_import.parts import PINS, SWITCH_PINS, DriverPart, MotorPart, driver_named, motor_named
-from services.robot_import.questions import Questions, above_zero, one_of, whole, yes_or_no
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.services.arm.motors.speed import speed_limits
+from gemelo.services.arm.motors.steps import exact_ratio
+from gemelo.services.arm.motors.tick import fastest_steps
+from gemelo.services.robot_import.parts import PINS, SWITCH_PINS, DriverPart, MotorPart, driver_named, motor_named
+from gemelo.services.robot_import.questions import Questions, above_zero, one_of, whole, yes_or_no
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 PINION_RADIUS = 0.01  # [m]

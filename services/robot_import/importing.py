@@ -10,17 +10,17 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from services.arm.checks.check import check
-from services.arm.checks.findings import Finding, Severity, error
-from services.arm.errors import DescriptionError
-from services.arm.model.description import load_arm
-from services.arm.model.virtual_drive import NO_MOTORS
-from services.robot_import.drive import speed_lines
-from services.robot_import.questions import Questions, answers_text, read_answers, yes_or_no
-from services.robot_import.robot_folder import Description, step, write_robot
-from services.robot_import.source import RobotSource, find_source
-from services.robot_import.survey import Survey, surveyed
-from services.robot_import.trial import trial_findings
+from gemelo.services.arm.checks.check import check
+from gemelo.services.arm.checks.findings import Finding, Severity, error
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.arm.model.virtual_drive import NO_MOTORS
+from gemelo.services.robot_import.drive import speed_lines
+from gemelo.services.robot_import.questions import Questions, answers_text, read_answers, yes_or_no
+from gemelo.services.robot_import.robot_folder import Description, step, write_robot
+from gemelo.services.robot_import.source import RobotSource, find_source
+from gemelo.services.robot_import.survey import Survey, surveyed
+from gemelo.services.robot_import.trial import trial_findings
 
 ANSWERS_FILE = "import.toml"
 XACRO = "xacro."  # before the names of its arguments, in a file of answers

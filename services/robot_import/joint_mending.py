@@ -7,11 +7,11 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping
 
-from services.arm.frames.transforms import from_axis_angle, from_rpy, multiply, rotate, to_rpy
-from services.arm.model.urdf import JointKind, UrdfJoint
-from services.arm.model.xml_reader import XmlReader
-from services.robot_import.limits import MOST_TRAVEL, TURN
-from services.robot_import.mended import Mended
+from gemelo.services.arm.frames.transforms import from_axis_angle, from_rpy, multiply, rotate, to_rpy
+from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.services.arm.model.xml_reader import XmlReader
+from gemelo.services.robot_import.limits import MOST_TRAVEL, TURN
+from gemelo.services.robot_import.mended import Mended
 
 FREE = {"planar": "drives", "floating": "is free to move"}
 LEFT_BY_FIXING = ("axis", "limit", "dynamics", "mimic", "safety_controller", "calibration")

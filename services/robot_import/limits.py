@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 
-from services.arm.model.urdf import JointKind, Limit, UrdfJoint
-from services.robot_import.mended import Mended
-from services.robot_import.questions import Questions, above_zero, number
+from gemelo.services.arm.model.urdf import JointKind, Limit, UrdfJoint
+from gemelo.services.robot_import.mended import Mended
+from gemelo.services.robot_import.questions import Questions, above_zero, number
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 MOST_TRAVEL = {JointKind.REVOLUTE: 8.02 * math.pi, JointKind.PRISMATIC: 5.0}  # [rad], [m]: beyond it is another unit

@@ -5,13 +5,13 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from services.arm.checks.findings import Finding, error, note
-from services.arm.checks.meshes import SMALLEST, Facts, MeshFacts, facts_of, link_volume
-from services.arm.checks.units import LARGEST_GYRATION, gyration
-from services.arm.checks.urdf import UNTOUCHED, principal_moments
-from services.arm.model.urdf import UrdfLink
-from services.robot_import.mended import Mended, links_of, meshes_of, subject_of
-from services.robot_import.questions import Questions, yes_or_no
+from gemelo.services.arm.checks.findings import Finding, error, note
+from gemelo.services.arm.checks.meshes import SMALLEST, Facts, MeshFacts, facts_of, link_volume
+from gemelo.services.arm.checks.units import LARGEST_GYRATION, gyration
+from gemelo.services.arm.checks.urdf import UNTOUCHED, principal_moments
+from gemelo.services.arm.model.urdf import UrdfLink
+from gemelo.services.robot_import.mended import Mended, links_of, meshes_of, subject_of
+from gemelo.services.robot_import.questions import Questions, yes_or_no
 
 MOST_NAMED = 3
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from services.arm.checks.meshes import MOST_TRIANGLES, MeshFacts, facts_of, scene_of
-from services.arm.errors import DescriptionError
-from services.robot_import.coarser import coarser
-from services.robot_import.mended import Mended
-from services.robot_import.mending import safe_name
+from gemelo.services.arm.checks.meshes import MOST_TRIANGLES, MeshFacts, facts_of, scene_of
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.robot_import.coarser import coarser
+from gemelo.services.robot_import.mended import Mended
+from gemelo.services.robot_import.mending import safe_name
 
 KEPT = (".stl", ".glb")  # the viewer, the page and the fitting read these; other formats become .glb
 MOST_COARSER = MOST_TRIANGLES // 5  # triangles of a copy that is made coarser

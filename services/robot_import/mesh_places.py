@@ -8,12 +8,20 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.checks.meshes import IN_MILLIMETRES
-from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_rpy, inverse, to_rpy
-from services.arm.kinematics.chain import link_transforms
-from services.arm.model.urdf import Geometry, UrdfLink, UrdfModel
-from services.robot_import.link_boxes import Box, between, box_of, diagonal, distance_to, joints_at, longest_joint
-from services.robot_import.mended import Mended, links_of, subject_of
+from gemelo.services.arm.checks.meshes import IN_MILLIMETRES
+from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose, from_rpy, inverse, to_rpy
+from gemelo.services.arm.kinematics.chain import link_transforms
+from gemelo.services.arm.model.urdf import Geometry, UrdfLink, UrdfModel
+from gemelo.services.robot_import.link_boxes import (
+    Box,
+    between,
+    box_of,
+    diagonal,
+    distance_to,
+    joints_at,
+    longest_joint,
+)
+from gemelo.services.robot_import.mended import Mended, links_of, subject_of
 
 Array = NDArray[np.float64]
 

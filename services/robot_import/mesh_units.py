@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from services.arm.checks.meshes import IN_MILLIMETRES, MeshFacts
-from services.arm.model.urdf import Geometry, UrdfLink, UrdfModel
-from services.robot_import.link_boxes import carried_by, corners_of, longest_joint, placed, pose_of
-from services.robot_import.mended import Mended, meshes_of, subject_of
+from gemelo.services.arm.checks.meshes import IN_MILLIMETRES, MeshFacts
+from gemelo.services.arm.model.urdf import Geometry, UrdfLink, UrdfModel
+from gemelo.services.robot_import.link_boxes import carried_by, corners_of, longest_joint, placed, pose_of
+from gemelo.services.robot_import.mended import Mended, meshes_of, subject_of
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}  # [m]

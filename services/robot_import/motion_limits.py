@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 
-from services.arm.checks.urdf import follower_range
-from services.arm.model.urdf import JointKind, Limit, UrdfJoint
-from services.robot_import.mended import Mended, numbers_in
+from gemelo.services.arm.checks.urdf import follower_range
+from gemelo.services.arm.model.urdf import JointKind, Limit, UrdfJoint
+from gemelo.services.robot_import.mended import Mended, numbers_in
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 PLACES = 9  # significant digits of a limit that is written

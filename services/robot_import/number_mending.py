@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 
-from services.arm.model.urdf import JointKind
-from services.arm.model.xml_reader import MINUSES
-from services.robot_import.joint_mending import FREE
-from services.robot_import.mended import Mended, numbers_in
+from gemelo.services.arm.model.urdf import JointKind
+from gemelo.services.arm.model.xml_reader import MINUSES
+from gemelo.services.robot_import.joint_mending import FREE
+from gemelo.services.robot_import.mended import Mended, numbers_in
 
 TEXTS = ("name", "link", "joint", "type", "filename")  # attributes that are no numbers
 SEVERAL = ("xyz", "rpy", "scale", "size")

@@ -1,6 +1,6 @@
 """The pairs of links of a new robot's folder that need no check, sampled in a process of its own.
 
-`python -m services.robot_import.pairs ROBOT_FOLDER METRES` prints each pair as JSON, one a line; links
+`python -m gemelo.services.robot_import.pairs ROBOT_FOLDER METRES` prints each pair as JSON, one a line; links
 that are never farther apart than METRES are always near.
 """
 
@@ -14,18 +14,18 @@ from pathlib import Path
 
 import msgspec
 
-from services.arm.checks.findings import Finding, error, warning
-from services.arm.errors import DescriptionError
-from services.arm.kinematics.collision_matrix import LinkPairData, collision_matrix
-from services.arm.model.description import ArmDescription, load_arm
-from services.arm.model.srdf_edit import with_pairs
-from services.robot_import.mended import Mended
-from services.robot_import.questions import yes_or_no
-from services.robot_import.semantics import OF_SRDF
+from gemelo.services.arm.checks.findings import Finding, error, warning
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.kinematics.collision_matrix import LinkPairData, collision_matrix
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.arm.model.srdf_edit import with_pairs
+from gemelo.services.robot_import.mended import Mended
+from gemelo.services.robot_import.questions import yes_or_no
+from gemelo.services.robot_import.semantics import OF_SRDF
 
 # Of the steps in processes of their own: with matrices of three columns the threads of BLAS cost a fourth more CPU.
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
-MODULE = "services.robot_import.pairs"
+MODULE = "gemelo.services.robot_import.pairs"
 MOST_NAMED = 3  # pairs of an SRDF that can touch
 BY_PERSON = "User"  # the reason of a pair that a person has excused
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 
-from services.arm.frames.transforms import IDENTITY, Rigid, compose
-from services.arm.kinematics.chain import origin_of
-from services.arm.model.urdf import JointKind
-from services.robot_import.link_boxes import pose_of
-from services.robot_import.mended import Mended, links_of, subject_of
-from services.robot_import.mesh_places import set_origin
+from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose
+from gemelo.services.arm.kinematics.chain import origin_of
+from gemelo.services.arm.model.urdf import JointKind
+from gemelo.services.robot_import.link_boxes import pose_of
+from gemelo.services.robot_import.mended import Mended, links_of, subject_of
+from gemelo.services.robot_import.mesh_places import set_origin
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 MOST_PARTS = 40  # links with shapes: of more, pairs are sampled for minutes, and the native planner takes 64

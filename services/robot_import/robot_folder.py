@@ -13,25 +13,25 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from schemas.text_file import read_text
-from services.arm.checks.findings import Finding, Severity, note
-from services.arm.checks.meshes import MeshFacts
-from services.arm.errors import DescriptionError
-from services.arm.model.description import load_arm
-from services.arm.model.srdf_edit import entries, with_pairs
-from services.arm.model.urdf import UrdfJoint, UrdfLink, UrdfModel
-from services.arm.model.virtual_drive import device_name
-from services.robot_import.drive import JointDrive, bare_toml, driven_toml
-from services.robot_import.mended import Mended
-from services.robot_import.mesh_copies import copy_meshes
-from services.robot_import.pairs import ONE_THREAD, sampled_pairs, write_pairs
-from services.robot_import.poses import NamedStates, named_states, srdf_text, zero_state
-from services.robot_import.semantics import srdf_lines
+from gemelo.schemas.text_file import read_text
+from gemelo.services.arm.checks.findings import Finding, Severity, note
+from gemelo.services.arm.checks.meshes import MeshFacts
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.arm.model.srdf_edit import entries, with_pairs
+from gemelo.services.arm.model.urdf import UrdfJoint, UrdfLink, UrdfModel
+from gemelo.services.arm.model.virtual_drive import device_name
+from gemelo.services.robot_import.drive import JointDrive, bare_toml, driven_toml
+from gemelo.services.robot_import.mended import Mended
+from gemelo.services.robot_import.mesh_copies import copy_meshes
+from gemelo.services.robot_import.pairs import ONE_THREAD, sampled_pairs, write_pairs
+from gemelo.services.robot_import.poses import NamedStates, named_states, srdf_text, zero_state
+from gemelo.services.robot_import.semantics import srdf_lines
 
 # [m] chosen: what shapes that are fitted to meshes may stand beyond them. Links that are never farther apart than this
 # beyond the clearance are parts of one hinge, whose true distance such shapes cannot tell.
 EXCESS, EXCESS_SHARE = 0.005, 0.01  # the latter of the longest mesh
-COMMAND_LINE = "services.cli.main"  # its steps in a process of their own: they load the planner
+COMMAND_LINE = "gemelo.services.cli.main"  # its steps in a process of their own: they load the planner
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from services.arm.errors import DescriptionError, nearest_name
-from services.robot_import.xacro_files import SUFFIX, expanded, outermost
+from gemelo.services.arm.errors import DescriptionError, nearest_name
+from gemelo.services.robot_import.xacro_files import SUFFIX, expanded, outermost
 
 BESIDE = 2  # innermost folders, whose meshes are the file's own without a package
 DEPTH = 4  # folders below a package in which its configuration may be

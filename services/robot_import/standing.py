@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from services.arm.device.device_config import MAX_COUNTS
-from services.arm.errors import suggestion
-from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
-from services.arm.model.virtual_drive import driven_joints
-from services.robot_import.joint_mending import stand_at
-from services.robot_import.mended import Mended
-from services.robot_import.poses import zero_state
-from services.robot_import.questions import Questions, yes_or_no
+from gemelo.services.arm.device.device_config import MAX_COUNTS
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
+from gemelo.services.arm.model.virtual_drive import driven_joints
+from gemelo.services.robot_import.joint_mending import stand_at
+from gemelo.services.robot_import.mended import Mended
+from gemelo.services.robot_import.poses import zero_state
+from gemelo.services.robot_import.questions import Questions, yes_or_no
 
 MOST = MAX_COUNTS["joint"]  # that one device drives
 FEW = 3  # names that are said

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 
-from services.arm.checks.units import joint_lengths
-from services.arm.model.urdf import UrdfJoint
-from services.robot_import.mended import Mended
+from gemelo.services.arm.checks.units import joint_lengths
+from gemelo.services.arm.model.urdf import UrdfJoint
+from gemelo.services.robot_import.mended import Mended
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 RADIUS_SHARE = 0.025  # of the longest rod: thin, and yet seen

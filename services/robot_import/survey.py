@@ -5,25 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from services.arm.checks.findings import Finding, Severity, error
-from services.arm.checks.meshes import MOST_TRIANGLES, MeshFacts
-from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.urdf import UrdfModel
-from services.arm.model.virtual_drive import MAX_NAME, device_name, driven_joints
-from services.robot_import import motion_limits
-from services.robot_import.drive import ask_drives
-from services.robot_import.limits import ask_limits
-from services.robot_import.link_mending import shapeless, untouched
-from services.robot_import.mended import Mended, meshes_of, subject_of
-from services.robot_import.mending import mend, safe_name
-from services.robot_import.parts import MOTORS, USUAL_DRIVER, DriverPart, MotorPart, driver_named, motor_named
-from services.robot_import.questions import Questions, yes_or_no
-from services.robot_import.rigid_groups import merge_rigid
-from services.robot_import.robot_folder import Description
-from services.robot_import.semantics import semantics
-from services.robot_import.source import RobotSource
-from services.robot_import.standing import ask_who_stands
-from services.robot_import.tool_link import other_tools, tool_link
+from gemelo.services.arm.checks.findings import Finding, Severity, error
+from gemelo.services.arm.checks.meshes import MOST_TRIANGLES, MeshFacts
+from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.services.arm.model.urdf import UrdfModel
+from gemelo.services.arm.model.virtual_drive import MAX_NAME, device_name, driven_joints
+from gemelo.services.robot_import import motion_limits
+from gemelo.services.robot_import.drive import ask_drives
+from gemelo.services.robot_import.limits import ask_limits
+from gemelo.services.robot_import.link_mending import shapeless, untouched
+from gemelo.services.robot_import.mended import Mended, meshes_of, subject_of
+from gemelo.services.robot_import.mending import mend, safe_name
+from gemelo.services.robot_import.parts import MOTORS, USUAL_DRIVER, DriverPart, MotorPart, driver_named, motor_named
+from gemelo.services.robot_import.questions import Questions, yes_or_no
+from gemelo.services.robot_import.rigid_groups import merge_rigid
+from gemelo.services.robot_import.robot_folder import Description
+from gemelo.services.robot_import.semantics import semantics
+from gemelo.services.robot_import.source import RobotSource
+from gemelo.services.robot_import.standing import ask_who_stands
+from gemelo.services.robot_import.tool_link import other_tools, tool_link
 
 LONGEST_NAME = 60  # letters: with what others add it is a folder's name everywhere
 NOT_IN_A_NAME = r"[^A-Za-z0-9_-]+"

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import msgspec
 
-from services.arm.checks.findings import Finding, error
+from gemelo.services.arm.checks.findings import Finding, error
 
-TRIAL = "services.planner.trial"
+TRIAL = "gemelo.services.planner.trial"
 
 
 def trial_findings(folder: Path) -> list[Finding]:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 
-from services.arm.checks.units import (
+from gemelo.services.arm.checks.units import (
     LARGEST_GYRATION,
     MOST_TURN,
     gyration,
     in_millimetres_message,
     is_drawn_in_millimetres,
 )
-from services.arm.checks.urdf import principal_moments
-from services.arm.model.urdf import JointKind
-from services.robot_import.mended import Mended, links_of, numbers_in
+from gemelo.services.arm.checks.urdf import principal_moments
+from gemelo.services.arm.model.urdf import JointKind
+from gemelo.services.robot_import.mended import Mended, links_of, numbers_in
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 MILLIMETRE, DEGREE = 0.001, math.pi / 180.0  # [m], [rad]

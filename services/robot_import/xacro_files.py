@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
-from services.arm.errors import DescriptionError, suggestion
-from services.robot_import.xacro_sandbox.keeper import Confined, Failed, expand
+from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.services.robot_import.xacro_sandbox.keeper import Confined, Failed, expand
 
 SUFFIX = ".xacro"
 NO_XACRO = (

@@ -7,15 +7,21 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from schemas.deployment import Deployment
-from schemas.errors import ConfigurationError
-from services.runtime.deployment import load_deployment
-from services.runtime.errors import BusError, RequestRefused
-from services.runtime.node import Node
-from services.runtime.process.freed_memory import give_back_freed_memory
-from services.runtime.process.leaving import end_process
-from services.runtime.process.logs import LEVELS, line_logger
-from services.runtime.process.shutdown import GRACE, ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.errors import ConfigurationError
+from gemelo.services.runtime.deployment import load_deployment
+from gemelo.services.runtime.errors import BusError, RequestRefused
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.freed_memory import give_back_freed_memory
+from gemelo.services.runtime.process.leaving import end_process
+from gemelo.services.runtime.process.logs import LEVELS, line_logger
+from gemelo.services.runtime.process.shutdown import (
+    GRACE,
+    ShutdownRequest,
+    end_soon,
+    end_with_any_thread,
+    stop_on_signals,
+)
 
 Run = Callable[[Node, Deployment], None]
 EXPECTED = (ConfigurationError, BusError, RequestRefused)  # a sentence says all; anything else shows where it happened

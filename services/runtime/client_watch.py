@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from services.runtime.bus.interface import Declaration
+from gemelo.services.runtime.bus.interface import Declaration
 
 Watch = Callable[[str, Callable[[bool], None]], Declaration]
 

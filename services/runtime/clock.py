@@ -1,6 +1,6 @@
 """The clock of a process, with all that differs from one run to the next: time, random numbers, its own number.
 
-Everything in `services.runtime` and `gemelo` takes them from the clock of its bus. `SYSTEM` is that of
+Everything in `gemelo.services.runtime` and `gemelo` takes them from the clock of its bus. `SYSTEM` is that of
 every real process; a simulation has one of virtual time, in which the same seed gives the same bytes
 (`services/simulation/virtual_clock.py`).
 """

@@ -15,9 +15,9 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from schemas.deployment import Deployment, DeploymentRecord
-from schemas.errors import ConfigurationError
-from schemas.text_file import NotUtf8, read_text
+from gemelo.schemas.deployment import Deployment, DeploymentRecord
+from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.text_file import NotUtf8, read_text
 
 DEFAULT_FILE = "deploy/local.toml"
 MQTT_FILES = (

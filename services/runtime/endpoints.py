@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from schemas.system import (
+from gemelo.schemas.system import (
     Empty,
     Interfaces,
     NodeInfo,
@@ -19,14 +19,14 @@ from schemas.system import (
     TopicInterface,
     TopicStatistics,
 )
-from schemas.topics import Request, Topic
-from services.runtime.actions.server import ActionServer
-from services.runtime.bus.branches import branch_of
-from services.runtime.bus.identity import Identity
-from services.runtime.clock import SYSTEM, Clock
-from services.runtime.loop.loop import LoopFigures
-from services.runtime.requests.server import RequestServer
-from services.runtime.topics import Publisher, Subscription
+from gemelo.schemas.topics import Request, Topic
+from gemelo.services.runtime.actions.server import ActionServer
+from gemelo.services.runtime.bus.branches import branch_of
+from gemelo.services.runtime.bus.identity import Identity
+from gemelo.services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.loop.loop import LoopFigures
+from gemelo.services.runtime.requests.server import RequestServer
+from gemelo.services.runtime.topics import Publisher, Subscription
 
 
 def info_request(node: str) -> Request[Empty, NodeInfo]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from services.runtime.serial_frames import build_frame
+from gemelo.services.runtime.serial_frames import build_frame
 
 UPDATE = 18  # frame type
 PIECE = 4096  # [bytes] of an image in one frame: a sector of the flash

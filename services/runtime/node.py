@@ -11,9 +11,9 @@ from typing import Self, TypeVar
 
 import msgspec
 
-from schemas.deployment import Deployment
-from schemas.message import Message
-from schemas.system import (
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.message import Message
+from gemelo.schemas.system import (
     NodeFiles,
     NodeInfo,
     Parameter,
@@ -22,20 +22,20 @@ from schemas.system import (
     SetParameter,
     TopicStatistics,
 )
-from schemas.topics import LOG, PARAMETER_CHANGES, STATISTICS, Action, Request, Topic
-from services.runtime.actions.client import ActionClient
-from services.runtime.actions.server import ActionServer, OnCancel, OnGoal, ReadGoal
-from services.runtime.bus import identity
-from services.runtime.bus.branches import principal_of
-from services.runtime.bus.connection import await_router, connect
-from services.runtime.bus.interface import Bus, Declaration
-from services.runtime.bus.name_holder import NameHolder, StopWatch
-from services.runtime.bus.wire import Encoded, encoded
-from services.runtime.certificate_watch import CertificateWatch
-from services.runtime.client_watch import Absences, ClientWatch
-from services.runtime.clock import SYSTEM, Clock
-from services.runtime.deployment import load_deployment, project_root, robot_name
-from services.runtime.endpoints import (
+from gemelo.schemas.topics import LOG, PARAMETER_CHANGES, STATISTICS, Action, Request, Topic
+from gemelo.services.runtime.actions.client import ActionClient
+from gemelo.services.runtime.actions.server import ActionServer, OnCancel, OnGoal, ReadGoal
+from gemelo.services.runtime.bus import identity
+from gemelo.services.runtime.bus.branches import principal_of
+from gemelo.services.runtime.bus.connection import await_router, connect
+from gemelo.services.runtime.bus.interface import Bus, Declaration
+from gemelo.services.runtime.bus.name_holder import NameHolder, StopWatch
+from gemelo.services.runtime.bus.wire import Encoded, encoded
+from gemelo.services.runtime.certificate_watch import CertificateWatch
+from gemelo.services.runtime.client_watch import Absences, ClientWatch
+from gemelo.services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.deployment import load_deployment, project_root, robot_name
+from gemelo.services.runtime.endpoints import (
     LoopStatistics,
     NodeEndpoints,
     info_request,
@@ -43,23 +43,23 @@ from services.runtime.endpoints import (
     parameter_request,
     parameters_request,
 )
-from services.runtime.errors import NodeNameTaken
-from services.runtime.loop.failures import Failures
-from services.runtime.loop.loop import Loop
-from services.runtime.loop.task_queue import Worker
-from services.runtime.parameters import ParameterRegistry, ParameterSet
-from services.runtime.process.logs import BusHandler, line_logger
-from services.runtime.process.readiness import Readiness
-from services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
-from services.runtime.process.unwritten import UnwrittenFiles
-from services.runtime.requests import client as requests
-from services.runtime.requests.exchanges import exchange_topic
-from services.runtime.requests.limits import RequestRates
-from services.runtime.requests.server import Pending, RequestServer, UrgentServer
-from services.runtime.running import find_deployment
-from services.runtime.saved_parameters import SavedParameters
-from services.runtime.started import load_started
-from services.runtime.topics import Latest, LatestOnDemand, Publisher, Subscription
+from gemelo.services.runtime.errors import NodeNameTaken
+from gemelo.services.runtime.loop.failures import Failures
+from gemelo.services.runtime.loop.loop import Loop
+from gemelo.services.runtime.loop.task_queue import Worker
+from gemelo.services.runtime.parameters import ParameterRegistry, ParameterSet
+from gemelo.services.runtime.process.logs import BusHandler, line_logger
+from gemelo.services.runtime.process.readiness import Readiness
+from gemelo.services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.services.runtime.requests import client as requests
+from gemelo.services.runtime.requests.exchanges import exchange_topic
+from gemelo.services.runtime.requests.limits import RequestRates
+from gemelo.services.runtime.requests.server import Pending, RequestServer, UrgentServer
+from gemelo.services.runtime.running import find_deployment
+from gemelo.services.runtime.saved_parameters import SavedParameters
+from gemelo.services.runtime.started import load_started
+from gemelo.services.runtime.topics import Latest, LatestOnDemand, Publisher, Subscription
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import threading
 from collections import deque
 
-from schemas.system import Empty, NodeInfo
-from services.runtime.clock_offset import ClockOffset, best, measured
-from services.runtime.endpoints import info_request
-from services.runtime.errors import NoAnswer, RequestRefused
-from services.runtime.node import Node
-from services.runtime.requests.client import PendingCall
+from gemelo.schemas.system import Empty, NodeInfo
+from gemelo.services.runtime.clock_offset import ClockOffset, best, measured
+from gemelo.services.runtime.endpoints import info_request
+from gemelo.services.runtime.errors import NoAnswer, RequestRefused
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.requests.client import PendingCall
 
 PERIOD = 2.0  # [s] between two questions
 TIMEOUT = 1.0  # [s] an answer that took longer would say little

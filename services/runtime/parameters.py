@@ -10,9 +10,9 @@ from typing import Any, Generic, TypeVar, cast
 
 import msgspec
 
-from schemas.system import Empty, Parameter, Parameters, ParameterValue, SetParameter
-from services.runtime.errors import RequestRefused
-from services.runtime.saved_parameters import SavedParameters
+from gemelo.schemas.system import Empty, Parameter, Parameters, ParameterValue, SetParameter
+from gemelo.services.runtime.errors import RequestRefused
+from gemelo.services.runtime.saved_parameters import SavedParameters
 
 P = TypeVar("P", bound=msgspec.Struct)
 

@@ -11,12 +11,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from schemas.roles import ROLES, Role, carried_out_by, served_by, written_by
-from schemas.topics import ACTIONS, REQUESTS, Request
-from services.runtime.actions import keys
-from services.runtime.bus.branches import asked_under, read_under, served_under, written_under
-from services.runtime.bus.identity import ALIVE, IDENTITY
-from services.runtime.requests.exchanges import exchange_topic
+from gemelo.schemas.roles import ROLES, Role, carried_out_by, served_by, written_by
+from gemelo.schemas.topics import ACTIONS, REQUESTS, Request
+from gemelo.services.runtime.actions import keys
+from gemelo.services.runtime.bus.branches import asked_under, read_under, served_under, written_under
+from gemelo.services.runtime.bus.identity import ALIVE, IDENTITY
+from gemelo.services.runtime.requests.exchanges import exchange_topic
 
 ADVANCED = "@adv/**"  # below an EVERY or LATCHED key: Zenoh's heartbeat, cache and token of its writer
 ABOUT = ("info", "interfaces", "parameters/list")  # what every node answers about itself

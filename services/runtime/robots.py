@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.deployment import RouterSection
-from services.runtime.bus.identity import ALIVE, addresses
+from gemelo.schemas.deployment import RouterSection
+from gemelo.services.runtime.bus.identity import ALIVE, addresses
 
 TO_ANSWER = 1.0  # [s] for the router to list the liveliness tokens
 
@@ -20,7 +20,7 @@ def nodes_on(router: RouterSection) -> dict[str, frozenset[str]]:
     """
     import zenoh  # slow to load
 
-    from services.runtime.bus.zenoh_config import client_config
+    from gemelo.services.runtime.bus.zenoh_config import client_config
 
     try:
         with zenoh.open(client_config(router)) as session:

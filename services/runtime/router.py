@@ -12,17 +12,17 @@ from pathlib import Path
 
 import zenoh
 
-from schemas.deployment import RouterSection
-from services.runtime.bus.dead_links import end_dead_links
-from services.runtime.bus.zenoh_config import router_config
-from services.runtime.certificate_watch import CertificateWatch
-from services.runtime.deployment import DeploymentError, exposure, load_deployment
-from services.runtime.process.logs import LEVELS, line_logger
-from services.runtime.process.ports import PortTaken, require_free
-from services.runtime.process.priority import step_ahead
-from services.runtime.process.readiness import Readiness
-from services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
-from services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.schemas.deployment import RouterSection
+from gemelo.services.runtime.bus.dead_links import end_dead_links
+from gemelo.services.runtime.bus.zenoh_config import router_config
+from gemelo.services.runtime.certificate_watch import CertificateWatch
+from gemelo.services.runtime.deployment import DeploymentError, exposure, load_deployment
+from gemelo.services.runtime.process.logs import LEVELS, line_logger
+from gemelo.services.runtime.process.ports import PortTaken, require_free
+from gemelo.services.runtime.process.priority import step_ahead
+from gemelo.services.runtime.process.readiness import Readiness
+from gemelo.services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles
 
 BEAT = 1.0  # [s]
 _LOCATOR = re.compile(r"(tcp|tls)/(.+):(\d+)")

@@ -9,12 +9,12 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from schemas.deployment import Deployment, RouterSection
-from schemas.errors import ConfigurationError
-from schemas.system import Empty, NodeInfo
-from services.runtime.deployment import CONFIG, PREFIX, load_deployment, project_root, robot_name
-from services.runtime.robots import nodes_on
-from services.runtime.started import chosen_name, deployment_of_arm, load_started
+from gemelo.schemas.deployment import Deployment, RouterSection
+from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.system import Empty, NodeInfo
+from gemelo.services.runtime.deployment import CONFIG, PREFIX, load_deployment, project_root, robot_name
+from gemelo.services.runtime.robots import nodes_on
+from gemelo.services.runtime.started import chosen_name, deployment_of_arm, load_started
 
 GATEWAY = "stepper_gateway"
 TELLERS = (GATEWAY, "planner", "state_publisher", "camera")  # a robot without any of them is a recording that is played
@@ -130,10 +130,10 @@ def _of_robot(base: Deployment, name: str) -> Deployment:
 
 def ask_files(router: RouterSection, robot: str, nodes: Iterable[str]) -> NodeInfo | None:
     """What the first of its nodes that tells says of itself and its files; None where none answers."""
-    from services.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus  # slow to load: zenoh
-    from services.runtime.endpoints import info_request
-    from services.runtime.errors import BusError, NoAnswer, RequestRefused
-    from services.runtime.requests.client import call
+    from gemelo.services.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus  # slow to load: zenoh
+    from gemelo.services.runtime.endpoints import info_request
+    from gemelo.services.runtime.errors import BusError, NoAnswer, RequestRefused
+    from gemelo.services.runtime.requests.client import call
 
     try:
         bus = ZenohBus(router, robot)

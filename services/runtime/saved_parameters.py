@@ -9,9 +9,9 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
-from schemas.system import ParameterValue
-from schemas.text_file import NotUtf8, read_text
-from services.runtime.errors import RequestRefused
+from gemelo.schemas.system import ParameterValue
+from gemelo.schemas.text_file import NotUtf8, read_text
+from gemelo.services.runtime.errors import RequestRefused
 
 FOLDER = "parameters"
 HEAD = "# As `gemelo param set --save` has left them; without this file the node starts as its deployment says.\n"

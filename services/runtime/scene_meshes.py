@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from schemas.message import Message
-from schemas.scene import PlanningScene, SceneMesh
-from schemas.scene_meshes import digests_in, mesh_digest, with_meshes
-from schemas.topics import Topic, scene_mesh
-from services.runtime.node import Node
-from services.runtime.topics import Subscription
+from gemelo.schemas.message import Message
+from gemelo.schemas.scene import PlanningScene, SceneMesh
+from gemelo.schemas.scene_meshes import digests_in, mesh_digest, with_meshes
+from gemelo.schemas.topics import Topic, scene_mesh
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.topics import Subscription
 
 OnMessage = Callable[[Topic[Any], Message], object]
 

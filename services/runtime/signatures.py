@@ -6,7 +6,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from schemas.errors import ConfigurationError
+from gemelo.schemas.errors import ConfigurationError
 
 
 class SignatureError(ConfigurationError):

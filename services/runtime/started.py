@@ -7,10 +7,10 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
-from schemas.deployment import Deployment
-from schemas.text_file import NotUtf8, read_text
-from services.runtime.deployment import ARMS, CONFIG, PREFIX, load_deployment, overriding, project_root
-from services.runtime.saved_parameters import toml
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.text_file import NotUtf8, read_text
+from gemelo.services.runtime.deployment import ARMS, CONFIG, PREFIX, load_deployment, overriding, project_root
+from gemelo.services.runtime.saved_parameters import toml
 
 FILE = ".gemelo/started.toml"  # of the project; $GEMELO_STARTED is another, for a stack of its own beside it
 USE = "use"  # beside it

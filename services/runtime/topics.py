@@ -6,15 +6,15 @@ import threading
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
-from schemas.message import BadMessage, Message
-from schemas.system import TopicStatistics
-from schemas.topics import ANY, Delivery, Topic
-from services.runtime.bus.branches import is_of_many, name_in
-from services.runtime.bus.interface import Arrival, Bus
-from services.runtime.bus.wire import Encoded, encoded, from_arrival, schema_of
-from services.runtime.clock import SYSTEM, Clock
-from services.runtime.loop.loop import Loop
-from services.runtime.loop.task_queue import ArrivalQueue, EveryQueue, LatestQueue, UnreadQueue
+from gemelo.schemas.message import BadMessage, Message
+from gemelo.schemas.system import TopicStatistics
+from gemelo.schemas.topics import ANY, Delivery, Topic
+from gemelo.services.runtime.bus.branches import is_of_many, name_in
+from gemelo.services.runtime.bus.interface import Arrival, Bus
+from gemelo.services.runtime.bus.wire import Encoded, encoded, from_arrival, schema_of
+from gemelo.services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.loop.loop import Loop
+from gemelo.services.runtime.loop.task_queue import ArrivalQueue, EveryQueue, LatestQueue, UnreadQueue
 
 M = TypeVar("M", bound=Message)
 

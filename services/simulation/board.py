@@ -8,17 +8,17 @@ from pathlib import Path
 
 import msgspec
 
-from firmware.platform.host.board import Board
-from firmware.platform.host.memory import StoredPosition
-from firmware.platform.host.virtual_esp32 import VirtualEsp32
-from firmware.platform.host.wires import Wires
-from schemas.robot import Motor
-from services.arm.device.device_config import reference_steps
-from services.arm.model.description import ArmDescription
-from services.runtime.process.readiness import Readiness
-from services.runtime.process.unwritten import UnwrittenFiles
-from services.simulation.memory_wire import MemoryWire
-from services.simulation.virtual_clock import VirtualClock
+from gemelo.firmware.platform.host.board import Board
+from gemelo.firmware.platform.host.memory import StoredPosition
+from gemelo.firmware.platform.host.virtual_esp32 import VirtualEsp32
+from gemelo.firmware.platform.host.wires import Wires
+from gemelo.schemas.robot import Motor
+from gemelo.services.arm.device.device_config import reference_steps
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.runtime.process.readiness import Readiness
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.services.simulation.memory_wire import MemoryWire
+from gemelo.services.simulation.virtual_clock import VirtualClock
 
 NAME = "virtual_esp32"
 PERIOD = 0.02  # [s] between two turns of a board to which nothing comes: as often its state is due

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from queue import SimpleQueue
 
-from firmware.bindings.device import CoreDevice
-from firmware.bindings.frames import OutFrame
-from firmware.platform.host.flash import NetworkCredentials
-from firmware.platform.host.link import REPORTS, Connected, Item, MqttMessage
-from firmware.platform.host.network import offline_status
-from schemas.simulation import WireConditions
-from services.simulation.virtual_clock import VirtualClock
-from services.stepper_gateway.links.connection import ReceiveQueue
-from services.stepper_gateway.links.link import Kind, Received
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.firmware.bindings.frames import OutFrame
+from gemelo.firmware.platform.host.flash import NetworkCredentials
+from gemelo.firmware.platform.host.link import REPORTS, Connected, Item, MqttMessage
+from gemelo.firmware.platform.host.network import offline_status
+from gemelo.schemas.simulation import WireConditions
+from gemelo.services.simulation.virtual_clock import VirtualClock
+from gemelo.services.stepper_gateway.links.connection import ReceiveQueue
+from gemelo.services.stepper_gateway.links.link import Kind, Received
 
 # A broker keeps status, event and configuration until they are delivered. Heartbeats are spared because two lost ones
 # hold the device, as they should: who wants that cuts the wire.

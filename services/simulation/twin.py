@@ -10,18 +10,18 @@ from typing import Any, NamedTuple
 
 from msgspec.structs import replace
 
-from schemas.deployment import Deployment, PathsSection, RouterSection
-from schemas.robot import Motor
-from schemas.simulation import WireConditions
-from schemas.system import ParameterValue
-from services.arm.device.device_config import device_config
-from services.arm.model.description import ArmDescription
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
-from services.simulation.board import SimulatedBoard, keep_position
-from services.simulation.memory_wire import MemoryWire
-from services.simulation.virtual_clock import VirtualClock
+from gemelo.schemas.deployment import Deployment, PathsSection, RouterSection
+from gemelo.schemas.robot import Motor
+from gemelo.schemas.simulation import WireConditions
+from gemelo.schemas.system import ParameterValue
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
+from gemelo.services.simulation.board import SimulatedBoard, keep_position
+from gemelo.services.simulation.memory_wire import MemoryWire
+from gemelo.services.simulation.virtual_clock import VirtualClock
 
 EXTRAS = {"planner": "planner", "camera": "eyes", "detector": "eyes"}  # of pyproject.toml, by service
 UNRECORDED: dict[str, ParameterValue] = {"record_inputs": False}  # nobody replays them, and they cost a fifth
@@ -133,7 +133,7 @@ def _within(deployment: Deployment, folder: Path) -> Deployment:
 def _shell(name: str) -> Any:
     """The module of a service's shell; raises `MissingPart` where a library is not installed."""
     try:
-        return import_module(f"services.{name}.main")
+        return import_module(f"gemelo.services.{name}.main")
     except ModuleNotFoundError as error:
         extra = EXTRAS.get(name, "")
         raise MissingPart(

@@ -22,9 +22,9 @@ from queue import Empty, SimpleQueue
 from types import FrameType
 from typing import TypeVar
 
-from services.runtime.clock import DrivenLoop
-from services.simulation.baton import Baton, VirtualCondition
-from services.simulation.participants import IdleTime, Participant, Wait
+from gemelo.services.runtime.clock import DrivenLoop
+from gemelo.services.simulation.baton import Baton, VirtualCondition
+from gemelo.services.simulation.participants import IdleTime, Participant, Wait
 
 T = TypeVar("T")
 
@@ -56,7 +56,7 @@ class LoopTurns:
 
 
 class VirtualClock:
-    """The clock of one simulation; see `services.runtime.clock.Clock`."""
+    """The clock of one simulation; see `gemelo.services.runtime.clock.Clock`."""
 
     is_virtual = True
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import msgspec
 from msgspec.structs import replace
 
-from schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
-from schemas.errors import ConfigurationError
-from services.arm.errors import suggestion
-from services.arm.model.description import ArmDescription, load_arm
-from services.hosts.quoting import Value, toml
-from services.runtime.deployment import ARMS
+from gemelo.schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
+from gemelo.schemas.errors import ConfigurationError
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.hosts.quoting import Value, toml
+from gemelo.services.runtime.deployment import ARMS
 
 HEADER = "# Written by `make up ARMS=...`, of deploy/local.toml and of the environment then.\n\n"
 SHARED = ("router", "broker", "viewer")  # processes that serve all arms

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import psutil
 
-from services.runtime.process.readiness import says_ready
-from services.stack.compose import ProcessState
+from gemelo.services.runtime.process.readiness import says_ready
+from gemelo.services.stack.compose import ProcessState
 
 LINES = 8  # of a log that are shown
 

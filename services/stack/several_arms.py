@@ -1,4 +1,4 @@
-"""`python -m services.stack.several_arms "NAME ..."`: what `make up ARMS="rm1 parol6"` starts, as files.
+"""`python -m gemelo.services.stack.several_arms "NAME ..."`: what `make up ARMS="rm1 parol6"` starts, as files.
 
 Prints the path of a process-compose file: router, broker and viewer once, and every other process of
 process-compose.yaml once for each arm, named <robot>-<process>. What cannot run together is refused before anything is
@@ -17,12 +17,12 @@ from typing import Any
 
 import yaml
 
-from schemas.deployment import Deployment
-from schemas.errors import ConfigurationError
-from services.runtime.deployment import forget_arms, load_deployment, overriding, project_root
-from services.runtime.started import keep_started
-from services.stack.arms import SHARED, StackedArm, deployment_file, file_of, left_out, stacked_arms
-from services.stack.start_check import say_virtual, start_problems
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.errors import ConfigurationError
+from gemelo.services.runtime.deployment import forget_arms, load_deployment, overriding, project_root
+from gemelo.services.runtime.started import keep_started
+from gemelo.services.stack.arms import SHARED, StackedArm, deployment_file, file_of, left_out, stacked_arms
+from gemelo.services.stack.start_check import say_virtual, start_problems
 
 ABOUT = "about"
 OUT = "${GEMELO_PATHS_OUT:-out}"  # as process-compose.yaml writes it

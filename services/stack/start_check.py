@@ -7,16 +7,16 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
-from schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
-from schemas.errors import ConfigurationError
-from services.arm.cell.cell_file import load_cell
-from services.arm.model.description import ArmDescription, load_arm, require_motors
-from services.arm.model.virtual_drive import NO_MOTORS
-from services.mqtt.access import device_access, gateway_access
-from services.mqtt.secure_folder import require_made
-from services.runtime.deployment import exposure, forget_arms, load_deployment, project_root
-from services.runtime.process.ports import PortTaken, require_free
-from services.runtime.started import keep_started
+from gemelo.schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
+from gemelo.schemas.errors import ConfigurationError
+from gemelo.services.arm.cell.cell_file import load_cell
+from gemelo.services.arm.model.description import ArmDescription, load_arm, require_motors
+from gemelo.services.arm.model.virtual_drive import NO_MOTORS
+from gemelo.services.mqtt.access import device_access, gateway_access
+from gemelo.services.mqtt.secure_folder import require_made
+from gemelo.services.runtime.deployment import exposure, forget_arms, load_deployment, project_root
+from gemelo.services.runtime.process.ports import PortTaken, require_free
+from gemelo.services.runtime.started import keep_started
 
 
 def start_problems(deployment: Deployment) -> list[str]:
@@ -79,13 +79,13 @@ def broker_problems(deployment: Deployment, device: str) -> list[str]:
         return [str(error)]
     if section.broker is not Broker.EXTERNAL or deployment.wire is Wire.SERIAL:
         return []
-    from services.mqtt.check import problem  # paho takes 50 ms that only a strange broker is worth
+    from gemelo.services.mqtt.check import problem  # paho takes 50 ms that only a strange broker is worth
 
     return list(dict.fromkeys(filter(None, map(problem, accesses))))
 
 
 def main() -> int:
-    """`python -m services.stack.start_check`: prints every problem to stderr; 0 if there is none, else 1."""
+    """`python -m gemelo.services.stack.start_check`: prints every problem to stderr; 0 if there is none, else 1."""
     try:
         deployment = load_deployment()
         found = start_problems(deployment)

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from services.arm.model.description import ArmDescription
-from services.stepper_gateway.control.control_handler import ControlHandler
-from services.stepper_gateway.device.command_handler import CommandHandler
-from services.stepper_gateway.device.echoes import Echoes
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.device.injection_handler import InjectionHandler
-from services.stepper_gateway.device.sensors import SensorRelay
-from services.stepper_gateway.goals.goal_executor import GoalExecutor
-from services.stepper_gateway.gripper.gripper_executor import GripperExecutor
-from services.stepper_gateway.ledger.record import LedgerRecord
-from services.stepper_gateway.ledger.step_ledger import LedgerKeeper
-from services.stepper_gateway.ledger.stopping_watch import StoppingWatch
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.motion_controller import MotionController
-from services.stepper_gateway.motion.target_follower import TargetFollower
-from services.stepper_gateway.outputs import Outbox
-from services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.stepper_gateway.control.control_handler import ControlHandler
+from gemelo.services.stepper_gateway.device.command_handler import CommandHandler
+from gemelo.services.stepper_gateway.device.echoes import Echoes
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.device.injection_handler import InjectionHandler
+from gemelo.services.stepper_gateway.device.sensors import SensorRelay
+from gemelo.services.stepper_gateway.goals.goal_executor import GoalExecutor
+from gemelo.services.stepper_gateway.gripper.gripper_executor import GripperExecutor
+from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.stepper_gateway.ledger.step_ledger import LedgerKeeper
+from gemelo.services.stepper_gateway.ledger.stopping_watch import StoppingWatch
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.motion_controller import MotionController
+from gemelo.services.stepper_gateway.motion.target_follower import TargetFollower
+from gemelo.services.stepper_gateway.outputs import Outbox
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
 
 class Components:

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping
 
 from msgspec.structs import replace
 
-from schemas.control import ControlGive, ControlJoin, ControlTake
-from schemas.device import (
+from gemelo.schemas.control import ControlGive, ControlJoin, ControlTake
+from gemelo.schemas.device import (
     ConfigureResponse,
     DeviceCommandKind,
     DeviceCommandRequest,
@@ -18,27 +18,27 @@ from schemas.device import (
     DeviceStopRequest,
     InjectRequest,
 )
-from schemas.gripper import GripperCommandGoal
-from schemas.joints import JointTargets
-from schemas.motion import FollowJointTrajectoryGoal
-from schemas.scene import PlanningScene
-from schemas.system import LogLevel
-from schemas.topics import DEVICE_STATUS
-from services.arm.model.description import ArmDescription
-from services.stepper_gateway.components import Components
-from services.stepper_gateway.control.clients import MotionCaller
-from services.stepper_gateway.control.control_handler import NOBODY
-from services.stepper_gateway.device.command_arguments import STOPS, kind_of
-from services.stepper_gateway.device.frame_handler import FrameHandler
-from services.stepper_gateway.device.gateway_device import status_of
-from services.stepper_gateway.device.other_writers import Strangers
-from services.stepper_gateway.goals.goal_executor import GoalVerdict
-from services.stepper_gateway.ledger.record import LedgerRecord
-from services.stepper_gateway.links.frames import BadFrame, CommandFrame, Heartbeat, NoFrame, Sync, encode
-from services.stepper_gateway.links.link import Kind, Received
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import Answer, Output
-from services.stepper_gateway.parameters import GatewayParameters
+from gemelo.schemas.gripper import GripperCommandGoal
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.scene import PlanningScene
+from gemelo.schemas.system import LogLevel
+from gemelo.schemas.topics import DEVICE_STATUS
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.stepper_gateway.components import Components
+from gemelo.services.stepper_gateway.control.clients import MotionCaller
+from gemelo.services.stepper_gateway.control.control_handler import NOBODY
+from gemelo.services.stepper_gateway.device.command_arguments import STOPS, kind_of
+from gemelo.services.stepper_gateway.device.frame_handler import FrameHandler
+from gemelo.services.stepper_gateway.device.gateway_device import status_of
+from gemelo.services.stepper_gateway.device.other_writers import Strangers
+from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
+from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.stepper_gateway.links.frames import BadFrame, CommandFrame, Heartbeat, NoFrame, Sync, encode
+from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.outputs import Answer, Output
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
 REGULAR = {Heartbeat: Kind.HB, Sync: Kind.SYNC, CommandFrame: Kind.CMD}  # what the session sends by itself
 BAD_FRAME_REPORT = 1.0  # [s] between two; chosen: a flood of bad frames must not flood the log

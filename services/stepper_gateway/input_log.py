@@ -11,11 +11,11 @@ from collections.abc import Callable
 
 import msgspec
 
-from schemas.device import GatewayInputs
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import BeganInput, Given, Input, Reply, digest_of, give, packed
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import Output
+from gemelo.schemas.device import GatewayInputs
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.inputs import BeganInput, Given, Input, Reply, digest_of, give, packed
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.outputs import Output
 
 PERIOD = 0.5  # [s] between two messages; chosen: what a kill -9 can cost
 HELD_BACK = 10.0  # [s] after the beginning until the first ones are published; chosen: a stack is up by then

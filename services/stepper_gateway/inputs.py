@@ -11,20 +11,20 @@ from hashlib import blake2b
 
 import msgspec
 
-from schemas.control import ControlGive, ControlJoin, ControlTake
-from schemas.device import DeviceCommandRequest, DeviceStopRequest, InjectRequest
-from schemas.gripper import GripperCommandGoal
-from schemas.joints import JointTargets
-from schemas.motion import FollowJointTrajectoryGoal
-from schemas.scene import PlanningScene
-from services.stepper_gateway.control.clients import MotionCaller
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.goals.goal_executor import GoalVerdict
-from services.stepper_gateway.ledger.record import LedgerRecord
-from services.stepper_gateway.links.link import Kind, Received
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import Output, Publish
-from services.stepper_gateway.parameters import GatewayParameters
+from gemelo.schemas.control import ControlGive, ControlJoin, ControlTake
+from gemelo.schemas.device import DeviceCommandRequest, DeviceStopRequest, InjectRequest
+from gemelo.schemas.gripper import GripperCommandGoal
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.stepper_gateway.control.clients import MotionCaller
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
+from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.outputs import Output, Publish
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
 LARGEST = 64 * 1024 * 1024  # [B] of one message's inputs, unpacked; chosen: far beyond half a second of them
 

@@ -6,19 +6,19 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from schemas.deployment import Deployment, DeviceKind, Wire
-from schemas.robot import Dialect
-from services.arm.model.description import ArmDescription, load_arm, require_motors
-from services.runtime.application import service
-from services.runtime.deployment import project_root
-from services.runtime.node import Node
-from services.runtime.process.priority import step_ahead
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import BeganInput
-from services.stepper_gateway.ledger.ledger_file import LedgerFile, read_ledger
-from services.stepper_gateway.links.link import Link
-from services.stepper_gateway.parameters import GatewayParameters
-from services.stepper_gateway.shell import Shell
+from gemelo.schemas.deployment import Deployment, DeviceKind, Wire
+from gemelo.schemas.robot import Dialect
+from gemelo.services.arm.model.description import ArmDescription, load_arm, require_motors
+from gemelo.services.runtime.application import service
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.priority import step_ahead
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.inputs import BeganInput
+from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile, read_ledger
+from gemelo.services.stepper_gateway.links.link import Link
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.stepper_gateway.shell import Shell
 
 RATE = 50.0  # [Hz] standard: that of the device's states
 # Between the threads of bus, wire and loop: at Python's own 5 ms a stop waits for several of them in a flood.
@@ -68,12 +68,12 @@ def open_device(deployment: Deployment, arm: ArmDescription, wake: Callable[[], 
         case Dialect.GEMELO:
             return open_link(deployment, arm.device.name, wake, baud_of(deployment, arm))
         case Dialect.RA:
-            from services.mqtt.access import gateway_access  # slow to load: only the wire's own library
-            from services.stepper_gateway.links.foreign.ra_link import RaLink
+            from gemelo.services.mqtt.access import gateway_access  # slow to load: only the wire's own library
+            from gemelo.services.stepper_gateway.links.foreign.ra_link import RaLink
 
             return RaLink(gateway_access(deployment.mqtt), arm, wake)
         case Dialect.TEXT:
-            from services.stepper_gateway.links.foreign.text_link import TextLink
+            from gemelo.services.stepper_gateway.links.foreign.text_link import TextLink
 
             return TextLink(serial_device(deployment), baud_of(deployment, arm), arm, wake)
 
@@ -82,12 +82,12 @@ def open_link(deployment: Deployment, device: str, wake: Callable[[], None], bau
     """The other wire's library is not even imported."""
     match deployment.wire:
         case Wire.MQTT:
-            from services.mqtt.access import gateway_access  # slow to load: only the wire's own library
-            from services.stepper_gateway.links.mqtt import MqttLink
+            from gemelo.services.mqtt.access import gateway_access  # slow to load: only the wire's own library
+            from gemelo.services.stepper_gateway.links.mqtt import MqttLink
 
             return MqttLink(gateway_access(deployment.mqtt), device, wake)
         case Wire.SERIAL:
-            from services.stepper_gateway.links.serial import SerialLink
+            from gemelo.services.stepper_gateway.links.serial import SerialLink
 
             return SerialLink(serial_device(deployment), deployment.serial.baud or baud, wake)
 

@@ -6,16 +6,16 @@ from typing import Any
 
 import msgspec
 
-from schemas.actions import GoalStatusCode
-from schemas.control import ControlAnswer
-from schemas.device import ConfigureResponse, DeviceCommandResponse, EchoResponse, InjectResponse
-from schemas.gripper import GripperCommandFeedback, GripperCommandResult
-from schemas.message import Message
-from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryResult
-from schemas.system import LogLevel
-from schemas.topics import Topic
-from services.stepper_gateway.ledger.record import LedgerRecord
-from services.stepper_gateway.links.link import Kind
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.control import ControlAnswer
+from gemelo.schemas.device import ConfigureResponse, DeviceCommandResponse, EchoResponse, InjectResponse
+from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandResult
+from gemelo.schemas.message import Message
+from gemelo.schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryResult
+from gemelo.schemas.system import LogLevel
+from gemelo.schemas.topics import Topic
+from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.stepper_gateway.links.link import Kind
 
 Response = DeviceCommandResponse | ConfigureResponse | InjectResponse | EchoResponse | ControlAnswer
 

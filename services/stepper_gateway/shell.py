@@ -8,8 +8,8 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlTake
-from schemas.device import (
+from gemelo.schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlTake
+from gemelo.schemas.device import (
     ConfigureRequest,
     ConfigureResponse,
     DeviceCommandRequest,
@@ -20,15 +20,15 @@ from schemas.device import (
     InjectRequest,
     InjectResponse,
 )
-from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
-from schemas.joints import JointTargets
-from schemas.motion import (
+from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.motion import (
     FollowErrorCode,
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
 )
-from schemas.topics import (
+from gemelo.schemas.topics import (
     CONTROL_GIVE,
     CONTROL_JOIN,
     CONTROL_TAKE,
@@ -43,17 +43,17 @@ from schemas.topics import (
     JOINT_TARGETS,
     SCENE,
 )
-from services.runtime.actions.server import ActionServer, GoalDecision, accept, refuse
-from services.runtime.node import Node
-from services.runtime.parameters import ParameterSet
-from services.runtime.requests.server import Pending
-from services.stepper_gateway.control.control import seal
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.goals.goal_executor import GoalVerdict
-from services.stepper_gateway.goals.goal_reading import read_goal
-from services.stepper_gateway.goals.pieces import Pieces
-from services.stepper_gateway.input_log import InputLog
-from services.stepper_gateway.inputs import (
+from gemelo.services.runtime.actions.server import ActionServer, GoalDecision, accept, refuse
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.parameters import ParameterSet
+from gemelo.services.runtime.requests.server import Pending
+from gemelo.services.stepper_gateway.control.control import seal
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
+from gemelo.services.stepper_gateway.goals.goal_reading import read_goal
+from gemelo.services.stepper_gateway.goals.pieces import Pieces
+from gemelo.services.stepper_gateway.input_log import InputLog
+from gemelo.services.stepper_gateway.inputs import (
     BeganInput,
     CancelInput,
     CommandInput,
@@ -77,10 +77,10 @@ from services.stepper_gateway.inputs import (
     TakeControlInput,
     TargetsInput,
 )
-from services.stepper_gateway.ledger.ledger_file import LedgerFile
-from services.stepper_gateway.links import link as links
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import (
+from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile
+from gemelo.services.stepper_gateway.links import link as links
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.outputs import (
     Answer,
     GoalExecuting,
     GoalFinished,
@@ -94,7 +94,7 @@ from services.stepper_gateway.outputs import (
     Publish,
     SendFrame,
 )
-from services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
 PLANNER = "planner"  # the node whose scene counts, and which streams targets for others
 AT_ONCE = 16  # payloads handled before the loop looks at its deadline and for stops; chosen: about 1 ms

@@ -10,9 +10,9 @@ from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
-from schemas.actions import GoalStatusCode
-from schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlTake
-from schemas.device import (
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlTake
+from gemelo.schemas.device import (
     ConfigureResponse,
     DeviceCommand,
     DeviceCommandKind,
@@ -25,26 +25,26 @@ from schemas.device import (
     InjectResponse,
     StopKind,
 )
-from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
-from schemas.joints import JointTargets
-from schemas.message import Message
-from schemas.motion import (
+from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.message import Message
+from gemelo.schemas.motion import (
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
     JointTrajectory,
 )
-from schemas.system import LogLevel
-from schemas.topics import Topic
-from services.arm.model.description import ArmDescription
-from services.stepper_gateway.control.clients import MotionCaller
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.device.command_arguments import KINDS
-from services.stepper_gateway.goals.goal_executor import GoalVerdict
-from services.stepper_gateway.ledger.record import LedgerRecord
-from services.stepper_gateway.links.link import Kind, Received
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import (
+from gemelo.schemas.system import LogLevel
+from gemelo.schemas.topics import Topic
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.stepper_gateway.control.clients import MotionCaller
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.device.command_arguments import KINDS
+from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
+from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.outputs import (
     Answer,
     GoalExecuting,
     GoalFinished,
@@ -57,7 +57,7 @@ from services.stepper_gateway.outputs import (
     Publish,
     SendFrame,
 )
-from services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
 __all__ = ["GatewayDriver", "GatewayParameters", "Kind", "Moment", "MotionCaller", "asked"]
 

@@ -9,16 +9,16 @@ from dataclasses import replace
 
 import msgspec
 
-from firmware.platform.host.sketch import HostSketch
-from schemas.device import DeviceCommandKind
-from schemas.robot import Dialect
-from services.arm.model.description import ArmDescription, heard_by_the_board
-from services.arm.motors.relative_moves import ramp_of
-from services.stepper_gateway.links.foreign import ra_messages
-from services.stepper_gateway.links.foreign.ra_device import RaDevice
-from services.stepper_gateway.links.link import Kind
-from services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Moment
-from services.virtual_arm.virtual_arm import GATEWAY_ZERO, UNIX, rm1
+from gemelo.firmware.platform.host.sketch import HostSketch
+from gemelo.schemas.device import DeviceCommandKind
+from gemelo.schemas.robot import Dialect
+from gemelo.services.arm.model.description import ArmDescription, heard_by_the_board
+from gemelo.services.arm.motors.relative_moves import ramp_of
+from gemelo.services.stepper_gateway.links.foreign import ra_messages
+from gemelo.services.stepper_gateway.links.foreign.ra_device import RaDevice
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Moment
+from gemelo.services.virtual_arm.virtual_arm import GATEWAY_ZERO, UNIX, rm1
 
 PERIOD = 0.02  # [s] of the gateway's loop
 STEP = 0.005  # [s] of virtual time

@@ -11,16 +11,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from firmware.bindings.device import CoreDevice
-from firmware.platform.host.board import DeviceClock
-from schemas.device_config import DeviceConfig
-from schemas.message import Message, Vector
-from schemas.robot import Motor
-from services.arm.device.device_config import device_config, reference_steps
-from services.arm.model.description import ArmDescription, load_arm
-from services.arm.model.gripper import gripper_unit
-from services.runtime.deployment import project_root
-from services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Kind, Moment
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.firmware.platform.host.board import DeviceClock
+from gemelo.schemas.device_config import DeviceConfig
+from gemelo.schemas.message import Message, Vector
+from gemelo.schemas.robot import Motor
+from gemelo.services.arm.device.device_config import device_config, reference_steps
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.arm.model.gripper import gripper_unit
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Kind, Moment
 
 UNIX = 1_700_000_000_000_000_000  # [ns] at the start of virtual time
 GATEWAY_ZERO = 1000.0  # [s] of the gateway's monotonic clock at the start

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.frames import Transform
+from gemelo.schemas.frames import Transform
 
 Array = NDArray[np.float64]
 

@@ -11,22 +11,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from schemas.control import ControlState
-from schemas.device import DeviceState, DeviceStatus, SensorReadings, ShaftPositions
-from schemas.joints import JointState, StepErrors
-from schemas.ledger import StepLedger, StoppingDistance
-from schemas.planning import PlannedPath
-from services.visualizer.content import entities
-from services.visualizer.content.arm_poses import arm_poses
-from services.visualizer.content.cameras import CameraView
-from services.visualizer.content.event_log import EventLog, clamp_stamp
-from services.visualizer.content.panel import PanelInputs, is_lost, panel, shaft_errors
-from services.visualizer.content.preview import MOVING, PlanPreview
-from services.visualizer.content.scene import MeshLoader, SceneView, load_no_mesh
-from services.visualizer.content.thinning import ThinnedSeries
-from services.visualizer.content.updates import LineStrip, Scalars, StateUpdate, TextPanel, Times, Tint, Update
-from services.visualizer.model.rotations import Array
-from services.visualizer.model.visual_model import VisualJoint, VisualModel
+from gemelo.schemas.control import ControlState
+from gemelo.schemas.device import DeviceState, DeviceStatus, SensorReadings, ShaftPositions
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.ledger import StepLedger, StoppingDistance
+from gemelo.schemas.planning import PlannedPath
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.content.arm_poses import arm_poses
+from gemelo.services.visualizer.content.cameras import CameraView
+from gemelo.services.visualizer.content.event_log import EventLog, clamp_stamp
+from gemelo.services.visualizer.content.panel import PanelInputs, is_lost, panel, shaft_errors
+from gemelo.services.visualizer.content.preview import MOVING, PlanPreview
+from gemelo.services.visualizer.content.scene import MeshLoader, SceneView, load_no_mesh
+from gemelo.services.visualizer.content.thinning import ThinnedSeries
+from gemelo.services.visualizer.content.updates import LineStrip, Scalars, StateUpdate, TextPanel, Times, Tint, Update
+from gemelo.services.visualizer.model.rotations import Array
+from gemelo.services.visualizer.model.visual_model import VisualJoint, VisualModel
 
 PANEL_PERIOD = 500_000_000  # [ns]
 AGAIN = 5_000_000_000  # [ns] after which the mode is sent again: a viewer that comes late has only the newest data

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from schemas.gripper import GripperState
-from schemas.topics import (
+from gemelo.schemas.gripper import GripperState
+from gemelo.schemas.topics import (
     CONTACTS,
     CONTROL,
     DEVICE_EVENTS,
@@ -28,9 +28,9 @@ from schemas.topics import (
     camera_image,
     camera_info,
 )
-from services.arm.model.description import ArmDescription
-from services.arm.model.gripper import jaw_objects, jaws_apart
-from services.visualizer.core import Visualizer
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.gripper import jaw_objects, jaws_apart
+from gemelo.services.visualizer.core import Visualizer
 
 
 class Feed(NamedTuple):

@@ -8,27 +8,27 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from schemas.deployment import Deployment
-from schemas.frames import RobotDescription
-from schemas.scene import MeshShape
-from schemas.text_file import read_text
-from schemas.topics import ANY, DESCRIPTION, LOG, SCENE
-from services.arm.cell.cell_file import deployed_cell
-from services.arm.model.description import load_arm
-from services.runtime.application import service
-from services.runtime.deployment import deployments_beside, project_root, robot_name
-from services.runtime.node import Node
-from services.runtime.node_clock import NodeClock
-from services.runtime.process.priority import step_behind
-from services.runtime.scene_meshes import SceneMeshes
-from services.visualizer.core import Visualizer
-from services.visualizer.feeds import feeds
-from services.visualizer.model.mesh_files import missing_meshes, scene_mesh
-from services.visualizer.model.triangle_meshes import ShadedMesh
-from services.visualizer.model.urdf import parse_urdf, tool_link
-from services.visualizer.render.arms_layout import SharedView
-from services.visualizer.render.layout import ArmLayout
-from services.visualizer.render.outputs import Outputs, VisualizerParameters
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.frames import RobotDescription
+from gemelo.schemas.scene import MeshShape
+from gemelo.schemas.text_file import read_text
+from gemelo.schemas.topics import ANY, DESCRIPTION, LOG, SCENE
+from gemelo.services.arm.cell.cell_file import deployed_cell
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.runtime.application import service
+from gemelo.services.runtime.deployment import deployments_beside, project_root, robot_name
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.node_clock import NodeClock
+from gemelo.services.runtime.process.priority import step_behind
+from gemelo.services.runtime.scene_meshes import SceneMeshes
+from gemelo.services.visualizer.core import Visualizer
+from gemelo.services.visualizer.feeds import feeds
+from gemelo.services.visualizer.model.mesh_files import missing_meshes, scene_mesh
+from gemelo.services.visualizer.model.triangle_meshes import ShadedMesh
+from gemelo.services.visualizer.model.urdf import parse_urdf, tool_link
+from gemelo.services.visualizer.render.arms_layout import SharedView
+from gemelo.services.visualizer.render.layout import ArmLayout
+from gemelo.services.visualizer.render.outputs import Outputs, VisualizerParameters
 
 BATCH_RATE = 10.0  # [Hz]
 

@@ -1,4 +1,4 @@
-"""`python -m services.visualizer.recorded FILE`: a recording in the twin's view; a black box at its incident.
+"""`python -m gemelo.services.visualizer.recorded FILE`: a recording in the twin's view; a black box at its incident.
 
 What is drawn is made from the messages alone, by the same core that draws the living arm.
 """
@@ -18,33 +18,33 @@ from typing import Any
 import msgspec
 import rerun as rr
 
-from schemas.camera import CameraImage
-from schemas.deployment import ViewerMode
-from schemas.frames import RobotDescription
-from schemas.scene import MeshShape, PlanningScene, SceneMesh
-from schemas.scene_meshes import with_meshes
-from schemas.topics import DESCRIPTION, SCENE
-from schemas.topics import scene_mesh as mesh_topic
-from services.arm.errors import DescriptionError
-from services.arm.model.description import load_arm
-from services.recordings.foxglove import CAMERA, IMAGE
-from services.recordings.incidents import Incident, incident_in
-from services.recordings.reader import BadRecording, RecordingReader, Row
-from services.recordings.shadow import recorded_robot, shadow_folder, write_shadow
-from services.recordings.view_layout import LAYOUT, ViewLayout
-from services.runtime.deployment import DeploymentError, project_root
-from services.runtime.process.own_files import make_own
-from services.runtime.started import load_started
-from services.visualizer.core import Visualizer
-from services.visualizer.feeds import feeds
-from services.visualizer.model.mesh_files import scene_mesh
-from services.visualizer.model.triangle_meshes import ShadedMesh
-from services.visualizer.model.urdf import parse_urdf, tool_link
-from services.visualizer.program.rerun_program import rerun_binary, start, stop
-from services.visualizer.program.screenshot import LOOPBACK, free_port, save_screenshot
-from services.visualizer.render.layout import ArmLayout, OpeningMoment, blueprint
-from services.visualizer.render.sink import APPLICATION, Sink
-from services.visualizer.viewer import address, resolved
+from gemelo.schemas.camera import CameraImage
+from gemelo.schemas.deployment import ViewerMode
+from gemelo.schemas.frames import RobotDescription
+from gemelo.schemas.scene import MeshShape, PlanningScene, SceneMesh
+from gemelo.schemas.scene_meshes import with_meshes
+from gemelo.schemas.topics import DESCRIPTION, SCENE
+from gemelo.schemas.topics import scene_mesh as mesh_topic
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.recordings.foxglove import CAMERA, IMAGE
+from gemelo.services.recordings.incidents import Incident, incident_in
+from gemelo.services.recordings.reader import BadRecording, RecordingReader, Row
+from gemelo.services.recordings.shadow import recorded_robot, shadow_folder, write_shadow
+from gemelo.services.recordings.view_layout import LAYOUT, ViewLayout
+from gemelo.services.runtime.deployment import DeploymentError, project_root
+from gemelo.services.runtime.process.own_files import make_own
+from gemelo.services.runtime.started import load_started
+from gemelo.services.visualizer.core import Visualizer
+from gemelo.services.visualizer.feeds import feeds
+from gemelo.services.visualizer.model.mesh_files import scene_mesh
+from gemelo.services.visualizer.model.triangle_meshes import ShadedMesh
+from gemelo.services.visualizer.model.urdf import parse_urdf, tool_link
+from gemelo.services.visualizer.program.rerun_program import rerun_binary, start, stop
+from gemelo.services.visualizer.program.screenshot import LOOPBACK, free_port, save_screenshot
+from gemelo.services.visualizer.render.layout import ArmLayout, OpeningMoment, blueprint
+from gemelo.services.visualizer.render.sink import APPLICATION, Sink
+from gemelo.services.visualizer.viewer import address, resolved
 
 BATCH = 100_000_000  # [ns] of the recording that are drawn together, as live
 PERIOD = 0.5  # [s] between two looks at the viewer

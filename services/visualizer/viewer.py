@@ -21,17 +21,17 @@ from urllib.parse import quote
 
 from msgspec.structs import replace
 
-from schemas.deployment import Deployment, ViewerMode, ViewerSection
-from services.runtime.deployment import DeploymentError, exposure, load_deployment, project_root
-from services.runtime.process.own_names import own_names
-from services.runtime.process.ports import PortTaken, require_free
-from services.runtime.process.priority import step_behind
-from services.runtime.process.readiness import Readiness
-from services.runtime.process.unwritten import UnwrittenFiles
-from services.visualizer.program.host_check import HostCheck, unguessable_host
-from services.visualizer.program.rerun_program import rerun_binary, start, stop
-from services.visualizer.program.screenshot import free_port
-from services.visualizer.program.viewer_connection import ViewerConnection
+from gemelo.schemas.deployment import Deployment, ViewerMode, ViewerSection
+from gemelo.services.runtime.deployment import DeploymentError, exposure, load_deployment, project_root
+from gemelo.services.runtime.process.own_names import own_names
+from gemelo.services.runtime.process.ports import PortTaken, require_free
+from gemelo.services.runtime.process.priority import step_behind
+from gemelo.services.runtime.process.readiness import Readiness
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.services.visualizer.program.host_check import HostCheck, unguessable_host
+from gemelo.services.visualizer.program.rerun_program import rerun_binary, start, stop
+from gemelo.services.visualizer.program.screenshot import free_port
+from gemelo.services.visualizer.program.viewer_connection import ViewerConnection
 
 PERIOD = 0.5  # [s] between two looks at the child
 CUT_OFF = "viewer: a sender ended or was cut off in the midst of a message; a visualizer comes back by itself"

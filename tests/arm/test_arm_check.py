@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.checks.check import Severity, check
+from gemelo.services.arm.checks.check import Severity, check
 from tests.arm.editing import edit
 
 

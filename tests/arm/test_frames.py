@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from schemas.frames import FrameTransform, FrameTransforms, Transform
-from services.arm.frames.frame_buffer import (
+from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
+from gemelo.services.arm.frames.frame_buffer import (
     FrameBuffer,
     FutureError,
     PastError,

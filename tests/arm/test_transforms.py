@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.frames import Transform
-from services.arm.frames.transforms import (
+from gemelo.schemas.frames import Transform
+from gemelo.services.arm.frames.transforms import (
     IDENTITY,
     Rigid,
     compose,

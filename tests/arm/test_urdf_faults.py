@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.checks.check import Severity, check
-from services.arm.errors import DescriptionError
-from services.arm.model.description import load_arm
-from services.arm.model.urdf import read_urdf, survey_urdf
+from gemelo.services.arm.checks.check import Severity, check
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.arm.model.urdf import read_urdf, survey_urdf
 from tests.arm.bare_arm import URDF, write_bare_arm
 from tests.arm.editing import edit
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.bench.planner.kinematics import is_solved, random_problems, solve
-from services.bench.scenes import parol6, rm1
-from services.planner.kinematics.ik import InverseKinematics
-from services.planner.request.deadline import NEVER
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.bench.planner.kinematics import is_solved, random_problems, solve
+from gemelo.services.bench.scenes import parol6, rm1
+from gemelo.services.planner.kinematics.ik import InverseKinematics
+from gemelo.services.planner.request.deadline import NEVER
 
 
 def test_a_solution_counts_and_what_is_off_does_not():

@@ -8,11 +8,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from services.bench.problems import known_paths
-from services.bench.problems.known_paths import JointGrid, islands, tightened
-from services.bench.problems.problem_sets import path_length
-from services.bench.scenes import rm1
-from services.planner.path.validity import ValidityChecker
+from gemelo.services.bench.problems import known_paths
+from gemelo.services.bench.problems.known_paths import JointGrid, islands, tightened
+from gemelo.services.bench.problems.problem_sets import path_length
+from gemelo.services.bench.scenes import rm1
+from gemelo.services.planner.path.validity import ValidityChecker
 
 ONES = np.ones(2)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from services.bench import many_arms
-from services.bench.figures import NotMeasured
-from services.bench.many_arms import Load, arms_on_one_router, loads_of
+from gemelo.services.bench import many_arms
+from gemelo.services.bench.figures import NotMeasured
+from gemelo.services.bench.many_arms import Load, arms_on_one_router, loads_of
 from tests.optional import need
 
 

@@ -8,15 +8,15 @@ import msgspec
 import numpy as np
 import pytest
 
-from schemas.planning import PlanCode, Refusal
-from services.bench.figures import NotMeasured
-from services.bench.planner import path_quality, planning
-from services.bench.planner.path_quality import joints_time, least_time
-from services.bench.planner.planning import runs_without_core
-from services.bench.planner.trials import PHASES, Trial, trials
-from services.bench.scenes import parol6
-from services.planner.core import Planner
-from services.planner.timing.profile import joint_limits
+from gemelo.schemas.planning import PlanCode, Refusal
+from gemelo.services.bench.figures import NotMeasured
+from gemelo.services.bench.planner import path_quality, planning
+from gemelo.services.bench.planner.path_quality import joints_time, least_time
+from gemelo.services.bench.planner.planning import runs_without_core
+from gemelo.services.bench.planner.trials import PHASES, Trial, trials
+from gemelo.services.bench.scenes import parol6
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.timing.profile import joint_limits
 
 LIMITS = joint_limits(parol6())
 

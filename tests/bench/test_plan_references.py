@@ -7,13 +7,13 @@ import sys
 import numpy as np
 import pytest
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.bench.figures import NotMeasured
-from services.bench.planner import references
-from services.bench.planner.references import CoalChecker, PlainOmpl, Roboplan
-from services.bench.problems.problem_sets import problem_set
-from services.bench.scenes import SCENES, parol6, random_configurations, rm1
-from services.planner.collision.world import World
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.bench.figures import NotMeasured
+from gemelo.services.bench.planner import references
+from gemelo.services.bench.planner.references import CoalChecker, PlainOmpl, Roboplan
+from gemelo.services.bench.problems.problem_sets import problem_set
+from gemelo.services.bench.scenes import SCENES, parol6, random_configurations, rm1
+from gemelo.services.planner.collision.world import World
 
 ARMS = {arm.name: arm for arm in (rm1(), parol6())}
 

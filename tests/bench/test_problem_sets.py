@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.bench.problems.problem_sets import (
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.bench.problems.problem_sets import (
     COUNT,
     FILE,
     PlanningProblem,
@@ -18,9 +18,9 @@ from services.bench.problems.problem_sets import (
     request_of,
     text_of,
 )
-from services.bench.scenes import SCENES, parol6, rm1
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.collision.world import World
+from gemelo.services.bench.scenes import SCENES, parol6, rm1
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision.world import World
 
 ARMS = {arm.name: arm for arm in (rm1(), parol6())}
 KINEMATICS = {name: Kinematics(arm) for name, arm in ARMS.items()}

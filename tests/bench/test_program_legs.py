@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.device import DeviceState
-from services.bench.figures import NotMeasured
-from services.bench.program_legs import standing_between
+from gemelo.schemas.device import DeviceState
+from gemelo.services.bench.figures import NotMeasured
+from gemelo.services.bench.program_legs import standing_between
 
 PERIOD = 0.02  # [s] between two states
 

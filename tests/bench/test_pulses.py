@@ -2,10 +2,10 @@
 
 import pytest
 
-from firmware.bindings.frames import PinChange
-from services.bench import pulses
-from services.bench.figures import NotMeasured
-from services.bench.probe import Pulse, WireKnot, pulses_of
+from gemelo.firmware.bindings.frames import PinChange
+from gemelo.services.bench import pulses
+from gemelo.services.bench.figures import NotMeasured
+from gemelo.services.bench.probe import Pulse, WireKnot, pulses_of
 
 
 def test_pulses_are_counted_by_dir():

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from schemas.actions import GoalStatusCode
-from schemas.joints import JointState, StepErrors
-from schemas.motion import FollowJointTrajectoryGoal
-from schemas.planning import JointGoal, PlanRequest
-from services.arm.model.description import load_arm
-from services.bench.virtual_time import Tally, swinging
-from services.planner.core import Planner
-from services.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.planning import JointGoal, PlanRequest
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.bench.virtual_time import Tally, swinging
+from gemelo.services.planner.core import Planner
+from gemelo.services.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 PLANNER = Planner(ARM)

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from services.bench import stops
+from gemelo.services.bench import stops
 
 
 class LateClock:

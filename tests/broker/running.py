@@ -16,9 +16,9 @@ import paho.mqtt.client as mqtt
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
-from services.mqtt.client import stop_loop
-from services.runtime.deployment import project_root
-from services.stack.stack import free_ports
+from gemelo.services.mqtt.client import stop_loop
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.stack.stack import free_ports
 from tests.optional import need
 
 BROKERS = ("embedded", "mosquitto")
@@ -52,7 +52,7 @@ class RunningBroker:
 
     def start(self) -> None:
         """Starts it, on the same port every time."""
-        command = [sys.executable, "-m", "services.broker.main"]
+        command = [sys.executable, "-m", "gemelo.services.broker.main"]
         with self._log.open("a") as log:
             self.popen = subprocess.Popen(command, cwd=project_root(), env=self._environment, stdout=log, stderr=log)
 

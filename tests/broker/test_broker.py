@@ -14,9 +14,9 @@ import paho.mqtt.client as mqtt
 import psutil
 import pytest
 
-from schemas.deployment import MqttSection
-from services.broker import embedded, mosquitto
-from services.broker.replacement import NotInstalled
+from gemelo.schemas.deployment import MqttSection
+from gemelo.services.broker import embedded, mosquitto
+from gemelo.services.broker.replacement import NotInstalled
 from tests.broker.running import BROKERS, Client, RunningBroker, wait_until
 
 
@@ -104,10 +104,10 @@ def test_a_taken_port_is_named_with_its_holder_and_the_setting(tmp_path, name):
 
 
 def test_a_missing_program_is_said_with_the_remedy(monkeypatch, tmp_path):
-    monkeypatch.setattr("services.broker.mosquitto.shutil.which", lambda *_, **__: None)
+    monkeypatch.setattr("gemelo.services.broker.mosquitto.shutil.which", lambda *_, **__: None)
     with pytest.raises(NotInstalled, match="sudo apt-get install mosquitto, or GEMELO_MQTT_BROKER=embedded"):
         mosquitto.find()
-    monkeypatch.setattr("services.broker.embedded.project_root", lambda: tmp_path)
+    monkeypatch.setattr("gemelo.services.broker.embedded.project_root", lambda: tmp_path)
     with pytest.raises(NotInstalled, match=r"gemelo-mqtt is not there: make setup builds it .*BROKER=mosquitto"):
         embedded.find()
 

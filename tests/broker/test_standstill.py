@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from services.mqtt import secure_folder
-from services.runtime.process.readiness import ALIVE
+from gemelo.services.mqtt import secure_folder
+from gemelo.services.runtime.process.readiness import ALIVE
 from tests.broker.running import BROKERS
 from tests.optional import need
 from tests.runtime.support import ROOT, free_port, until
@@ -40,7 +40,7 @@ def broker(request: pytest.FixtureRequest, systemd: socket.socket, tmp_path: Pat
         secure_folder.make(tmp_path / "secure", ["127.0.0.1"], ["rm1"])
         settings["MQTT_SECURE_FOLDER"] = str(tmp_path / "secure")
     process = subprocess.Popen(
-        [sys.executable, "-m", "services.broker.main"], cwd=ROOT, text=True, stdout=subprocess.PIPE,
+        [sys.executable, "-m", "gemelo.services.broker.main"], cwd=ROOT, text=True, stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT, env=os.environ | {"NOTIFY_SOCKET": str(tmp_path / "notify")}
         | {f"GEMELO_{key}": value for key, value in settings.items()},
     )  # fmt: skip

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.camera import CameraCondition, CameraImage, CameraStatus
-from services.camera.core import CameraCore
-from services.camera.sources.source import CameraFault, EncodedImage
+from gemelo.schemas.camera import CameraCondition, CameraImage, CameraStatus
+from gemelo.services.camera.core import CameraCore
+from gemelo.services.camera.sources.source import CameraFault, EncodedImage
 
 SECOND = 1_000_000_000
 STEP = SECOND // 10

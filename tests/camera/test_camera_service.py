@@ -11,20 +11,20 @@ import cv2
 import numpy as np
 import pytest
 
-from schemas.camera import CameraCondition, CameraImage, CameraInfo, CameraStatus
-from schemas.cell import Calibration, MeasuredCamera
-from schemas.deployment import Deployment
-from schemas.detections import Detections
-from schemas.joints import JointState
-from schemas.topics import JOINT_STATES, camera_image, camera_info, camera_status, camera_truth
-from services.arm.cell.camera_file import CAMERA_FILE, write_measured
-from services.arm.errors import DescriptionError
-from services.arm.model.description import ArmDescription
-from services.camera.main import run
-from services.camera.sources.source import encoded
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.deployment import load_deployment
-from services.runtime.node import Node
+from gemelo.schemas.camera import CameraCondition, CameraImage, CameraInfo, CameraStatus
+from gemelo.schemas.cell import Calibration, MeasuredCamera
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.detections import Detections
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.topics import JOINT_STATES, camera_image, camera_info, camera_status, camera_truth
+from gemelo.services.arm.cell.camera_file import CAMERA_FILE, write_measured
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.camera.main import run
+from gemelo.services.camera.sources.source import encoded
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.deployment import load_deployment
+from gemelo.services.runtime.node import Node
 from tests.runtime.support import hear, until
 
 CELL = """

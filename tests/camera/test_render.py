@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from schemas.camera import CameraInfo
-from services.arm.frames.transforms import IDENTITY, Rigid, from_rpy
-from services.camera.virtual.render import Optics, render
-from services.camera.virtual.solids import Face, PosedSolid, box, cylinder, sphere, tag
+from gemelo.schemas.camera import CameraInfo
+from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, from_rpy
+from gemelo.services.camera.virtual.render import Optics, render
+from gemelo.services.camera.virtual.solids import Face, PosedSolid, box, cylinder, sphere, tag
 
 EXACT = Optics(samples=3, blur=0.0, noise=0.0, background=(0, 0, 0))
 BARREL = (-0.28, 0.09, 0.0012, -0.0009, -0.01)

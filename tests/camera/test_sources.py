@@ -15,12 +15,12 @@ import cv2
 import numpy as np
 import pytest
 
-from schemas.camera import CameraCondition
-from schemas.cell import CameraRecord, V4l2Source, VirtualSource
-from services.camera.reader import ImageReader
-from services.camera.sources.source import CameraFault, EncodedImage, encoded
-from services.camera.sources.stored import FolderOfImages, Video
-from services.camera.sources.v4l2 import MJPG, V4l2Camera, capture_stamp, holder_of
+from gemelo.schemas.camera import CameraCondition
+from gemelo.schemas.cell import CameraRecord, V4l2Source, VirtualSource
+from gemelo.services.camera.reader import ImageReader
+from gemelo.services.camera.sources.source import CameraFault, EncodedImage, encoded
+from gemelo.services.camera.sources.stored import FolderOfImages, Video
+from gemelo.services.camera.sources.v4l2 import MJPG, V4l2Camera, capture_stamp, holder_of
 
 RECORD = CameraRecord(name="webcam", source=VirtualSource(), size=(64, 48), fps=100.0)
 MS = 1_000_000

@@ -9,19 +9,25 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from schemas.camera import CameraInfo
-from schemas.cell import VirtualSource
-from schemas.frames import Transform
-from schemas.gripper import GripperState
-from schemas.joints import JointState
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.cell.camera_model import exact_info
-from services.arm.cell.cell_file import Cell, grasp_width, load_cell
-from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_rpy, inverse
-from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import ArmDescription, load_arm
-from services.camera.virtual.virtual_camera import VirtualCamera, base_from_camera, outline, projected, true_detections
-from services.camera.virtual.world import CameraWorld
+from gemelo.schemas.camera import CameraInfo
+from gemelo.schemas.cell import VirtualSource
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.gripper import GripperState
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.arm.cell.camera_model import exact_info
+from gemelo.services.arm.cell.cell_file import Cell, grasp_width, load_cell
+from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose, from_rpy, inverse
+from gemelo.services.arm.kinematics.chain import link_transforms
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.camera.virtual.virtual_camera import (
+    VirtualCamera,
+    base_from_camera,
+    outline,
+    projected,
+    true_detections,
+)
+from gemelo.services.camera.virtual.world import CameraWorld
 
 
 @pytest.fixture(params=["rm1", "parol6"])

@@ -2,9 +2,9 @@
 
 import pytest
 
-from services.broker import mosquitto
-from services.chaos.site import installed_broker
-from services.chaos.soak import ProcessSample, progress
+from gemelo.services.broker import mosquitto
+from gemelo.services.chaos.site import installed_broker
+from gemelo.services.chaos.soak import ProcessSample, progress
 
 
 @pytest.mark.parametrize(("is_installed", "broker"), [(True, "mosquitto"), (False, "embedded")])

@@ -9,15 +9,15 @@ from argparse import ArgumentParser
 
 import msgspec
 
-from schemas.deployment import Deployment, Wire
-from services.chaos.campaign import Episode, meddled, order, unexpected_hands, words_of
-from services.chaos.faults import FAULTS, Fault
-from services.chaos.main import chosen_faults, possible_faults, unfit
-from services.chaos.options import add_chaos_options
-from services.chaos.report import ChaosReport, page_of, rows_of, summary, text_of
-from services.chaos.site import processes_of
-from services.stack.not_ready import NotReady
-from services.stack.stack import PROCESSES, StackError
+from gemelo.schemas.deployment import Deployment, Wire
+from gemelo.services.chaos.campaign import Episode, meddled, order, unexpected_hands, words_of
+from gemelo.services.chaos.faults import FAULTS, Fault
+from gemelo.services.chaos.main import chosen_faults, possible_faults, unfit
+from gemelo.services.chaos.options import add_chaos_options
+from gemelo.services.chaos.report import ChaosReport, page_of, rows_of, summary, text_of
+from gemelo.services.chaos.site import processes_of
+from gemelo.services.stack.not_ready import NotReady
+from gemelo.services.stack.stack import PROCESSES, StackError
 
 
 def fault(name: str) -> Fault:

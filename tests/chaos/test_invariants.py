@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.device import DeviceState
-from services.arm.model.description import ArmDescription
-from services.chaos.invariants import jerks, jumps, misses, missing_records, moved, segments
+from gemelo.schemas.device import DeviceState
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.chaos.invariants import jerks, jumps, misses, missing_records, moved, segments
 
 SLOT = 20_000  # [us] between two states
 BASE = 7  # boot id

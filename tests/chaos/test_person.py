@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from gemelo import DeviceMode
-from schemas.device import DeviceConfiguration
-from services.chaos.person import Person
+from gemelo.schemas.device import DeviceConfiguration
+from gemelo.services.chaos.person import Person
 
 SILENT = 'device "rm1" is silent for more than 0.5 s: check its power and network'
 

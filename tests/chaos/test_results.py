@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from services.stack.results import MARK, new_results
-from services.stack.stack import StackError
+from gemelo.services.stack.results import MARK, new_results
+from gemelo.services.stack.stack import StackError
 
 BEGUN = 60.0  # [s] in which a run that does not refuse its folder would have emptied it
 COMMANDS = (
-    ("services.chaos", "--broker", "embedded", "--minutes", "0.1"),
-    ("services.chaos.soak", "--broker", "embedded", "--hours", "0.001"),
-    ("services.demo", "--broker", "embedded", "--no-picture"),
+    ("gemelo.services.chaos", "--broker", "embedded", "--minutes", "0.1"),
+    ("gemelo.services.chaos.soak", "--broker", "embedded", "--hours", "0.001"),
+    ("gemelo.services.demo", "--broker", "embedded", "--no-picture"),
 )
 
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from schemas.deployment import Wire
-from services.chaos.site import ChaosSite, processes_of, with_wire
-from services.runtime.deployment import DEFAULT_FILE, load_deployment, project_root
-from services.runtime.saved_parameters import SavedParameters
-from services.stack.stack import PROCESSES
+from gemelo.schemas.deployment import Wire
+from gemelo.services.chaos.site import ChaosSite, processes_of, with_wire
+from gemelo.services.runtime.deployment import DEFAULT_FILE, load_deployment, project_root
+from gemelo.services.runtime.saved_parameters import SavedParameters
+from gemelo.services.stack.stack import PROCESSES
 
 
 def test_everything_that_a_stack_may_run_runs_in_chaos_and_less_in_a_soak(tmp_path: Path):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from firmware.platform.host.slot_record import STOOD, row
-from services.arm.device.device_config import device_config
-from services.chaos import slots
+from gemelo.firmware.platform.host.slot_record import STOOD, row
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.chaos import slots
 
 
 def written(config, counts: list[int], boots: list[int] | None = None) -> np.ndarray:

@@ -11,9 +11,9 @@ import pytest
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
-from services.chaos.slow_link import OneWay, SlowLink, Way, client_id_in
-from services.mqtt.client import stop_loop
-from services.stack.stack import free_ports
+from gemelo.services.chaos.slow_link import OneWay, SlowLink, Way, client_id_in
+from gemelo.services.mqtt.client import stop_loop
+from gemelo.services.stack.stack import free_ports
 from tests.broker.running import VERSIONS
 
 SHORTLY = 0.3  # [s] in which an echo would be back many times

@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from services.chaos import clocks
-from services.chaos.clocks import ClockError, SteppingClocks
+from gemelo.services.chaos import clocks
+from gemelo.services.chaos.clocks import ClockError, SteppingClocks
 
 TELLS = """
 import sys, time

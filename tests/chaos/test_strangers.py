@@ -7,10 +7,10 @@ from random import Random
 
 import zenoh
 
-from schemas.topics import TOPICS
-from services.chaos.strangers import BusStranger
-from services.runtime.bus.branches import read_under
-from services.runtime.bus.zenoh_config import client_config
+from gemelo.schemas.topics import TOPICS
+from gemelo.services.chaos.strangers import BusStranger
+from gemelo.services.runtime.bus.branches import read_under
+from gemelo.services.runtime.bus.zenoh_config import client_config
 from tests.runtime.support import RouterProcess, until
 
 

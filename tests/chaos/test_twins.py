@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from services.chaos import twins
-from services.chaos.twins import TwinClient, TwinProcess
+from gemelo.services.chaos import twins
+from gemelo.services.chaos.twins import TwinClient, TwinProcess
 from tests.broker.running import Client, RunningBroker
 
 GIVES_WAY = "print('another node is alive')"

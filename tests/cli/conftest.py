@@ -9,9 +9,9 @@ import pytest
 
 import gemelo
 from gemelo.api.session import Session as ArmSession
-from schemas.actions import GoalStatusCode
-from schemas.deployment import Deployment, PathsSection
-from schemas.device import (
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.deployment import Deployment, PathsSection
+from gemelo.schemas.device import (
     DeviceCommandRequest,
     DeviceCommandResponse,
     DeviceMode,
@@ -19,15 +19,15 @@ from schemas.device import (
     DeviceStatus,
     DeviceStopRequest,
 )
-from schemas.joints import JointState, StepErrors
-from schemas.motion import (
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.motion import (
     FollowErrorCode,
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
 )
-from schemas.planning import PlanRequest, PlanResponse
-from schemas.topics import (
+from gemelo.schemas.planning import PlanRequest, PlanResponse
+from gemelo.schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_STATE,
     DEVICE_STATUS,
@@ -37,12 +37,12 @@ from schemas.topics import (
     PLAN,
     STEP_ERRORS,
 )
-from services.arm.model.description import ArmDescription, load_arm
-from services.cli.session import CommandSession
-from services.planner.core import Planner
-from services.runtime.actions import accept, refuse
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.node import Node
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.cli.session import CommandSession
+from gemelo.services.planner.core import Planner
+from gemelo.services.runtime.actions import accept, refuse
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.node import Node
 from tests.runtime.support import RouterProcess, spinning
 
 MOVE_TIME = 0.4  # [s] that every goal takes here

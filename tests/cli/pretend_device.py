@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from schemas.device import (
+from gemelo.schemas.device import (
     ArmCommand,
     ConfigureRequest,
     ConfigureResponse,
@@ -26,7 +26,7 @@ from schemas.device import (
     SpeedCommand,
     StopKind,
 )
-from schemas.topics import (
+from gemelo.schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURATION,
     DEVICE_CONFIGURE,
@@ -37,8 +37,8 @@ from schemas.topics import (
     DEVICE_STOP,
     SENSORS,
 )
-from services.arm.model.description import ArmDescription
-from services.runtime.node import Node
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.runtime.node import Node
 
 TO_HOME = 0.15  # [s] for every joint
 

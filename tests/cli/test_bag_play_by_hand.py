@@ -12,15 +12,15 @@ from pathlib import Path
 
 import pytest
 
-from schemas.joints import JointState
-from schemas.topics import DESCRIPTION, Delivery, Topic
-from services.arm.model.description import load_arm
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.recordings.channels import Entry
-from services.recordings.mcap_file import McapFile
-from services.runtime.node import Node
-from services.state_publisher.main import describe
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.topics import DESCRIPTION, Delivery, Topic
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.mcap_file import McapFile
+from gemelo.services.runtime.node import Node
+from gemelo.services.state_publisher.main import describe
 from tests.runtime.support import ROOT, spinning, until
 
 START = 1_795_000_000_000_000_000
@@ -46,7 +46,7 @@ class Playing:
         self.heard: list[int] = []
         self._keys, terminal = pty.openpty()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "services.cli.main", "bag", "play", str(bag), "--paused"], cwd=ROOT,
+            [sys.executable, "-m", "gemelo.services.cli.main", "bag", "play", str(bag), "--paused"], cwd=ROOT,
             env=environ, stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
         os.close(terminal)

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from gemelo import Pose, Seen
-from services.arm.model.description import ArmDescription, load_arm
-from services.cli import camera_check
-from services.cli.errors import ExitCode
-from services.cli.main import run
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.cli import camera_check
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
 
 ROOT = Path(__file__).parents[2]
 

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import gemelo
-from schemas.camera import CameraInfo
-from schemas.cell import TagRecord
-from services.arm.cell.camera_file import CAMERA_FILE, MOUNT_BOARD
-from services.arm.cell.camera_model import believed_info
-from services.arm.cell.cell_file import load_cell
-from services.arm.model.description import ArmDescription, load_arm
-from services.bench.vision.mount_images import (
+from gemelo.schemas.camera import CameraInfo
+from gemelo.schemas.cell import TagRecord
+from gemelo.services.arm.cell.camera_file import CAMERA_FILE, MOUNT_BOARD
+from gemelo.services.arm.cell.camera_model import believed_info
+from gemelo.services.arm.cell.cell_file import load_cell
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.bench.vision.mount_images import (
     OFF,
     Setup,
     Sight,
@@ -28,13 +28,13 @@ from services.bench.vision.mount_images import (
     standing,
     tag_on_level_tool,
 )
-from services.bench.vision.mounting import tool_error
-from services.cli import camera_poses
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.cli.session import reported
-from services.vision.rigid import from_transform, step, to_transform
-from services.vision.tags import GreyImage
+from gemelo.services.bench.vision.mounting import tool_error
+from gemelo.services.cli import camera_poses
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.cli.session import reported
+from gemelo.services.vision.rigid import from_transform, step, to_transform
+from gemelo.services.vision.tags import GreyImage
 
 ROOT = Path(__file__).parents[2]
 

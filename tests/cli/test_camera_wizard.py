@@ -14,29 +14,29 @@ import numpy as np
 import pytest
 
 from gemelo.api.units import Pose
-from schemas.cell import VirtualSource
-from schemas.joints import JointState
-from services.arm.cell.camera_file import CAMERA_FILE
-from services.arm.cell.camera_model import believed_info, exact_info
-from services.arm.cell.cell_file import load_cell
-from services.arm.frames.transforms import from_rpy
-from services.arm.model.description import ArmDescription
-from services.bench.vision import images
-from services.bench.vision.images import Surface, render
-from services.camera.virtual.virtual_camera import VirtualCamera
-from services.camera.virtual.world import CameraWorld
-from services.cli import camera_mount
-from services.cli.camera_boards import CHESS_BOARD, TAG_BOARD, tag_board
-from services.cli.camera_calibrate import take
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.vision.boards import TagBoard, picture
-from services.vision.calibration.lens import fit_lens
-from services.vision.calibration.touches import spread_points
-from services.vision.camera_model import model_of
-from services.vision.pages import BAR, POINT, page_of
-from services.vision.rigid import apply, from_transform, inverse, rigid, turn
-from services.vision.tags import GreyImage
+from gemelo.schemas.cell import VirtualSource
+from gemelo.schemas.joints import JointState
+from gemelo.services.arm.cell.camera_file import CAMERA_FILE
+from gemelo.services.arm.cell.camera_model import believed_info, exact_info
+from gemelo.services.arm.cell.cell_file import load_cell
+from gemelo.services.arm.frames.transforms import from_rpy
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.vision import images
+from gemelo.services.bench.vision.images import Surface, render
+from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
+from gemelo.services.camera.virtual.world import CameraWorld
+from gemelo.services.cli import camera_mount
+from gemelo.services.cli.camera_boards import CHESS_BOARD, TAG_BOARD, tag_board
+from gemelo.services.cli.camera_calibrate import take
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.vision.boards import TagBoard, picture
+from gemelo.services.vision.calibration.lens import fit_lens
+from gemelo.services.vision.calibration.touches import spread_points
+from gemelo.services.vision.camera_model import model_of
+from gemelo.services.vision.pages import BAR, POINT, page_of
+from gemelo.services.vision.rigid import apply, from_transform, inverse, rigid, turn
+from gemelo.services.vision.tags import GreyImage
 
 BOARD_AT = np.array([0.28, -0.02, 0.0])  # [m] of the board with tags on the table
 CELL = """

@@ -18,18 +18,18 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
 import gemelo
-from schemas.joints import JointState
-from schemas.topics import DESCRIPTION, JOINT_STATES, Delivery, Topic
-from services.arm.model.description import load_arm
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.recordings.channels import Entry
-from services.recordings.mcap_file import McapFile
-from services.runtime.deployment import load_deployment
-from services.runtime.node import Node
-from services.state_publisher.main import describe
-from services.visualizer.content import entities
-from services.visualizer.program.rerun_program import rerun_binary
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.topics import DESCRIPTION, JOINT_STATES, Delivery, Topic
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.mcap_file import McapFile
+from gemelo.services.runtime.deployment import load_deployment
+from gemelo.services.runtime.node import Node
+from gemelo.services.state_publisher.main import describe
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.program.rerun_program import rerun_binary
 from tests.runtime.support import spinning, until
 
 START = 1_795_000_000_000_000_000
@@ -105,7 +105,7 @@ def test_a_recording_is_played_from_a_time_on_at_another_rate(router, ten_second
 def test_a_recording_is_played_again_and_again_until_it_is_ended(router, ten_seconds):
     heard: list[tuple[float, int]] = []
     with hearing(heard):
-        command = [sys.executable, "-m", "services.cli.main", "bag", "play", str(ten_seconds)]
+        command = [sys.executable, "-m", "gemelo.services.cli.main", "bag", "play", str(ten_seconds)]
         with subprocess.Popen([*command, "--loop", "--rate", "10", "--start", "5"], cwd=ROOT) as playing:
             try:
                 assert until(lambda: len(heard) > 250, 40.0)
@@ -121,8 +121,8 @@ def test_a_recording_is_played_again_and_again_until_it_is_ended(router, ten_sec
 def test_the_view_of_a_shadow_robot_shows_what_is_played(router, bag, tmp_path):
     """The visualizer itself, as a process that is told nothing but the shadow's folder."""
     shadow, view, heard = tmp_path / "out/shadows/rm1-replay", tmp_path / "view.rrd", list[JointState]()
-    play = [sys.executable, "-m", "services.cli.main", "bag", "play", str(bag), "--loop"]
-    show = [sys.executable, "-m", "services.visualizer.main", "--set", f"recording_path={view}"]
+    play = [sys.executable, "-m", "gemelo.services.cli.main", "bag", "play", str(bag), "--loop"]
+    show = [sys.executable, "-m", "gemelo.services.visualizer.main", "--set", f"recording_path={view}"]
     environment = os.environ | {"GEMELO_ROBOT": str(shadow), "GEMELO_VIEWER_MODE": "none"}
     with Node("tool", robot="rm1-replay") as tool, subprocess.Popen(play, cwd=ROOT) as playing:
         tool.subscribe(JOINT_STATES, heard.append)

@@ -25,12 +25,12 @@ from hypothesis import strategies as st
 from msgspec import Meta
 
 import gemelo
-from schemas.device import DeviceStopRequest, StopKind
-from schemas.frames import FrameTransform, FrameTransforms, Transform
-from schemas.joints import JointState
-from schemas.message import Message, encode
-from schemas.system import NodeStatistics, TopicStatistics
-from schemas.topics import (
+from gemelo.schemas.device import DeviceStopRequest, StopKind
+from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import Message, encode
+from gemelo.schemas.system import NodeStatistics, TopicStatistics
+from gemelo.schemas.topics import (
     DEVICE_STOP,
     FOLLOW_JOINT_TRAJECTORY,
     FRAMES,
@@ -41,8 +41,8 @@ from schemas.topics import (
     Delivery,
     Topic,
 )
-from services.arm.frames.transforms import from_rpy, to_rpy
-from services.cli import (
+from gemelo.services.arm.frames.transforms import from_rpy, to_rpy
+from gemelo.services.cli import (
     action_watch,
     interface,
     living_topics,
@@ -54,15 +54,15 @@ from services.cli import (
     topic_ends,
     topic_rates,
 )
-from services.cli.errors import CommandError, ExitCode
-from services.cli.field_path import FieldPath, leaves
-from services.cli.forms import csv_lines, json_line, yaml_document
-from services.cli.main import run
-from services.cli.session import CommandSession
-from services.recordings.table import exchanges_of
-from services.runtime.bus.memory_bus import MemoryBus
-from services.runtime.node import Node
-from services.runtime.topics import Publisher
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.field_path import FieldPath, leaves
+from gemelo.services.cli.forms import csv_lines, json_line, yaml_document
+from gemelo.services.cli.main import run
+from gemelo.services.cli.session import CommandSession
+from gemelo.services.recordings.table import exchanges_of
+from gemelo.services.runtime.bus.memory_bus import MemoryBus
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.topics import Publisher
 from tests.runtime.support import hear, spinning
 
 WHOLE = FieldPath(FrameTransform, "")

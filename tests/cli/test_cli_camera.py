@@ -12,16 +12,16 @@ import cv2
 import numpy as np
 import pytest
 
-from schemas.camera import CameraCondition, CameraImage, CameraInfo, CameraStatus
-from schemas.detections import Detection, Detections
-from schemas.topics import camera_detections, camera_image, camera_info, camera_status
-from services.cli import camera
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.cli.session import CommandSession
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.deployment import load_deployment
-from services.runtime.node import Node
+from gemelo.schemas.camera import CameraCondition, CameraImage, CameraInfo, CameraStatus
+from gemelo.schemas.detections import Detection, Detections
+from gemelo.schemas.topics import camera_detections, camera_image, camera_info, camera_status
+from gemelo.services.cli import camera
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.cli.session import CommandSession
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.deployment import load_deployment
+from gemelo.services.runtime.node import Node
 from tests.runtime.support import free_port
 
 PICTURE = cv2.imencode(".jpg", np.full((48, 64, 3), 60, np.uint8))[1].tobytes()

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.model.srdf_edit import entries
-from services.arm.model.urdf import read_urdf
-from services.cli.errors import ExitCode
-from services.cli.main import run
+from gemelo.services.arm.model.srdf_edit import entries
+from gemelo.services.arm.model.urdf import read_urdf
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import threading
 import msgspec
 import pytest
 
-from schemas.device import (
+from gemelo.schemas.device import (
     ArmCommand,
     DeviceConfiguration,
     DeviceFault,
@@ -22,14 +22,14 @@ from schemas.device import (
     InjectRequest,
     StopKind,
 )
-from services.cli import device, device_config, device_monitor, device_status, stop_ready
-from services.cli.device_press import PRESSES, press, request_of
-from services.cli.errors import CommandError, ExitCode
-from services.cli.forms import csv_lines, json_line
-from services.cli.home import home
-from services.cli.main import run
-from services.runtime.bus.memory_bus import MemoryBus
-from services.runtime.node import Node
+from gemelo.services.cli import device, device_config, device_monitor, device_status, stop_ready
+from gemelo.services.cli.device_press import PRESSES, press, request_of
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.forms import csv_lines, json_line
+from gemelo.services.cli.home import home
+from gemelo.services.cli.main import run
+from gemelo.services.runtime.bus.memory_bus import MemoryBus
+from gemelo.services.runtime.node import Node
 from tests.cli.pretend_device import PretendDevice
 from tests.runtime.support import spinning
 
@@ -176,7 +176,7 @@ def test_sensors_are_a_table_with_units(session, rm1_device, capsys):
 
 
 def test_silent_sensors_are_an_error(session, rm1_device, monkeypatch):
-    from services.cli.device_snapshot import DeviceView
+    from gemelo.services.cli.device_snapshot import DeviceView
 
     wait = DeviceView.wait_for
     monkeypatch.setattr(DeviceView, "wait_for", lambda view, is_enough, timeout=0.2: wait(view, is_enough, timeout))

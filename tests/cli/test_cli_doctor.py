@@ -13,16 +13,16 @@ from pathlib import Path
 
 import pytest
 
-from schemas.device import DeviceState, DeviceStatus
-from schemas.system import NodeInfo
-from services.chaos.descriptors import give_descriptors, take_descriptors
-from services.cli import doctor
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.mqtt import secure_folder
-from services.runtime.bus.memory_bus import MemoryBus
-from services.runtime.clock_offset import ClockOffset
-from services.runtime.deployment import when_silent
+from gemelo.schemas.device import DeviceState, DeviceStatus
+from gemelo.schemas.system import NodeInfo
+from gemelo.services.chaos.descriptors import give_descriptors, take_descriptors
+from gemelo.services.cli import doctor
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.mqtt import secure_folder
+from gemelo.services.runtime.bus.memory_bus import MemoryBus
+from gemelo.services.runtime.clock_offset import ClockOffset
+from gemelo.services.runtime.deployment import when_silent
 from tests.disks import WAYS, refusing_disk
 from tests.real_time import may_run_in_real_time
 from tests.stepper_gateway.locked import Mosquitto, external, locked

@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.device import ReferenceCommand
-from schemas.motion import JointTrajectory, TrajectoryPoint
-from schemas.planning import JointGoal, NamedGoal, PoseGoal, Refusal
-from services.arm.model.description import load_arm
-from services.cli.device import reference_request
-from services.cli.errors import CommandError, ExitCode
-from services.cli.main import parse
-from services.cli.move_report import MoveReport, summary, tool_error
-from services.cli.move_request import goal_of, request_of
-from services.cli.request_text import as_typed, refusal_text
-from services.cli.units import parse_joints
+from gemelo.schemas.device import ReferenceCommand
+from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
+from gemelo.schemas.planning import JointGoal, NamedGoal, PoseGoal, Refusal
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.cli.device import reference_request
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.main import parse
+from gemelo.services.cli.move_report import MoveReport, summary, tool_error
+from gemelo.services.cli.move_request import goal_of, request_of
+from gemelo.services.cli.request_text import as_typed, refusal_text
+from gemelo.services.cli.units import parse_joints
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 

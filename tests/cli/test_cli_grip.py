@@ -9,10 +9,10 @@ import pytest
 
 import gemelo
 from gemelo import Gripped
-from services.cli import grip
-from services.cli.errors import CommandError
-from services.cli.grip import opening
-from services.cli.main import parse
+from gemelo.services.cli import grip
+from gemelo.services.cli.errors import CommandError
+from gemelo.services.cli.grip import opening
+from gemelo.services.cli.main import parse
 
 
 def said(to: str) -> CommandError:

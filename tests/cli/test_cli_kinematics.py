@@ -10,16 +10,16 @@ from contextlib import contextmanager
 
 import pytest
 
-from schemas.joints import JointState
-from schemas.planning import FkRequest, IkRequest, PoseGoal
-from schemas.topics import FK, IK
-from services.cli import kinematics
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.cli.session import load_robot, reported
-from services.planner.kinematics.kinematic_requests import KinematicRequests
-from services.runtime.bus.memory_bus import MemoryBus
-from services.runtime.node import Node
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import FkRequest, IkRequest, PoseGoal
+from gemelo.schemas.topics import FK, IK
+from gemelo.services.cli import kinematics
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.cli.session import load_robot, reported
+from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
+from gemelo.services.runtime.bus.memory_bus import MemoryBus
+from gemelo.services.runtime.node import Node
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 import gemelo
-from schemas.actions import GoalStatusCode
-from schemas.device import (
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import (
     DeviceCommandRequest,
     DeviceMode,
     DeviceStopRequest,
@@ -18,16 +18,16 @@ from schemas.device import (
     ResumeCommand,
     StopKind,
 )
-from schemas.joints import JointState
-from schemas.planning import JointGoal, NamedGoal, PlanRequest, PoseGoal
-from schemas.topics import JOINT_STATES, JOINT_TARGETS
-from services.cli import action, device, node, state, topic, topic_rates
-from services.cli.errors import CommandError, ExitCode
-from services.cli.field_path import FieldPath
-from services.cli.forms import yaml_document
-from services.cli.messages import message_of
-from services.cli.move import move
-from services.cli.terminal import Interrupt
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JointGoal, NamedGoal, PlanRequest, PoseGoal
+from gemelo.schemas.topics import JOINT_STATES, JOINT_TARGETS
+from gemelo.services.cli import action, device, node, state, topic, topic_rates
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.field_path import FieldPath
+from gemelo.services.cli.forms import yaml_document
+from gemelo.services.cli.messages import message_of
+from gemelo.services.cli.move import move
+from gemelo.services.cli.terminal import Interrupt
 
 READY = PlanRequest(goal=NamedGoal(name="ready"))
 
@@ -152,8 +152,8 @@ def test_only_the_writer_of_a_topic_may_publish_on_it(session):
 
 
 def test_pub_stamps_what_has_no_stamp(session, network, deployment, capsys):
-    from services.runtime.bus.memory_bus import MemoryBus
-    from services.runtime.node import Node
+    from gemelo.services.runtime.bus.memory_bus import MemoryBus
+    from gemelo.services.runtime.node import Node
 
     heard = []
     with Node("listener", deployment, robot="rm1", bus=MemoryBus(network)) as listener:

@@ -8,11 +8,11 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.device import DeviceMode, DeviceState
-from schemas.joints import JointState
-from services.cli.messages import dump
-from services.cli.text_table import table
-from services.cli.topic_rates import RateWindow
+from gemelo.schemas.device import DeviceMode, DeviceState
+from gemelo.schemas.joints import JointState
+from gemelo.services.cli.messages import dump
+from gemelo.services.cli.text_table import table
+from gemelo.services.cli.topic_rates import RateWindow
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | texts

@@ -12,19 +12,19 @@ import pytest
 
 import gemelo
 from gemelo.api import planning
-from schemas.joints import JointState
-from schemas.planning import NamedGoal, PlanPhase, PlanProgress, PlanRequest, PlanResponse
-from schemas.scene import SceneReplace, SceneRequest
-from schemas.topics import PLAN, PLAN_PROGRESS, SCENE_EDIT
-from services.cli import move as move_module
-from services.cli.errors import CommandError, ExitCode
-from services.cli.move import move
-from services.cli.terminal import LiveBlock
-from services.planner.core import Planner
-from services.planner.main import run
-from services.runtime.bus.memory_bus import MemoryBus
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import NamedGoal, PlanPhase, PlanProgress, PlanRequest, PlanResponse
+from gemelo.schemas.scene import SceneReplace, SceneRequest
+from gemelo.schemas.topics import PLAN, PLAN_PROGRESS, SCENE_EDIT
+from gemelo.services.cli import move as move_module
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.move import move
+from gemelo.services.cli.terminal import LiveBlock
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.main import run
+from gemelo.services.runtime.bus.memory_bus import MemoryBus
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.planner.walled import WALLED, past_the_wall
 from tests.runtime.support import spinning
 

@@ -10,19 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.frames import FrameTransforms
-from schemas.joints import JointState, StepErrors
-from schemas.message import Message
-from schemas.topics import JOINT_STATES, STEP_ERRORS, Delivery, Topic
-from services.cli import living_topics
-from services.cli.chart import ACROSS, BLANK, DOTS, DOWN, LABEL, ChartCurve, chart
-from services.cli.errors import CommandError, ExitCode
-from services.cli.field_path import FieldPath
-from services.cli.main import run
-from services.cli.plot import Field, Plot, plot
-from services.cli.terminal import COLOUR, LiveBlock, cut
-from services.runtime.bus.memory_bus import MemoryBus
-from services.runtime.node import Node
+from gemelo.schemas.frames import FrameTransforms
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import JOINT_STATES, STEP_ERRORS, Delivery, Topic
+from gemelo.services.cli import living_topics
+from gemelo.services.cli.chart import ACROSS, BLANK, DOTS, DOWN, LABEL, ChartCurve, chart
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.field_path import FieldPath
+from gemelo.services.cli.main import run
+from gemelo.services.cli.plot import Field, Plot, plot
+from gemelo.services.cli.terminal import COLOUR, LiveBlock, cut
+from gemelo.services.runtime.bus.memory_bus import MemoryBus
+from gemelo.services.runtime.node import Node
 from tests.runtime.support import spinning
 
 COLUMNS, ROWS = 60, 10

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from schemas.joints import JointState
-from schemas.message import encode
-from schemas.scene import (
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import encode
+from gemelo.schemas.scene import (
     AllowedPair,
     BoxShape,
     CylinderShape,
@@ -23,17 +23,17 @@ from schemas.scene import (
     SceneObject,
     SphereShape,
 )
-from schemas.scene_meshes import mesh_digest
-from schemas.topics import JOINT_STATES, SCENE
-from services.cli import scene as scene_module
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.cli.scene import attach_choices, pair_choices
-from services.cli.session import load_robot, reported
-from services.planner.scene.answer_log import AnswerLog
-from services.planner.scene.scene_keeper import SceneKeeper
-from services.runtime.bus.memory_bus import MemoryBus
-from services.runtime.node import Node
+from gemelo.schemas.scene_meshes import mesh_digest
+from gemelo.schemas.topics import JOINT_STATES, SCENE
+from gemelo.services.cli import scene as scene_module
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.cli.scene import attach_choices, pair_choices
+from gemelo.services.cli.session import load_robot, reported
+from gemelo.services.planner.scene.answer_log import AnswerLog
+from gemelo.services.planner.scene.scene_keeper import SceneKeeper
+from gemelo.services.runtime.bus.memory_bus import MemoryBus
+from gemelo.services.runtime.node import Node
 from tests.runtime.support import until
 
 Said = Callable[[str], ExitCode]

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.cli.errors import CommandError, ExitCode
-from services.cli.main import run
-from services.cli.units import ANGLE, FAR, LENGTH, SHARE, SPEED, parse_joints, parse_quantity, show
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.cli.units import ANGLE, FAR, LENGTH, SHARE, SPEED, parse_joints, parse_quantity, show
 
 
 @dataclass(frozen=True)

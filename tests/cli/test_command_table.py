@@ -8,10 +8,10 @@ import sys
 
 import pytest
 
-from services.arm.model import description
-from services.cli.commands import COMMANDS, GROUPS
-from services.cli.errors import ExitCode
-from services.cli.main import parse, run
+from gemelo.services.arm.model import description
+from gemelo.services.cli.commands import COMMANDS, GROUPS
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import parse, run
 from tests.table import table
 
 SPEAKING = (
@@ -95,17 +95,23 @@ def test_a_robot_that_cannot_be_read_still_completes_the_commands(monkeypatch, c
 @pytest.mark.parametrize(
     ("line", "absent"),
     [
-        (["--help"], ("msgspec", "numpy", "zenoh", "services.cli.move", "services.cli.topic")),
+        (["--help"], ("msgspec", "numpy", "zenoh", "gemelo.services.cli.move", "gemelo.services.cli.topic")),
         (
             ["topic", "list"],
-            ("numpy", "zenoh", "services.arm.model.description", "services.cli.move", "services.runtime.actions"),
+            (
+                "numpy",
+                "zenoh",
+                "gemelo.services.arm.model.description",
+                "gemelo.services.cli.move",
+                "gemelo.services.runtime.actions",
+            ),
         ),
-        (["move", "--help"], ("numpy", "zenoh", "rich", "services.cli.jog")),
+        (["move", "--help"], ("numpy", "zenoh", "rich", "gemelo.services.cli.jog")),
     ],
 )
 def test_a_command_loads_nothing_that_it_does_not_use(line, absent):
     program = (
-        "import sys\nfrom services.cli.main import run\n"
+        "import sys\nfrom gemelo.services.cli.main import run\n"
         f"try:\n    run({line!r})\nexcept SystemExit:\n    pass\nprint(*sys.modules, file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True)

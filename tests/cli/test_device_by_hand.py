@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import pytest
 
 import gemelo
-from schemas.device import DeviceState
-from schemas.topics import DEVICE_SHAFT, DEVICE_STATE
-from services.cli.errors import ExitCode
+from gemelo.schemas.device import DeviceState
+from gemelo.schemas.topics import DEVICE_SHAFT, DEVICE_STATE
+from gemelo.services.cli.errors import ExitCode
 from tests.simulated import TypedAt
 
 NEAR_ITS_SWITCHES = {

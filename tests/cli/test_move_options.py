@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from schemas.planning import (
+from gemelo.schemas.planning import (
     CircularMotion,
     FreeMotion,
     JointGoal,
@@ -16,13 +16,13 @@ from schemas.planning import (
     PoseGoal,
     WaypointGoal,
 )
-from services.arm.frames.transforms import from_rpy
-from services.arm.model.description import load_arm
-from services.cli.errors import CommandError
-from services.cli.main import parse
-from services.cli.move import EXAMPLES
-from services.cli.move_report import MoveReport, summary
-from services.cli.move_request import request_from
+from gemelo.services.arm.frames.transforms import from_rpy
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.cli.errors import CommandError
+from gemelo.services.cli.main import parse
+from gemelo.services.cli.move import EXAMPLES
+from gemelo.services.cli.move_report import MoveReport, summary
+from gemelo.services.cli.move_request import request_from
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 

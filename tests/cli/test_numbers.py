@@ -8,19 +8,19 @@ from typing import NamedTuple
 
 import pytest
 
-from services.arm.model.description import load_arm
-from services.cli import units
-from services.cli.commands import COMMANDS
-from services.cli.device import reference_request
-from services.cli.device_press import request_of
-from services.cli.errors import CommandError, ExitCode
-from services.cli.jog import command_of
-from services.cli.kinematics import ik_request
-from services.cli.main import parse
-from services.cli.move_request import request_from
-from services.cli.parser import Options, Parser, complete
-from services.cli.scene_object import object_of
-from services.cli.units import (
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.cli import units
+from gemelo.services.cli.commands import COMMANDS
+from gemelo.services.cli.device import reference_request
+from gemelo.services.cli.device_press import request_of
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.jog import command_of
+from gemelo.services.cli.kinematics import ik_request
+from gemelo.services.cli.main import parse
+from gemelo.services.cli.move_request import request_from
+from gemelo.services.cli.parser import Options, Parser, complete
+from gemelo.services.cli.scene_object import object_of
+from gemelo.services.cli.units import (
     ACCELERATION,
     ANGLE,
     ANGULAR_SPEED,

@@ -11,15 +11,15 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from schemas.plain_text import escaped, escaped_but_colours
-from schemas.system import LogLevel, LogRecord
-from services.cli.errors import ExitCode
-from services.cli.log import line_of
-from services.cli.main import run
-from services.cli.messages import dump
-from services.cli.output import EscapedStream, control, escaped_output, print_coloured
-from services.cli.terminal import LiveBlock
-from services.runtime.process.logs import line_logger
+from gemelo.schemas.plain_text import escaped, escaped_but_colours
+from gemelo.schemas.system import LogLevel, LogRecord
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.log import line_of
+from gemelo.services.cli.main import run
+from gemelo.services.cli.messages import dump
+from gemelo.services.cli.output import EscapedStream, control, escaped_output, print_coloured
+from gemelo.services.cli.terminal import LiveBlock
+from gemelo.services.runtime.process.logs import line_logger
 
 CLIPBOARD = "\x1b]52;c;cm0gLXJmIH4=\x07"  # what a terminal puts into its clipboard
 ATTACKS = (

@@ -11,11 +11,11 @@ import msgspec
 import pytest
 
 import gemelo
-from schemas.planning import PlanResponse
-from services.cli import move
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.cli.session import load_robot, reported
+from gemelo.schemas.planning import PlanResponse
+from gemelo.services.cli import move
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.cli.session import load_robot, reported
 
 
 @pytest.fixture

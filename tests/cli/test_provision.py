@@ -12,12 +12,12 @@ import tty
 import msgspec
 import pytest
 
-from services.cli import provision as module
-from services.cli.credentials import CredentialsChange, certificate, password, private_key, require_sound
-from services.cli.errors import CommandError, ExitCode
-from services.cli.main import run
-from services.credentials.authority import Authority
-from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
+from gemelo.services.cli import provision as module
+from gemelo.services.cli.credentials import CredentialsChange, certificate, password, private_key, require_sound
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.credentials.authority import Authority
+from gemelo.services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 
 
 class Board:
@@ -159,8 +159,8 @@ def test_a_factory_reset_asks_first_and_then_says_only_that(line, capsys, monkey
 
 
 def test_no_option_takes_a_password():
-    from services.cli.commands import COMMANDS
-    from services.cli.completion import options_of
+    from gemelo.services.cli.commands import COMMANDS
+    from gemelo.services.cli.completion import options_of
 
     (command,) = [each for each in COMMANDS if each.words == ("device", "provision")]
     assert [option for option in options_of(command) if "pass" in option] == []

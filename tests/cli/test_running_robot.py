@@ -11,20 +11,20 @@ import pytest
 from msgspec.structs import replace
 
 import gemelo
-from schemas.cell import CellTexts
-from schemas.deployment import Deployment
-from schemas.joints import JointState
-from schemas.topics import CELL, JOINT_STATES
-from services.arm.cell.cell_file import load_cell, read_cell_texts
-from services.cli import doctor
-from services.cli.cells import cell_of
-from services.cli.errors import CommandError, ExitCode
-from services.cli.main import run
-from services.cli.session import load_robot
-from services.runtime.deployment import project_root
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
-from services.runtime.started import chosen_name
+from gemelo.schemas.cell import CellTexts
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.topics import CELL, JOINT_STATES
+from gemelo.services.arm.cell.cell_file import load_cell, read_cell_texts
+from gemelo.services.cli import doctor
+from gemelo.services.cli.cells import cell_of
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.cli.session import load_robot
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
+from gemelo.services.runtime.started import chosen_name
 from tests.runtime.support import RouterProcess, spinning
 
 ROOT = project_root()

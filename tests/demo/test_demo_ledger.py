@@ -3,10 +3,10 @@
 import msgspec
 import pytest
 
-from schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState
-from schemas.joints import StepErrors
-from services.demo.ledger import StepTotals, nearest_step
-from services.demo.report import FOLLOWING_LIMIT, DemoReport, Move, complaints, report_of, text_of
+from gemelo.schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState
+from gemelo.schemas.joints import StepErrors
+from gemelo.services.demo.ledger import StepTotals, nearest_step
+from gemelo.services.demo.report import FOLLOWING_LIMIT, DemoReport, Move, complaints, report_of, text_of
 
 NAMES = ("brazo_joint", "efector_joint")
 

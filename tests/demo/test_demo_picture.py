@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import rerun
 
-from services.demo import main
-from services.visualizer.program import screenshot
+from gemelo.services.demo import main
+from gemelo.services.visualizer.program import screenshot
 from tests.optional import lack
 
 LACK = "Vulkan missing: sudo apt-get install mesa-vulkan-drivers"

@@ -10,8 +10,8 @@ from importlib.metadata import PackageNotFoundError, packages_distributions, req
 
 import pytest
 
-from services.hosts.layout import BROKER, SERVICES, extras
-from services.runtime.deployment import project_root
+from gemelo.services.hosts.layout import BROKER, SERVICES, extras
+from gemelo.services.runtime.deployment import project_root
 from tests.hosts.sites import EXAMPLE, site
 
 ROOT = project_root()
@@ -74,7 +74,7 @@ def blocked_for(chosen: tuple[str, ...]) -> list[str]:
     """The modules of every installed distribution that neither the base nor these extras bring."""
     allowed = closure([*PROJECT["dependencies"], *(each for extra in chosen for each in EXTRAS[extra])])
     allowed |= {"gemelo"}
-    ours = {"firmware", "gemelo", "schemas", "services"}
+    ours = {"gemelo"}
     owners_of = {**packages_distributions(), **IN_A_PREFIX}
     return sorted(
         module
@@ -101,10 +101,10 @@ def test_a_service_is_imported_with_only_the_extras_that_it_names(service):
 
 def test_the_block_is_real():
     with pytest.raises(AssertionError, match="ModuleNotFoundError"):
-        loaded_by("services.planner.main", ())
+        loaded_by("gemelo.services.planner.main", ())
 
 
-@pytest.mark.parametrize("module", [module_of("stepper_gateway"), "services.cli.main", "gemelo"])
+@pytest.mark.parametrize("module", [module_of("stepper_gateway"), "gemelo.services.cli.main", "gemelo"])
 def test_a_gateway_host_and_a_person_need_no_extra(module):
     assert not loaded_by(module, ()) & NEVER_ON_A_GATEWAY
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from services.runtime.deployment import project_root
+from gemelo.services.runtime.deployment import project_root
 from tests import optional
 
 ROOT = project_root()

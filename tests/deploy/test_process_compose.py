@@ -7,9 +7,9 @@ import tomllib
 
 import yaml
 
-from schemas.topics import ACTIONS, REQUESTS, TOPICS
-from services.runtime.deployment import project_root
-from services.stack.stack import PROCESSES
+from gemelo.schemas.topics import ACTIONS, REQUESTS, TOPICS
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.stack.stack import PROCESSES
 
 ROOT = project_root()
 COMPOSE = yaml.safe_load((ROOT / "process-compose.yaml").read_text())

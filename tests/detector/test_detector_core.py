@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from schemas.camera import CameraInfo
-from schemas.cell import BoxThing, Colour, ColourThing, VirtualSource
-from schemas.detections import Detection, Detections
-from schemas.joints import JointState
-from services.arm.cell.camera_model import believed_info, exact_info
-from services.arm.cell.cell_file import Cell, load_cell
-from services.arm.cell.colours import RGB, nearest_colour
-from services.arm.frames.transforms import from_rpy
-from services.arm.model.description import ArmDescription, load_arm
-from services.camera.virtual.virtual_camera import VirtualCamera, true_detections
-from services.camera.virtual.world import CameraWorld
-from services.detector.core import Detector
-from services.vision.rigid import Array, from_transform
+from gemelo.schemas.camera import CameraInfo
+from gemelo.schemas.cell import BoxThing, Colour, ColourThing, VirtualSource
+from gemelo.schemas.detections import Detection, Detections
+from gemelo.schemas.joints import JointState
+from gemelo.services.arm.cell.camera_model import believed_info, exact_info
+from gemelo.services.arm.cell.cell_file import Cell, load_cell
+from gemelo.services.arm.cell.colours import RGB, nearest_colour
+from gemelo.services.arm.frames.transforms import from_rpy
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.camera.virtual.virtual_camera import VirtualCamera, true_detections
+from gemelo.services.camera.virtual.world import CameraWorld
+from gemelo.services.detector.core import Detector
+from gemelo.services.vision.rigid import Array, from_transform
 
 ON_PLANE, OF_BOX = 0.1e-3, 0.5e-3  # [m]
 

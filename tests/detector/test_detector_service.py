@@ -11,26 +11,26 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from schemas.camera import CameraImage, CameraInfo
-from schemas.cell import VirtualSource
-from schemas.deployment import Deployment
-from schemas.detections import Detections
-from schemas.joints import JointState
-from schemas.system import LogRecord
-from schemas.topics import JOINT_STATES, LOG, camera_detections, camera_image, camera_info
-from services.arm.cell.camera_model import believed_info
-from services.arm.cell.cell_file import Cell, load_cell
-from services.arm.frames.transforms import compose, from_message, from_rpy, inverse, to_message
-from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import ArmDescription, load_arm
-from services.camera.sources.source import encoded
-from services.camera.virtual.virtual_camera import VirtualCamera
-from services.camera.virtual.world import CameraWorld
-from services.detector.images import NoPicture, decoded
-from services.detector.main import Places, run
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.deployment import load_deployment
-from services.runtime.node import Node
+from gemelo.schemas.camera import CameraImage, CameraInfo
+from gemelo.schemas.cell import VirtualSource
+from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.detections import Detections
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.system import LogRecord
+from gemelo.schemas.topics import JOINT_STATES, LOG, camera_detections, camera_image, camera_info
+from gemelo.services.arm.cell.camera_model import believed_info
+from gemelo.services.arm.cell.cell_file import Cell, load_cell
+from gemelo.services.arm.frames.transforms import compose, from_message, from_rpy, inverse, to_message
+from gemelo.services.arm.kinematics.chain import link_transforms
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.camera.sources.source import encoded
+from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
+from gemelo.services.camera.virtual.world import CameraWorld
+from gemelo.services.detector.images import NoPicture, decoded
+from gemelo.services.detector.main import Places, run
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.deployment import load_deployment
+from gemelo.services.runtime.node import Node
 from tests.runtime.support import hear, spinning
 from tests.runtime.test_clock_offset import Skewed
 

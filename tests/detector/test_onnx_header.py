@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from services.detector.onnx_header import Header, NotOnnx, read_header
+from gemelo.services.detector.onnx_header import Header, NotOnnx, read_header
 from tests.detector.onnx_file import red_finder
 from tests.table import table
 

@@ -8,11 +8,11 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from firmware.bindings.device import CoreDevice
-from firmware.bindings.injection import inject
-from schemas.device import DeviceCommandKind, DeviceMode, InjectKind, InjectRequest
-from schemas.device_config import DeviceConfig, JointConfig
-from schemas.robot import Motor
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.firmware.bindings.injection import inject
+from gemelo.schemas.device import DeviceCommandKind, DeviceMode, InjectKind, InjectRequest
+from gemelo.schemas.device_config import DeviceConfig, JointConfig
+from gemelo.schemas.robot import Motor
 
 BOOT = 0x12345678
 NEVER = (1 << 64) - 1

@@ -6,7 +6,7 @@ import msgspec
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from schemas.device_config import (
+from gemelo.schemas.device_config import (
     UNUSED,
     DeviceConfig,
     HomingConfig,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from firmware.platform.host.board import DeviceClock
-from schemas.actions import GoalStatusCode
-from services.virtual_arm.virtual_arm import BOOTED, VirtualArm, VirtualWire
+from gemelo.firmware.platform.host.board import DeviceClock
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.services.virtual_arm.virtual_arm import BOOTED, VirtualArm, VirtualWire
 from tests.stepper_gateway.harness import move
 
 

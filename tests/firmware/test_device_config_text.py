@@ -12,10 +12,10 @@ from hypothesis import HealthCheck, assume, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from firmware.bindings.parsers import ConfigTextRefused, read_config
-from schemas.device_config import DeviceConfig, JointConfig, config_text
-from services.arm.device.device_config import device_config
-from services.arm.model.description import load_arm
+from gemelo.firmware.bindings.parsers import ConfigTextRefused, read_config
+from gemelo.schemas.device_config import DeviceConfig, JointConfig, config_text
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.arm.model.description import load_arm
 from tests.profiles import examples
 
 LARGEST = 8220  # [bytes] kMaxConfigText of core/config_text.h

@@ -7,8 +7,8 @@ import random
 
 from bench_firmware import FIRST, LAST, Bench, Row, rm1_config, smooth, traj
 
-from schemas.device import DeviceMode
-from schemas.device_config import DeviceConfig, JointConfig
+from gemelo.schemas.device import DeviceMode
+from gemelo.schemas.device_config import DeviceConfig, JointConfig
 
 OK, DUPLICATE, GAP, NO_SPACE = 0, 1, 2, 3
 HALF_A_STEP = 128  # [1/256 step]

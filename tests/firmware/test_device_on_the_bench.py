@@ -12,9 +12,9 @@ from bench_firmware import FIRST, LAST, Bench, Row, command, rm1_config, smooth,
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.bindings.device import ConfigError, CoreDevice
-from schemas.device import DeviceMode
-from schemas.device_config import DeviceConfig, JointConfig
+from gemelo.firmware.bindings.device import ConfigError, CoreDevice
+from gemelo.schemas.device import DeviceMode
+from gemelo.schemas.device_config import DeviceConfig, JointConfig
 from tests.profiles import examples
 from tests.table import table
 

@@ -10,14 +10,14 @@ import pytest
 from bench_firmware import command
 from update_bed import NEWER, LossyWire, UpdateBed, an_image, silent_core
 
-from firmware.platform.host.image import source_version, virtual_image
-from schemas.device import DeviceCommandKind
-from services.cli import device_update, update_transfer
-from services.cli.errors import CommandError, ExitCode
-from services.cli.main import run
-from services.cli.provision import BAUD, open_line
-from services.cli.update_transfer import SerialWire, Transfer, await_status
-from services.runtime.firmware_update import (
+from gemelo.firmware.platform.host.image import source_version, virtual_image
+from gemelo.schemas.device import DeviceCommandKind
+from gemelo.services.cli import device_update, update_transfer
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.cli.provision import BAUD, open_line
+from gemelo.services.cli.update_transfer import SerialWire, Transfer, await_status
+from gemelo.services.runtime.firmware_update import (
     HEADER,
     PIECE,
     VIRTUAL_CHIP,
@@ -28,7 +28,7 @@ from services.runtime.firmware_update import (
     read_header,
     update_frame,
 )
-from services.runtime.signatures import is_signed, make_key, sign
+from gemelo.services.runtime.signatures import is_signed, make_key, sign
 
 WHOLE: Callable[[int, bytes], list[bytes]] = lambda _, frame: [frame]  # noqa: E731
 
@@ -83,7 +83,7 @@ def test_a_board_runs_the_new_firmware_from_the_other_slot_and_keeps_it(
 def test_a_firmware_that_says_nothing_gives_way_to_the_one_before(
     bed: UpdateBed, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    from firmware.platform.host import virtual_esp32
+    from gemelo.firmware.platform.host import virtual_esp32
 
     monkeypatch.setattr(virtual_esp32, "TRIAL", 1.0)
     assert bed.update(an_image(silent_core(tmp_path))) is ExitCode.FAILED

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from machine_code import Function, functions, reached
 
-from firmware.platform.esp32.check_linked import INSIDE, IRAM
-from firmware.platform.esp32.check_linked import functions as functions_in
+from gemelo.firmware.platform.esp32.check_linked import INSIDE, IRAM
+from gemelo.firmware.platform.esp32.check_linked import functions as functions_in
 from tests.optional import need
 
 ROOT = Path(__file__).parents[2]

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from update_bed import NAME, ROOT, an_image, newer_core
 
-from firmware.bindings.library import LIBRARY, LibraryMissing
-from firmware.platform.host.firmware_slots import FirmwareSlots
-from services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.firmware.bindings.library import LIBRARY, LibraryMissing
+from gemelo.firmware.platform.host.firmware_slots import FirmwareSlots
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles
 from tests.disks import WAYS, refusing_disk
 
 GONE = "replaced by a file"  # what was in the folder cannot be read either
@@ -83,7 +83,7 @@ def test_where_no_slot_can_be_started_the_process_ends_with_one_sentence_and_a_r
         board.boot()
     assert remedy in str(error.value)
     ended = subprocess.run(
-        [sys.executable, "-m", "firmware.platform.host.main"], cwd=ROOT, capture_output=True, text=True,
+        [sys.executable, "-m", "gemelo.firmware.platform.host.main"], cwd=ROOT, capture_output=True, text=True,
         check=False, timeout=60.0, env={**os.environ, "GEMELO_PATHS_RUN": str(tmp_path / "run")},
     )  # fmt: skip
     assert ended.returncode == 1

@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from firmware.platform.host.flash import NetworkCredentials
-from firmware.platform.host.link import Connected, Denied, DeviceLink, Disconnected, Item, MqttMessage
-from firmware.platform.host.network import AddressError, broker_address
-from schemas.device_topics import topic
-from services.credentials.authority import Authority
-from services.mqtt import secure_folder
-from services.mqtt.access import BrokerAccess, device_access, gateway_access
-from services.mqtt.client import MqttClient
+from gemelo.firmware.platform.host.flash import NetworkCredentials
+from gemelo.firmware.platform.host.link import Connected, Denied, DeviceLink, Disconnected, Item, MqttMessage
+from gemelo.firmware.platform.host.network import AddressError, broker_address
+from gemelo.schemas.device_topics import topic
+from gemelo.services.credentials.authority import Authority
+from gemelo.services.mqtt import secure_folder
+from gemelo.services.mqtt.access import BrokerAccess, device_access, gateway_access
+from gemelo.services.mqtt.client import MqttClient
 from tests.stepper_gateway.locked import Mosquitto, locked, renew
 
 pytestmark = pytest.mark.full

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from bed_firmware import Bed, open_bed, wait_for
 
-from firmware.platform.host.memory import PositionStore, StoredPosition
-from services.chaos.descriptors import give_descriptors, take_descriptors
-from services.runtime.process import unwritten as attempts
-from services.runtime.process.readiness import says_ready
-from services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.firmware.platform.host.memory import PositionStore, StoredPosition
+from gemelo.services.chaos.descriptors import give_descriptors, take_descriptors
+from gemelo.services.runtime.process import unwritten as attempts
+from gemelo.services.runtime.process.readiness import says_ready
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles
 from tests.disks import WAYS, Disk, refusing_disk
 
 REFERENCE = (0, 0, 0)

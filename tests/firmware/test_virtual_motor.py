@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.bindings.motor import MotorError, VirtualMotor
-from schemas.robot import Motor, PullOut
+from gemelo.firmware.bindings.motor import MotorError, VirtualMotor
+from gemelo.schemas.robot import Motor, PullOut
 from tests.profiles import examples
 
 NEMA23 = PullOut(

@@ -7,8 +7,8 @@ import struct
 from bed_firmware import Bed, wait_for
 from bench_firmware import command
 
-from schemas.device import DeviceCommandKind, InjectKind
-from services.stepper_gateway.links.frames import Code
+from gemelo.schemas.device import DeviceCommandKind, InjectKind
+from gemelo.services.stepper_gateway.links.frames import Code
 
 WAY = 200  # [steps]
 

@@ -11,9 +11,9 @@ import paho.mqtt.client as paho
 import pytest
 from paho.mqtt.enums import CallbackAPIVersion
 
-from schemas.device_topics import topic
-from services.chaos.slow_link import client_id_in
-from services.stepper_gateway.links.frames import Sync, encode
+from gemelo.schemas.device_topics import topic
+from gemelo.services.chaos.slow_link import client_id_in
+from gemelo.services.stepper_gateway.links.frames import Sync, encode
 from tests.mqtt.packet_proxy import PacketProxy
 from tests.stepper_gateway.processes import DEVICE, Processes
 

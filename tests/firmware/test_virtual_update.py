@@ -9,12 +9,12 @@ import pytest
 from bed_firmware import Bed, wait_for
 from update_bed import NEWER, an_image
 
-from firmware.platform.host.flash import Flash, NetworkCredentials
-from schemas.device import DeviceCommandKind
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.runtime.process.unwritten import UnwrittenFiles
-from services.runtime.signatures import make_key
+from gemelo.firmware.platform.host.flash import Flash, NetworkCredentials
+from gemelo.schemas.device import DeviceCommandKind
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.services.runtime.signatures import make_key
 
 pytestmark = pytest.mark.full
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware.draw_wiring import HEIGHT, PICTURE, WIDTH, draw, read_pins
+from gemelo.firmware.draw_wiring import HEIGHT, PICTURE, WIDTH, draw, read_pins
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "firmware/README.md").read_text()
@@ -34,7 +34,7 @@ def test_the_readme_names_the_pins_of_robot_toml() -> None:
 
 
 def test_the_picture_is_what_robot_toml_says_now() -> None:
-    assert PICTURE.read_text() == draw(read_pins()).svg(), "remedy: python -m firmware.draw_wiring"
+    assert PICTURE.read_text() == draw(read_pins()).svg(), "remedy: python -m gemelo.firmware.draw_wiring"
 
 
 def test_no_label_of_the_picture_covers_another_or_leaves_the_paper() -> None:

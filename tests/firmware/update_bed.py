@@ -14,27 +14,27 @@ import msgspec
 from bed_firmware import free_port
 from bench_firmware import command
 
-from firmware.bindings.library import LIBRARY
-from firmware.platform.host import virtual_esp32
-from firmware.platform.host.board import Board
-from firmware.platform.host.image import source_version, virtual_image
-from firmware.platform.host.link import Item, SerialBytes, ShutdownRequested
-from firmware.platform.host.network import Network
-from firmware.platform.host.pty import SerialLine
-from firmware.platform.host.virtual_esp32 import VirtualEsp32
-from firmware.platform.host.wires import Wires
-from schemas.device import DeviceCommandKind
-from services.arm.model.description import load_arm
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.cli.provision import BAUD, open_line
-from services.cli.update_transfer import SerialWire, UpdateStatus, UpdateWire, await_status
-from services.mqtt.access import BrokerAccess
-from services.runtime.firmware_update import UpdateAck
-from services.runtime.process.readiness import Readiness
-from services.runtime.process.unwritten import UnwrittenFiles
-from services.runtime.serial_frames import packet
-from services.runtime.signatures import make_key
+from gemelo.firmware.bindings.library import LIBRARY
+from gemelo.firmware.platform.host import virtual_esp32
+from gemelo.firmware.platform.host.board import Board
+from gemelo.firmware.platform.host.image import source_version, virtual_image
+from gemelo.firmware.platform.host.link import Item, SerialBytes, ShutdownRequested
+from gemelo.firmware.platform.host.network import Network
+from gemelo.firmware.platform.host.pty import SerialLine
+from gemelo.firmware.platform.host.virtual_esp32 import VirtualEsp32
+from gemelo.firmware.platform.host.wires import Wires
+from gemelo.schemas.device import DeviceCommandKind
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.cli.provision import BAUD, open_line
+from gemelo.services.cli.update_transfer import SerialWire, UpdateStatus, UpdateWire, await_status
+from gemelo.services.mqtt.access import BrokerAccess
+from gemelo.services.runtime.firmware_update import UpdateAck
+from gemelo.services.runtime.process.readiness import Readiness
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.services.runtime.serial_frames import packet
+from gemelo.services.runtime.signatures import make_key
 
 ROOT = Path(__file__).resolve().parents[2]
 NEWER = "1.0.9"  # as long as the version that it replaces in the library's bytes

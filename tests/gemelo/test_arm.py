@@ -8,8 +8,8 @@ import pytest
 
 import gemelo
 from gemelo.api.simulation import SimulatedArm
-from schemas.device import HomeCommand
-from schemas.planning import PlanProgress
+from gemelo.schemas.device import HomeCommand
+from gemelo.schemas.planning import PlanProgress
 from tests.simulated import is_moving
 
 

@@ -16,28 +16,28 @@ import gemelo
 from gemelo.api import control_file
 from gemelo.api.control import Hold
 from gemelo.api.session import Session
-from schemas.actions import GoalRequest, GoalResponse, ResultRequest
-from schemas.control import ControlAnswer, ControlState, ControlTake
-from schemas.deployment import Deployment, PathsSection
-from schemas.joints import JointTargets
-from schemas.message import encode
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from schemas.system import Failure
-from schemas.topics import CONTROL, CONTROL_TAKE, DEVICE_EVENTS, FOLLOW_JOINT_TRAJECTORY, GATEWAY_INPUTS, LOG
-from services.arm.model.description import load_arm
-from services.cli.control import describe
-from services.runtime.actions.keys import goal_request, result_request
-from services.runtime.bus.interface import BusReply
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.client_watch import RETURN, Absence
-from services.runtime.errors import GoalRefused
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import BeganInput, unpacked
-from services.stepper_gateway.ledger.ledger_file import LedgerFile
-from services.stepper_gateway.parameters import GatewayParameters
-from services.stepper_gateway.shell import Shell
+from gemelo.schemas.actions import GoalRequest, GoalResponse, ResultRequest
+from gemelo.schemas.control import ControlAnswer, ControlState, ControlTake
+from gemelo.schemas.deployment import Deployment, PathsSection
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.message import encode
+from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from gemelo.schemas.system import Failure
+from gemelo.schemas.topics import CONTROL, CONTROL_TAKE, DEVICE_EVENTS, FOLLOW_JOINT_TRAJECTORY, GATEWAY_INPUTS, LOG
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.cli.control import describe
+from gemelo.services.runtime.actions.keys import goal_request, result_request
+from gemelo.services.runtime.bus.interface import BusReply
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.client_watch import RETURN, Absence
+from gemelo.services.runtime.errors import GoalRefused
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.inputs import BeganInput, unpacked
+from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.stepper_gateway.shell import Shell
 from tests.runtime.support import ROOT, spinning, until
 
 

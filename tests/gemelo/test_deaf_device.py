@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from firmware.bindings.device import CoreDevice
-from schemas.actions import GoalStatusCode
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from schemas.topics import DEVICE_STATUS, FOLLOW_JOINT_TRAJECTORY
-from services.arm.device.device_config import device_config, reference_steps
-from services.arm.model.description import ArmDescription
-from services.runtime.errors import GoalRefused
-from services.stepper_gateway.links.link import Kind, Received
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from gemelo.schemas.topics import DEVICE_STATUS, FOLLOW_JOINT_TRAJECTORY
+from gemelo.services.arm.device.device_config import device_config, reference_steps
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.runtime.errors import GoalRefused
+from gemelo.services.stepper_gateway.links.link import Kind, Received
 from tests.gemelo.test_control import Lab, refusal
 from tests.runtime.support import until
 from tests.stepper_gateway.harness import move

@@ -10,7 +10,7 @@ import pytest
 
 from gemelo import Refused
 from gemelo.api.jog import BEGIN, PERIOD, JogCommands
-from schemas.planning import JogCommand, JogStatus
+from gemelo.schemas.planning import JogCommand, JogStatus
 
 BUSY = JogStatus(limited_by="a goal is being carried out: cancel it first")
 HELD = JogStatus(limited_by="ana holds control", check="control")

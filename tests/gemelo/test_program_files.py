@@ -42,7 +42,7 @@ from gemelo.programs import (
 from gemelo.programs.reading import parse_program
 from gemelo.programs.steps import KINDS
 from gemelo.programs.toml_lines import toml_lines
-from services.arm.model.description import load_arm
+from gemelo.services.arm.model.description import load_arm
 from tests.table import table
 
 ROBOT = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")

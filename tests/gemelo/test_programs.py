@@ -38,7 +38,7 @@ from gemelo.programs import (
     export_script,
 )
 from gemelo.programs.steps import AnyStep
-from schemas.device import DeviceMode, DeviceState
+from gemelo.schemas.device import DeviceMode, DeviceState
 from tests.gemelo.test_docstrings import OPTIONS
 from tests.simulated import is_moving, make_ready, rests
 

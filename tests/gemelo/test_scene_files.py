@@ -7,7 +7,7 @@ import pytest
 
 import gemelo
 from gemelo.api.scene_files import read_scene, write_scene
-from schemas.scene import PlanningScene, SceneObject, SphereShape
+from gemelo.schemas.scene import PlanningScene, SceneObject, SphereShape
 
 ONE = PlanningScene(objects=(SceneObject(name="ball", shape=SphereShape(radius=0.02)),))
 

@@ -8,10 +8,10 @@ import pytest
 
 from gemelo.api.seeing import Seen, add_to_scene, body_of, combined, streams, why_unclear
 from gemelo.api.units import Pose
-from schemas.camera import CameraCondition, CameraStatus
-from schemas.cell import ColourThing, TagThing
-from schemas.detections import Detection, DetectionKind, Detections, Unclear
-from schemas.frames import Transform
+from gemelo.schemas.camera import CameraCondition, CameraStatus
+from gemelo.schemas.cell import ColourThing, TagThing
+from gemelo.schemas.detections import Detection, DetectionKind, Detections, Unclear
+from gemelo.schemas.frames import Transform
 
 TURN = (0.0, 0.0, 0.0, 1.0)
 

@@ -10,16 +10,16 @@ from contextlib import ExitStack
 import pytest
 from msgspec.structs import replace
 
-from schemas.deployment import Broker, MqttSection
-from schemas.device import DeviceStatus
-from schemas.topics import DEVICE_STATUS
-from services.cli.main import run
-from services.credentials.authority import Authority
-from services.credentials.expiry import DAY, expiry
-from services.hosts.certificates import Certificate, days_by_host, endings, older, shown_at
-from services.mqtt import secure_folder
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
+from gemelo.schemas.deployment import Broker, MqttSection
+from gemelo.schemas.device import DeviceStatus
+from gemelo.schemas.topics import DEVICE_STATUS
+from gemelo.services.cli.main import run
+from gemelo.services.credentials.authority import Authority
+from gemelo.services.credentials.expiry import DAY, expiry
+from gemelo.services.hosts.certificates import Certificate, days_by_host, endings, older, shown_at
+from gemelo.services.mqtt import secure_folder
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.hosts.site_router import SiteRouter
 from tests.runtime.locks import HOST, Lock, LockedRouter
 from tests.runtime.support import free_port, spinning

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 
-from services.hosts.layout import extras
-from services.hosts.render import rendered
-from services.runtime.deployment import project_root
+from gemelo.services.hosts.layout import extras
+from gemelo.services.hosts.render import rendered
+from gemelo.services.runtime.deployment import project_root
 from tests.hosts.sites import site
 
 

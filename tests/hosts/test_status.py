@@ -8,18 +8,18 @@ from contextlib import ExitStack
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.device import DeviceStatus
-from schemas.roles import SERVICES
-from schemas.system import NodeInfo
-from schemas.topics import DEVICE_STATUS
-from services.cli.deploy_status import summary
-from services.cli.main import run
-from services.hosts.checks import load_site
-from services.hosts.status import SeenNode, SeenRobot, ServiceState, is_well, site_status
-from services.runtime.clock_offset import ClockOffset
-from services.runtime.deployment import project_root
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
+from gemelo.schemas.device import DeviceStatus
+from gemelo.schemas.roles import SERVICES
+from gemelo.schemas.system import NodeInfo
+from gemelo.schemas.topics import DEVICE_STATUS
+from gemelo.services.cli.deploy_status import summary
+from gemelo.services.cli.main import run
+from gemelo.services.hosts.checks import load_site
+from gemelo.services.hosts.status import SeenNode, SeenRobot, ServiceState, is_well, site_status
+from gemelo.services.runtime.clock_offset import ClockOffset
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.hosts.sites import EXAMPLE
 from tests.runtime.support import RouterProcess, spinning
 

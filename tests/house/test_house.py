@@ -24,10 +24,10 @@ from tests.house.counts import (
 )
 
 KEPT = {
-    "services.planner.parameters": "as the parameters of every service",
-    "services.panel.view.pick_box": "a part of the page, as all its boxes",
-    "services.runtime.process.freed_memory": "the C library's heap, apart from the main of services",
-    "services.stepper_gateway.ledger.reasons": "the sentences, apart from the arithmetic",
+    "gemelo.services.planner.parameters": "as the parameters of every service",
+    "gemelo.services.panel.view.pick_box": "a part of the page, as all its boxes",
+    "gemelo.services.runtime.process.freed_memory": "the C library's heap, apart from the main of services",
+    "gemelo.services.stepper_gateway.ledger.reasons": "the sentences, apart from the arithmetic",
 }
 LOOKERS = ("tests/", "services/bench/", "services/chaos/", "services/demo/", "docs/", "examples/")
 CLAUSES = {"What", "Where", "How", "Whether", "Who", "When", "Which", "Why", "Whatever", "True", "From", "By", "For"}

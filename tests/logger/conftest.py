@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from schemas.device import CommandAck, CommandChunk
+from gemelo.schemas.device import CommandAck, CommandChunk
 
 JOINTS = ("brazo_joint", "antebrazo_joint", "efector_joint")
 START = 1_795_000_000_000_000_000

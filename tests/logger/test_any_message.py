@@ -10,13 +10,13 @@ import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
-from schemas.message import Message, decode, encode
-from schemas.topics import TOPICS
-from services.logger.core import Logger
-from services.logger.recording import Recording
-from services.recordings.channels import Entry
-from services.visualizer.core import Visualizer
-from services.visualizer.model.urdf import parse_urdf
+from gemelo.schemas.message import Message, decode, encode
+from gemelo.schemas.topics import TOPICS
+from gemelo.services.logger.core import Logger
+from gemelo.services.logger.recording import Recording
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.visualizer.core import Visualizer
+from gemelo.services.visualizer.model.urdf import parse_urdf
 from tests.profiles import examples
 
 START = 1_795_000_000_000_000_000

@@ -14,26 +14,26 @@ from mcap.records import Chunk
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from schemas.frames import RobotDescription
-from schemas.joints import JointState
-from schemas.message import decode, encode
-from schemas.system import LogRecord
-from schemas.topics import DESCRIPTION, JOINT_STATES, LOG, PLAN
-from services.logger.command_log import CommandRow
-from services.logger.recording import Recording
-from services.recordings.channels import Entry
-from services.recordings.contents import contents_of
-from services.recordings.export import NothingToExport, chosen, export
-from services.recordings.mcap_file import McapFile
-from services.recordings.player import Player, Roles, payload_of
-from services.recordings.reader import BadRecording, RecordingReader
-from services.recordings.repair import repair
-from services.recordings.shadow import recorded_robot, write_shadow
-from services.recordings.table import exchanges_of, recorded_topics
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.errors import NodeNameTaken
-from services.runtime.node import Node
-from services.visualizer.program.rerun_program import rerun_binary
+from gemelo.schemas.frames import RobotDescription
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import decode, encode
+from gemelo.schemas.system import LogRecord
+from gemelo.schemas.topics import DESCRIPTION, JOINT_STATES, LOG, PLAN
+from gemelo.services.logger.command_log import CommandRow
+from gemelo.services.logger.recording import Recording
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.contents import contents_of
+from gemelo.services.recordings.export import NothingToExport, chosen, export
+from gemelo.services.recordings.mcap_file import McapFile
+from gemelo.services.recordings.player import Player, Roles, payload_of
+from gemelo.services.recordings.reader import BadRecording, RecordingReader
+from gemelo.services.recordings.repair import repair
+from gemelo.services.recordings.shadow import recorded_robot, write_shadow
+from gemelo.services.recordings.table import exchanges_of, recorded_topics
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.errors import NodeNameTaken
+from gemelo.services.runtime.node import Node
+from gemelo.services.visualizer.program.rerun_program import rerun_binary
 from tests.schemas.samples import sample
 from tests.table import table
 

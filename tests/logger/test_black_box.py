@@ -11,8 +11,8 @@ from mcap.reader import make_reader
 from msgspec import Raw
 from msgspec.structs import replace
 
-from schemas.actions import GoalResponse, GoalStatusCode
-from schemas.device import (
+from gemelo.schemas.actions import GoalResponse, GoalStatusCode
+from gemelo.schemas.device import (
     DeviceCommandResponse,
     DeviceEvent,
     DeviceFault,
@@ -22,13 +22,13 @@ from schemas.device import (
     InjectRequest,
     InjectResponse,
 )
-from schemas.joints import JointState, StepErrors
-from schemas.ledger import StepLedger, StoppingDistance
-from schemas.message import Message
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryResult
-from schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Refusal
-from schemas.roles import SERVICES
-from schemas.system import (
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.ledger import StepLedger, StoppingDistance
+from gemelo.schemas.message import Message
+from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryResult
+from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Refusal
+from gemelo.schemas.roles import SERVICES
+from gemelo.schemas.system import (
     Failure,
     LogLevel,
     LogRecord,
@@ -36,7 +36,7 @@ from schemas.system import (
     Parameter,
     ParameterChange,
 )
-from schemas.topics import (
+from gemelo.schemas.topics import (
     DESCRIPTION,
     DEVICE_EVENTS,
     DEVICE_INJECT,
@@ -53,13 +53,13 @@ from schemas.topics import (
     STEP_LEDGER,
     STOPPING_DISTANCE,
 )
-from services.arm.model.description import load_arm
-from services.logger.black_box import MOST, MOST_BYTES, BlackBox, BlackBoxWriter
-from services.logger.incident_story import LONGEST, brief
-from services.recordings.incidents import Incident, IncidentKind, black_boxes, read_incident
-from services.recordings.reader import BadRecording
-from services.recordings.table import action_topics, exchanges_of, goal_request_of
-from services.state_publisher.main import describe
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.logger.black_box import MOST, MOST_BYTES, BlackBox, BlackBoxWriter
+from gemelo.services.logger.incident_story import LONGEST, brief
+from gemelo.services.recordings.incidents import Incident, IncidentKind, black_boxes, read_incident
+from gemelo.services.recordings.reader import BadRecording
+from gemelo.services.recordings.table import action_topics, exchanges_of, goal_request_of
+from gemelo.services.state_publisher.main import describe
 
 SECOND = 1_000_000_000
 START = 1_795_000_000 * SECOND

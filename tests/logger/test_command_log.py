@@ -5,8 +5,8 @@ import struct
 import msgspec
 import pytest
 
-from schemas.device import CommandAck
-from services.logger.command_log import ACK_TIMEOUT, CommandLog, header
+from gemelo.schemas.device import CommandAck
+from gemelo.services.logger.command_log import ACK_TIMEOUT, CommandLog, header
 
 START = 1_795_000_000_000_000_000
 JOINTS = ("brazo_joint", "antebrazo_joint", "efector_joint")

@@ -7,14 +7,14 @@ import signal
 import pytest
 from mcap.reader import make_reader
 
-from schemas.frames import RobotDescription
-from schemas.joints import JointState
-from schemas.system import LogRecord
-from schemas.topics import COMMAND_ACKS, COMMANDS, DESCRIPTION, JOINT_STATES, LOG
-from services.chaos.small_disk import BALLAST, SIZE
-from services.logger.core import Logger
-from services.logger.disk import RETRY, SHARE, LoggerParameters, RecordingWriter
-from services.logger.files import is_due, stem_of, surplus
+from gemelo.schemas.frames import RobotDescription
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.system import LogRecord
+from gemelo.schemas.topics import COMMAND_ACKS, COMMANDS, DESCRIPTION, JOINT_STATES, LOG
+from gemelo.services.chaos.small_disk import BALLAST, SIZE
+from gemelo.services.logger.core import Logger
+from gemelo.services.logger.disk import RETRY, SHARE, LoggerParameters, RecordingWriter
+from gemelo.services.logger.files import is_due, stem_of, surplus
 from tests.disks import refusing_disk
 
 START = 1_795_000_000_000_000_000

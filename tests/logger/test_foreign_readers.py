@@ -15,15 +15,15 @@ from mcap.reader import NonSeekingReader, SeekingReader
 from mcap.writer import CompressionType
 from rerun.chunk import McapReader
 
-from schemas.joints import JointState
-from schemas.system import LogRecord
-from schemas.topics import DESCRIPTION, JOINT_STATES, LOG
-from services.arm.model.description import load_arm
-from services.recordings.channels import Entry
-from services.recordings.mcap_file import McapFile
-from services.recordings.repair import repair
-from services.recordings.table import recorded_topics
-from services.state_publisher.main import describe
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.system import LogRecord
+from gemelo.schemas.topics import DESCRIPTION, JOINT_STATES, LOG
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.mcap_file import McapFile
+from gemelo.services.recordings.repair import repair
+from gemelo.services.recordings.table import recorded_topics
+from gemelo.services.state_publisher.main import describe
 from tests.logger.mcap_by_the_book import CHUNK, MESSAGE_INDEX, Book, records_of
 
 ROOT = Path(__file__).parents[2]

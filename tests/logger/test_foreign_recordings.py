@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from mcap.writer import CompressionType, Writer
 
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.recordings.reader import BadRecording
-from services.replay.main import CANNOT
-from services.replay.main import main as replay
-from services.replay.recorded import Recorded
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.recordings.reader import BadRecording
+from gemelo.services.replay.main import CANNOT
+from gemelo.services.replay.main import main as replay
+from gemelo.services.replay.recorded import Recorded
 from tests.runtime.support import free_port
 
 ROS2 = "is a recording of ROS 2 (CDR messages)"

@@ -8,17 +8,17 @@ import jsonschema
 import pytest
 from mcap.reader import make_reader
 
-from schemas.frames import FrameTransform, FrameTransforms, Transform
-from schemas.joints import JointState
-from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, PlanningScene, SceneObject, SphereShape
-from schemas.system import LogLevel, LogRecord
-from schemas.topics import DESCRIPTION, FRAMES, LOG, SCENE, STATIC_FRAMES
-from services.arm.model.description import load_arm
-from services.arm.model.urdf import JointKind
-from services.recordings.channels import Entry
-from services.recordings.mcap_file import McapFile
-from services.state_publisher.core import StatePublisher
-from services.state_publisher.main import describe
+from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, PlanningScene, SceneObject, SphereShape
+from gemelo.schemas.system import LogLevel, LogRecord
+from gemelo.schemas.topics import DESCRIPTION, FRAMES, LOG, SCENE, STATIC_FRAMES
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.arm.model.urdf import JointKind
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.mcap_file import McapFile
+from gemelo.services.state_publisher.core import StatePublisher
+from gemelo.services.state_publisher.main import describe
 
 ROOT = Path(__file__).parents[2]
 START = 1_795_000_000_123_456_789

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from schemas.camera import CameraImage, CameraInfo
-from schemas.frames import Transform
-from services.logger.core import Entry
-from services.logger.images import CameraRecorder
-from services.logger.recording import Recording
+from gemelo.schemas.camera import CameraImage, CameraInfo
+from gemelo.schemas.frames import Transform
+from gemelo.services.logger.core import Entry
+from gemelo.services.logger.images import CameraRecorder
+from gemelo.services.logger.recording import Recording
 
 START = 1_795_000_000_000_000_000
 SECOND = 1_000_000_000

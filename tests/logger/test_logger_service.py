@@ -21,8 +21,8 @@ from mcap.records import Channel
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
-from schemas.actions import GoalStatusCode
-from schemas.device import (
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import (
     DeviceCommandRequest,
     DeviceCommandResponse,
     DeviceEvent,
@@ -31,14 +31,14 @@ from schemas.device import (
     ResetCommand,
     SpeedCommand,
 )
-from schemas.frames import RobotDescription
-from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
-from schemas.joints import JointState
-from schemas.message import Message
-from schemas.planning import PlanCode, PlanRequest, PlanResponse
-from schemas.scene import CylinderShape, SceneAdd, SceneObject, SceneRemove, SceneRequest
-from schemas.system import LogRecord, SetParameter
-from schemas.topics import (
+from gemelo.schemas.frames import RobotDescription
+from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import Message
+from gemelo.schemas.planning import PlanCode, PlanRequest, PlanResponse
+from gemelo.schemas.scene import CylinderShape, SceneAdd, SceneObject, SceneRemove, SceneRequest
+from gemelo.schemas.system import LogRecord, SetParameter
+from gemelo.schemas.topics import (
     COMMAND_ACKS,
     COMMANDS,
     DESCRIPTION,
@@ -54,16 +54,16 @@ from schemas.topics import (
     Request,
     Topic,
 )
-from services.arm.model.description import load_arm
-from services.logger.main import run
-from services.planner.scene.scene_store import SceneStore
-from services.runtime.actions import accept
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.deployment import load_deployment
-from services.runtime.endpoints import parameter_request
-from services.runtime.errors import RequestRefused
-from services.runtime.node import Node
-from services.visualizer.render.outputs import VisualizerParameters
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.logger.main import run
+from gemelo.services.planner.scene.scene_store import SceneStore
+from gemelo.services.runtime.actions import accept
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.deployment import load_deployment
+from gemelo.services.runtime.endpoints import parameter_request
+from gemelo.services.runtime.errors import RequestRefused
+from gemelo.services.runtime.node import Node
+from gemelo.services.visualizer.render.outputs import VisualizerParameters
 
 ROOT = Path(__file__).parents[2]
 
@@ -348,7 +348,10 @@ def process(module, environment, *arguments):
 
 def test_kill_9_of_the_service_leaves_a_file_that_can_be_read(environment, deployment, tmp_path):
     run_folder = tmp_path / "run"
-    with process("services.runtime.router", environment), process("services.logger.main", environment) as logger:
+    with (
+        process("gemelo.services.runtime.router", environment),
+        process("gemelo.services.logger.main", environment) as logger,
+    ):
         wait_for(lambda: (run_folder / "logger.ready").exists())
         with Node("gateway", deployment) as gateway:
             for index in range(300):
@@ -378,7 +381,10 @@ def recorded_events(records):
 
 
 def test_sigterm_ends_it_with_a_finished_file(environment, deployment, tmp_path):
-    with process("services.runtime.router", environment), process("services.logger.main", environment) as logger:
+    with (
+        process("gemelo.services.runtime.router", environment),
+        process("gemelo.services.logger.main", environment) as logger,
+    ):
         wait_for(lambda: (tmp_path / "run" / "logger.ready").exists(), HANGS)
         with Node("gateway", deployment) as gateway:
             for index in range(300):

@@ -15,14 +15,14 @@ from mcap.reader import make_reader
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
-from schemas.frames import FrameTransform, FrameTransforms, RobotDescription
-from schemas.joints import JointState
-from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, TOPICS
-from services.logger.command_log import CommandRow
-from services.logger.recording import Recording
-from services.recordings import foxglove
-from services.recordings.channels import Entry, schema_of
-from services.recordings.table import recorded_topics
+from gemelo.schemas.frames import FrameTransform, FrameTransforms, RobotDescription
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, TOPICS
+from gemelo.services.logger.command_log import CommandRow
+from gemelo.services.logger.recording import Recording
+from gemelo.services.recordings import foxglove
+from gemelo.services.recordings.channels import Entry, schema_of
+from gemelo.services.recordings.table import recorded_topics
 from tests.table import table
 
 START = 1_795_000_000_000_000_000
@@ -104,11 +104,11 @@ def test_the_table_of_commands_is_plain_csv(recording):
 WRITER = """
 import sys, time
 from pathlib import Path
-from schemas.joints import JointState
-from schemas.topics import JOINT_STATES
-from services.logger.command_log import CommandRow
-from services.logger.recording import Recording
-from services.recordings.channels import Entry
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.topics import JOINT_STATES
+from gemelo.services.logger.command_log import CommandRow
+from gemelo.services.logger.recording import Recording
+from gemelo.services.recordings.channels import Entry
 recording = Recording(Path(sys.argv[1]), "killed", {})
 count = 0
 while True:
@@ -121,7 +121,7 @@ while True:
 
 
 def test_kill_9_loses_nothing_that_was_written(tmp_path):
-    root = Path(str(files("services"))).parent
+    root = Path(str(files("gemelo"))).parent
     with subprocess.Popen(
         [sys.executable, "-c", WRITER, str(tmp_path)], stdout=subprocess.PIPE, text=True, cwd=root
     ) as writer:

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from services.credentials.private_files import AccessError
-from services.mqtt.access import BrokerAccess, read_secret, tls_context
-from services.mqtt.failures import NO_TLS, WANTS_CERTIFICATE, denial, failure, refusal, silence
-from services.runtime.deployment import load_deployment, project_root
-from services.stepper_gateway.device.session import DeviceSession
-from services.stepper_gateway.moment import Moment
+from gemelo.services.credentials.private_files import AccessError
+from gemelo.services.mqtt.access import BrokerAccess, read_secret, tls_context
+from gemelo.services.mqtt.failures import NO_TLS, WANTS_CERTIFICATE, denial, failure, refusal, silence
+from gemelo.services.runtime.deployment import load_deployment, project_root
+from gemelo.services.stepper_gateway.device.session import DeviceSession
+from gemelo.services.stepper_gateway.moment import Moment
 
 PAGES = [project_root() / "docs" / name for name in ("my_broker.md", "es/mi_broker.md")]
 

@@ -14,25 +14,25 @@ from unittest import mock
 
 import gemelo
 from gemelo.api.session import Session
-from schemas.device import (
+from gemelo.schemas.device import (
     DeviceCommandResponse,
     DeviceMode,
     DeviceState,
     DeviceStatus,
     DeviceStopRequest,
 )
-from schemas.frames import Transform
-from schemas.joints import JointState, StepErrors
-from schemas.planning import FkRequest, FkResponse, PlanCode
-from schemas.scene import PlanningScene
-from schemas.topics import DEVICE_STATE, DEVICE_STATUS, DEVICE_STOP, FK, JOINT_STATES, SCENE, STEP_ERRORS
-from services.arm.model.description import ArmDescription, load_arm
-from services.bench.bare_browser import BareBrowser, Said, bare_browser
-from services.panel.main import TEXTS, Panel
-from services.runtime import topics
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.deployment import load_deployment
-from services.runtime.node import Node
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.planning import FkRequest, FkResponse, PlanCode
+from gemelo.schemas.scene import PlanningScene
+from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS, DEVICE_STOP, FK, JOINT_STATES, SCENE, STEP_ERRORS
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.bench.bare_browser import BareBrowser, Said, bare_browser
+from gemelo.services.panel.main import TEXTS, Panel
+from gemelo.services.runtime import topics
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.deployment import load_deployment
+from gemelo.services.runtime.node import Node
 from tests.runtime.support import free_port, spinning, until
 
 ROOT = Path(__file__).parents[2]

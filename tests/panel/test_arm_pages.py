@@ -9,13 +9,13 @@ import pytest
 import viser
 from playwright.sync_api import Browser, expect
 
-from schemas.deployment import Deployment, PanelSection, PathsSection
-from services.panel.view.arm_pages import ArmPage, arm_pages, arms_line
-from services.panel.words.words import Words
-from services.runtime.deployment import project_root
-from services.stack.arms import stacked_arms
-from services.stack.several_arms import write
-from services.stack.stack import free_ports
+from gemelo.schemas.deployment import Deployment, PanelSection, PathsSection
+from gemelo.services.panel.view.arm_pages import ArmPage, arm_pages, arms_line
+from gemelo.services.panel.words.words import Words
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.stack.arms import stacked_arms
+from gemelo.services.stack.several_arms import write
+from gemelo.services.stack.stack import free_ports
 from tests.stacks.browser import new_context
 
 ENGLISH = Words("en")

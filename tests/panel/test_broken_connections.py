@@ -14,8 +14,8 @@ import pytest
 import viser
 from websockets.sync.client import ClientConnection, connect
 
-from services.panel.view.broken_connections import PAGE, PERIOD, BrokenConnections
-from services.panel.view.own_pages import OwnServer, own_pages_only
+from gemelo.services.panel.view.broken_connections import PAGE, PERIOD, BrokenConnections
+from gemelo.services.panel.view.own_pages import OwnServer, own_pages_only
 from tests.panel.person import until
 
 UPGRADE = "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"

@@ -8,13 +8,13 @@ from types import SimpleNamespace
 import pytest
 import viser
 
-from schemas.camera import CameraImage
-from schemas.detections import Detection, Detections
-from services.panel.model.cameras import CameraPictures
-from services.panel.view.browser import CHANNEL, Click, read_browser
-from services.panel.view.camera_box import CameraBox
-from services.panel.view.kit import Kit
-from services.panel.words.words import Words
+from gemelo.schemas.camera import CameraImage
+from gemelo.schemas.detections import Detection, Detections
+from gemelo.services.panel.model.cameras import CameraPictures
+from gemelo.services.panel.view.browser import CHANNEL, Click, read_browser
+from gemelo.services.panel.view.camera_box import CameraBox
+from gemelo.services.panel.view.kit import Kit
+from gemelo.services.panel.words.words import Words
 
 
 def square(name: str, x: float, y: float) -> Detection:
@@ -94,7 +94,7 @@ def test_where_nothing_is_detected_a_click_says_that(page) -> None:
 def test_an_image_is_not_sent_again_while_it_is_the_same(page, monkeypatch) -> None:
     page.box.refresh()
     sent = []
-    monkeypatch.setattr("services.panel.view.camera_box.image_html", lambda *each: sent.append(each) or "")
+    monkeypatch.setattr("gemelo.services.panel.view.camera_box.image_html", lambda *each: sent.append(each) or "")
     page.box.refresh()
     assert not sent
     clicks(page, 310.0, 190.0)

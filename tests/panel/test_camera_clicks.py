@@ -12,8 +12,8 @@ import pytest
 import viser
 from playwright.sync_api import Browser, Page, expect
 
-from schemas.camera import CameraImage
-from services.panel.view.browser import CHANNEL, read_browser, script_html
+from gemelo.schemas.camera import CameraImage
+from gemelo.services.panel.view.browser import CHANNEL, read_browser, script_html
 from tests.panel.person import OPENING, PATIENCE, place_in_image, until
 from tests.panel.test_camera_box import opened
 from tests.stacks.browser import new_context

@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from schemas.camera import CameraImage
-from schemas.detections import Detection, Detections
-from services.panel.model import cameras
-from services.panel.model.cameras import AGED, LARGEST, CameraPictures, Picture
-from services.panel.view.camera_box import CHOSEN, image_html
+from gemelo.schemas.camera import CameraImage
+from gemelo.schemas.detections import Detection, Detections
+from gemelo.services.panel.model import cameras
+from gemelo.services.panel.model.cameras import AGED, LARGEST, CameraPictures, Picture
+from gemelo.services.panel.view.camera_box import CHOSEN, image_html
 
 CUP = Detection(name="cup", corners=((300.0, 200.0), (340.0, 200.0), (340.0, 240.0), (300.0, 240.0)))
 

@@ -10,7 +10,7 @@ from tests.runtime.support import ROOT
 
 PROGRAM = """
 import sys, threading, time
-from services.panel import main as panel
+from gemelo.services.panel import main as panel
 
 def run(*given):
     threading.Thread(target=lambda: [][1], name="stop").start()

@@ -9,8 +9,8 @@ import pytest
 from playwright.sync_api import Browser
 
 import gemelo
-from services.panel.words.words import TABLES
-from services.stack.stack import Stack
+from gemelo.services.panel.words.words import TABLES
+from gemelo.services.stack.stack import Stack
 from tests.panel.person import Person, until
 from tests.panel.test_page import is_moving, rests
 from tests.stacks.browser import SIZE

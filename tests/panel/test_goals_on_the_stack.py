@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import gemelo
-from schemas.scene import CylinderShape, SphereShape
-from services.bench.bare_browser import bare_browser
-from services.panel.view.world import configuration_at
-from services.panel.words.en import ENGLISH
-from services.stack.stack import Stack
+from gemelo.schemas.scene import CylinderShape, SphereShape
+from gemelo.services.bench.bare_browser import bare_browser
+from gemelo.services.panel.view.world import configuration_at
+from gemelo.services.panel.words.en import ENGLISH
+from gemelo.services.stack.stack import Stack
 from tests.panel.person import until
 from tests.panel.served import Served, passed, rests
 from tests.stacks.shared import found_by_scripts

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Frame, Page
 
-from services.panel.view.browser import script_html
+from gemelo.services.panel.view.browser import script_html
 from tests.stacks.browser import new_context
 
 BUTTON = "<button onpointerdown=\"document.title += '+'\" onpointerup=\"document.title += '-'\">x +  ▲</button>"

@@ -8,7 +8,7 @@ import pytest
 import viser
 from playwright.sync_api import Browser
 
-from services.panel.view.browser import CHANNEL, script_html
+from gemelo.services.panel.view.browser import CHANNEL, script_html
 from tests.panel.person import OPENING, until
 from tests.stacks.browser import new_context
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from schemas.device import DeviceStatus
-from schemas.topics import DEVICE_STATUS
-from services.stepper_gateway.device.session import DEAF
+from gemelo.schemas.device import DeviceStatus
+from gemelo.schemas.topics import DEVICE_STATUS
+from gemelo.services.stepper_gateway.device.session import DEAF
 from tests.panel.memory_page import MemoryPage, memory_page
 from tests.runtime.support import until
 

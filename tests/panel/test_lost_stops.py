@@ -10,11 +10,11 @@ import pytest
 from playwright.sync_api import Browser
 from playwright.sync_api import Page as Window
 
-from schemas.device import StopKind
-from services.chaos.slow_link import SlowLink
-from services.panel.view.browser import STILL_MEANT, STOP_SIGN, Stops
-from services.panel.view.browser import Browser as Told
-from services.panel.view.page import Page
+from gemelo.schemas.device import StopKind
+from gemelo.services.chaos.slow_link import SlowLink
+from gemelo.services.panel.view.browser import STILL_MEANT, STOP_SIGN, Stops
+from gemelo.services.panel.view.browser import Browser as Told
+from gemelo.services.panel.view.page import Page
 from tests.panel.memory_page import MemoryPage, memory_page
 from tests.panel.person import OPENING, until
 from tests.runtime.support import free_port

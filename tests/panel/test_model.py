@@ -17,23 +17,23 @@ from msgspec.structs import replace
 
 import gemelo
 from gemelo.programs import AnyStep, Program, Repeat, RunStatus, StepPath, Wait
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceMode, DeviceState
-from services.arm.model.description import ArmDescription, load_arm
-from services.panel.model.availability import CHECKS
-from services.panel.model.goal import GoalSolver
-from services.panel.model.problems import Problem, problem_of
-from services.panel.model.teaching import deleted, inserted, shifted
-from services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, ToolTurns, tool_turns
-from services.panel.model.units import in_degrees
-from services.panel.view.browser import CHANNEL, Browser, read_browser, script_html
-from services.panel.view.obstacles import nearest_hit
-from services.panel.words.en import ENGLISH
-from services.panel.words.en_refusals import REFUSALS as ENGLISH_REFUSALS
-from services.panel.words.es import SPANISH
-from services.panel.words.es_refusals import REFUSALS
-from services.panel.words.refusals import key_of
-from services.panel.words.words import Words, language_of
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceMode, DeviceState
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.panel.model.availability import CHECKS
+from gemelo.services.panel.model.goal import GoalSolver
+from gemelo.services.panel.model.problems import Problem, problem_of
+from gemelo.services.panel.model.teaching import deleted, inserted, shifted
+from gemelo.services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, ToolTurns, tool_turns
+from gemelo.services.panel.model.units import in_degrees
+from gemelo.services.panel.view.browser import CHANNEL, Browser, read_browser, script_html
+from gemelo.services.panel.view.obstacles import nearest_hit
+from gemelo.services.panel.words.en import ENGLISH
+from gemelo.services.panel.words.en_refusals import REFUSALS as ENGLISH_REFUSALS
+from gemelo.services.panel.words.es import SPANISH
+from gemelo.services.panel.words.es_refusals import REFUSALS
+from gemelo.services.panel.words.refusals import key_of
+from gemelo.services.panel.words.words import Words, language_of
 from tests.arm.bare_arm import ROBOT
 from tests.runtime.support import until
 

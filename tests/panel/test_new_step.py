@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gemelo.programs import Grip, Line, Repeat, Speed, Wait
-from services.panel.view.tabs.new_step import NewStep
+from gemelo.services.panel.view.tabs.new_step import NewStep
 from tests.panel.memory_page import MemoryPage, memory_page
 
 

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from gemelo.programs.run import RunState, RunStatus
-from services.panel.view.page import Page
-from services.panel.words.en import ENGLISH
+from gemelo.services.panel.view.page import Page
+from gemelo.services.panel.words.en import ENGLISH
 from tests.panel.memory_page import MemoryPage, memory_page
 from tests.runtime.support import until
 

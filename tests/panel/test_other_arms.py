@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.model.description import load_arm
-from services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, ToolTurns, tool_turns
-from services.panel.model.units import STEP, meant, shown, slider_range
-from services.panel.words.en import ENGLISH
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, ToolTurns, tool_turns
+from gemelo.services.panel.model.units import STEP, meant, shown, slider_range
+from gemelo.services.panel.words.en import ENGLISH
 from tests.arm.bare_arm import ROBOT, write_bare_arm
 from tests.panel.memory_page import MemoryPage, memory_page
 

@@ -13,8 +13,8 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 import gemelo
-from schemas.joints import JointState
-from services.stack.stack import Stack
+from gemelo.schemas.joints import JointState
+from gemelo.services.stack.stack import Stack
 from tests.panel.person import BLUE, Person, until
 from tests.stacks.browser import SIZE
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import gemelo
-from services.stack.stack import Stack
+from gemelo.services.stack.stack import Stack
 from tests.panel.person import Person, until
 from tests.stacks.shared import found_by_scripts
 

@@ -10,8 +10,8 @@ import pytest
 
 import gemelo
 from gemelo.programs import Go, Program
-from services.panel.words.en import ENGLISH
-from services.stack.stack import Stack
+from gemelo.services.panel.words.en import ENGLISH
+from gemelo.services.stack.stack import Stack
 from tests.panel.person import until
 from tests.panel.served import Served, passed, rests
 from tests.simulated import make_ready

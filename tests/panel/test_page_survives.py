@@ -7,8 +7,8 @@ from math import degrees
 import pytest
 
 import gemelo
-from services.bench.bare_browser import bare_browser
-from services.stack.stack import Stack
+from gemelo.services.bench.bare_browser import bare_browser
+from gemelo.services.stack.stack import Stack
 from tests.panel.person import until
 from tests.simulated import make_ready
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 import gemelo
-from services.panel.model.picks import Picks
+from gemelo.services.panel.model.picks import Picks
 
 CELL = SimpleNamespace(things=[SimpleNamespace(name="cup")], places=[SimpleNamespace(name="bin")])
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.detections import Detection
-from services.panel.model.pointing import pointed_at
+from gemelo.schemas.detections import Detection
+from gemelo.services.panel.model.pointing import pointed_at
 
 NEAR = 16.0
 PIXELS = st.floats(0.0, 640.0)

@@ -12,17 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo.api.device import Device
-from schemas.device import StopKind
-from schemas.frames import Transform
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.model.description import load_arm
-from services.panel.main import TEXTS
-from services.panel.model.pace import EARLY, PERIOD, DrawPace
-from services.panel.view.arms import DrawnArm, load_model
-from services.panel.view.browser import CHANNEL, STOP_SIGN
-from services.panel.view.page import LATE, LATE_AGAIN
-from services.panel.view.world import ASPECT, FARTHEST
-from services.panel.words.en import ENGLISH
+from gemelo.schemas.device import StopKind
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.panel.main import TEXTS
+from gemelo.services.panel.model.pace import EARLY, PERIOD, DrawPace
+from gemelo.services.panel.view.arms import DrawnArm, load_model
+from gemelo.services.panel.view.browser import CHANNEL, STOP_SIGN
+from gemelo.services.panel.view.page import LATE, LATE_AGAIN
+from gemelo.services.panel.view.world import ASPECT, FARTHEST
+from gemelo.services.panel.words.en import ENGLISH
 from tests.panel.memory_page import ROOT, MemoryPage, memory_page
 from tests.profiles import examples
 from tests.runtime.support import until

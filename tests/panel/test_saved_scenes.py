@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from schemas.frames import Transform
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.panel.view.tabs import scene as scene_tab
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.panel.view.tabs import scene as scene_tab
 from tests.panel.memory_page import memory_page
 from tests.runtime.support import until
 

@@ -10,10 +10,10 @@ import pytest
 
 import gemelo
 from gemelo.programs import Go, Line, Program
-from services.arm.frames.transforms import from_rpy, multiply
-from services.panel.model.tool_turns import ALL_RINGS
-from services.panel.words.en import ENGLISH
-from services.stack.stack import Stack
+from gemelo.services.arm.frames.transforms import from_rpy, multiply
+from gemelo.services.panel.model.tool_turns import ALL_RINGS
+from gemelo.services.panel.words.en import ENGLISH
+from gemelo.services.stack.stack import Stack
 from tests.panel.person import until
 from tests.panel.served import Served, rests
 from tests.stacks.shared import found_by_scripts

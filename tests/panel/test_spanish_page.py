@@ -26,15 +26,15 @@ from gemelo.programs import (
     WaitFor,
 )
 from gemelo.programs.steps import KINDS
-from schemas.device import DeviceCommandKind, DeviceFault, DeviceMode, StopKind
-from schemas.device_faults import fault_text
-from schemas.motion import FollowErrorCode
-from services.panel.model.problems import problem_of
-from services.panel.words.step_text import step_text
-from services.panel.words.words import SENTENCES, Words
-from services.stepper_gateway.device.command_handler import NOT_NOW, REMEDIES, complaint
-from services.stepper_gateway.device.session import DEAF, ONE_NAME
-from services.stepper_gateway.links.frames import Code
+from gemelo.schemas.device import DeviceCommandKind, DeviceFault, DeviceMode, StopKind
+from gemelo.schemas.device_faults import fault_text
+from gemelo.schemas.motion import FollowErrorCode
+from gemelo.services.panel.model.problems import problem_of
+from gemelo.services.panel.words.step_text import step_text
+from gemelo.services.panel.words.words import SENTENCES, Words
+from gemelo.services.stepper_gateway.device.command_handler import NOT_NOW, REMEDIES, complaint
+from gemelo.services.stepper_gateway.device.session import DEAF, ONE_NAME
+from gemelo.services.stepper_gateway.links.frames import Code
 from tests.table import table
 
 ROOT = Path(__file__).parents[2]

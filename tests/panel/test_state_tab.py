@@ -5,9 +5,9 @@ from __future__ import annotations
 import errno
 from pathlib import Path
 
-from schemas.device import ShaftPositions
-from schemas.joints import JointState
-from schemas.topics import DEVICE_SHAFT, JOINT_COMMANDS
+from gemelo.schemas.device import ShaftPositions
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.topics import DEVICE_SHAFT, JOINT_COMMANDS
 from tests.panel.memory_page import memory_page
 from tests.runtime.support import until
 

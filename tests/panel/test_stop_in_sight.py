@@ -8,7 +8,7 @@ import pytest
 import viser
 from playwright.sync_api import Browser, Page, expect
 
-from services.panel.view.browser import CHANNEL, STOP_SIGN, read_browser, script_html
+from gemelo.services.panel.view.browser import CHANNEL, STOP_SIGN, read_browser, script_html
 from tests.panel.person import OPENING, PATIENCE, until
 from tests.stacks.browser import new_context
 

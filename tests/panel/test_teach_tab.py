@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from services.panel.view.page import Page
+from gemelo.services.panel.view.page import Page
 from tests.panel.memory_page import MemoryPage, memory_page
 from tests.runtime.support import until
 

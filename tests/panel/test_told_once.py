@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import gemelo
-from services.panel.model.problems import problem_of
+from gemelo.services.panel.model.problems import problem_of
 from tests.panel.memory_page import memory_page
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from gemelo.programs import Wait
-from services.panel.view.tabs.programs import ProgramsTab
-from services.panel.words.en import ENGLISH
+from gemelo.services.panel.view.tabs.programs import ProgramsTab
+from gemelo.services.panel.words.en import ENGLISH
 from tests.panel.memory_page import MemoryPage, memory_page
 from tests.runtime.support import until
 

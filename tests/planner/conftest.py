@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.joints import JointState
-from services.arm.model.description import ArmDescription
-from services.planner.core import Planner
+from gemelo.schemas.joints import JointState
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.core import Planner
 from tests.planner.judging import forget_scenes
 
 

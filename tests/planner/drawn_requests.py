@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 from hypothesis import strategies as st
 
-from schemas.frames import Transform
-from schemas.planning import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.planning import (
     CircularMotion,
     FreeMotion,
     Goal,
@@ -21,10 +21,10 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, Shape, SphereShape
-from services.planner.core import Planner
-from services.planner.kinematics.task_space import task_space
-from services.planner.path.search import KNOWN
+from gemelo.schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, Shape, SphereShape
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.kinematics.task_space import task_space
+from gemelo.services.planner.path.search import KNOWN
 from tests.planner.independent import Judge
 from tests.planner.judging import asked, configuration_at, joints, quaternion_of
 

@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import JogCommand, JogStatus
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.planner.collision.world import World
-from services.planner.jog.jog import PERIOD, Jog
-from services.stepper_gateway.motion.knots import Knot, Limits
-from services.stepper_gateway.motion.target_tracker import TargetTracker
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JogCommand, JogStatus
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.jog.jog import PERIOD, Jog
+from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
+from gemelo.services.stepper_gateway.motion.target_tracker import TargetTracker
 
 Array = NDArray[np.float64]
 

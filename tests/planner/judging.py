@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from schemas.joints import JointState
-from schemas.planning import (
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import (
     Goal,
     JointGoal,
     NamedGoal,
@@ -21,11 +21,11 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from schemas.scene import PlanningScene
-from services.arm.model.description import ArmDescription, load_arm
-from services.planner.collision.world import World
-from services.planner.core import Planner
-from services.planner.verification.verify import DENSITY, LOOSE_JERK
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.verification.verify import DENSITY, LOOSE_JERK
 from tests.planner.independent import Array, Judge, Motion, resampled
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import psutil
 
-from services.planner.workers.process import CHILD
+from gemelo.services.planner.workers.process import CHILD
 
 
 def planning_processes(of: int | None = None) -> list[psutil.Process]:

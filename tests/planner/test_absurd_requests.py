@@ -8,8 +8,8 @@ import time
 import msgspec
 import pytest
 
-from schemas.joints import JointState
-from schemas.planning import (
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import (
     CircularMotion,
     FreeMotion,
     Goal,
@@ -23,7 +23,7 @@ from schemas.planning import (
     PoseGoal,
     WaypointGoal,
 )
-from schemas.scene import PlanningScene
+from gemelo.schemas.scene import PlanningScene
 from tests.planner.judging import asked, planner_of, require_refused, require_sound, show
 from tests.profiles import count
 from tests.table import table

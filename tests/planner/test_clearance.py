@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import (
     FreeMotion,
     IkRequest,
     JointGoal,
@@ -21,13 +21,13 @@ from schemas.planning import (
     PoseGoal,
     ValidityRequest,
 )
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.model.description import ArmDescription
-from services.planner.collision.clearance import CLEARANCE, usable_clearance
-from services.planner.collision.world import World
-from services.planner.core import Planner
-from services.planner.kinematics.kinematic_requests import KinematicRequests
-from services.planner.verification.verify import sample
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.clearance import CLEARANCE, usable_clearance
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
+from gemelo.services.planner.verification.verify import sample
 
 GOAL = (0.9, 0.6, 0.1)
 GAP = 0.0015  # [m] between the tool at the goal and the box below it

@@ -13,12 +13,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.planner.kinematics.closed_form import closed_form, turns_about
-from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.targets import ToolTarget
-from services.planner.request.deadline import NEVER
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.planner.kinematics.closed_form import closed_form, turns_about
+from gemelo.services.planner.kinematics.ik import InverseKinematics
+from gemelo.services.planner.kinematics.targets import ToolTarget
+from gemelo.services.planner.request.deadline import NEVER
 from tests.profiles import examples
 
 ROOT = Path(__file__).parents[2] / "urdf"

@@ -10,18 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import load_arm
-from services.bench.scenes import SCENES
-from services.planner.collision.world import World
-from services.planner.path.curve import smooth_runs
-from services.planner.path.smoothing import smooth, stopping
-from services.planner.request.deadline import NEVER
-from services.planner.timing import profile
-from services.planner.timing.profile import joint_limits, trajectory_of
-from services.planner.timing.time_optimal import time_optimal_path
-from services.planner.timing.timing import timed_path, timed_path_in_python
-from services.planner.verification.verify import limit_shares, require_ends, sample
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.bench.scenes import SCENES
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.path.curve import smooth_runs
+from gemelo.services.planner.path.smoothing import smooth, stopping
+from gemelo.services.planner.request.deadline import NEVER
+from gemelo.services.planner.timing import profile
+from gemelo.services.planner.timing.profile import joint_limits, trajectory_of
+from gemelo.services.planner.timing.time_optimal import time_optimal_path
+from gemelo.services.planner.timing.timing import timed_path, timed_path_in_python
+from gemelo.services.planner.verification.verify import limit_shares, require_ends, sample
 from tests.profiles import examples
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")

@@ -13,9 +13,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import (
     FreeMotion,
     Goal,
     JointGoal,
@@ -28,14 +28,14 @@ from schemas.planning import (
     PoseGoal,
     WaypointGoal,
 )
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.model.description import load_arm
-from services.planner.collision import world as world_module
-from services.planner.collision.pair_distances import PairDistances
-from services.planner.collision.world import World
-from services.planner.core import Planner
-from services.planner.pipeline.trajectory_builder import TrajectoryBuilder
-from services.planner.workers.workers import for_process
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.collision import world as world_module
+from gemelo.services.planner.collision.pair_distances import PairDistances
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.pipeline.trajectory_builder import TrajectoryBuilder
+from gemelo.services.planner.workers.workers import for_process
 from tests.arm.plates import add_plate
 from tests.planner.test_world import stl_box
 from tests.planner.walled import WALLED, past_the_wall

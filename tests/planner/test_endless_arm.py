@@ -8,12 +8,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from schemas.joints import JointState
-from schemas.planning import JointGoal, PlanRequest, PoseGoal
-from services.arm.model.description import load_arm
-from services.planner.core import Planner
-from services.planner.kinematics.goals import Goals
-from services.planner.request.deadline import NEVER
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JointGoal, PlanRequest, PoseGoal
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.kinematics.goals import Goals
+from gemelo.services.planner.request.deadline import NEVER
 
 BOX = '<collision><origin xyz="{at}"/><geometry><box size="{size}"/></geometry></collision>'
 LINKS = {

@@ -12,16 +12,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.bindings.device import CoreDevice
-from schemas.motion import JointTrajectory
-from schemas.planning import StepMargin
-from schemas.robot import PullOut
-from services.arm.device.device_config import device_config
-from services.arm.model.description import ArmDescription
-from services.planner.request.refusals import PlanRefused
-from services.planner.timing.profile import joint_limits, straight_line
-from services.planner.verification import feasibility
-from services.planner.verification.feasibility import (
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.schemas.motion import JointTrajectory
+from gemelo.schemas.planning import StepMargin
+from gemelo.schemas.robot import PullOut
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.request.refusals import PlanRefused
+from gemelo.services.planner.timing.profile import joint_limits, straight_line
+from gemelo.services.planner.verification import feasibility
+from gemelo.services.planner.verification.feasibility import (
     feasible_scale,
     margins,
     queue_share,
@@ -30,8 +30,8 @@ from services.planner.verification.feasibility import (
     slowed,
     step_stream,
 )
-from services.planner.verification.verify import at_times, states_of
-from services.stepper_gateway.links.frames import Chunk, ChunkFlag, Heartbeat, encode
+from gemelo.services.planner.verification.verify import at_times, states_of
+from gemelo.services.stepper_gateway.links.frames import Chunk, ChunkFlag, Heartbeat, encode
 
 FAR = (1.5, -1.2, 0.1)
 
@@ -175,7 +175,7 @@ def test_the_margins_are_the_same_however_many_knots_are_looked_at_at_once(
 ) -> None:
     trajectory = line(rm1)
     whole = margins(rm1, step_stream(rm1, trajectory))
-    monkeypatch.setattr("services.planner.verification.feasibility.MOST_KNOTS", most)
+    monkeypatch.setattr("gemelo.services.planner.verification.feasibility.MOST_KNOTS", most)
     assert require_feasible(rm1, trajectory) == whole
 
 

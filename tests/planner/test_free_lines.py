@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.planning import NamedGoal, PlanRequest
-from services.arm.model.description import ArmDescription
-from services.planner.pipeline.trajectory_builder import TrajectoryBuilder, TrajectoryTouches, lies_on
-from services.planner.request.deadline import Stopwatch, endless
-from services.planner.timing.profile import joint_limits, straight_line
+from gemelo.schemas.planning import NamedGoal, PlanRequest
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.pipeline.trajectory_builder import TrajectoryBuilder, TrajectoryTouches, lies_on
+from gemelo.services.planner.request.deadline import Stopwatch, endless
+from gemelo.services.planner.timing.profile import joint_limits, straight_line
 
 GOAL = (1.0, -0.5, 0.1)
 

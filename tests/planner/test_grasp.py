@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.frames import Transform
-from schemas.gripper import GripperState
-from schemas.joints import JointState
-from schemas.planning import PlanCode, ValidityRequest
-from schemas.scene import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.gripper import GripperState
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import PlanCode, ValidityRequest
+from gemelo.schemas.scene import (
     AllowedPair,
     BoxShape,
     CylinderShape,
@@ -33,16 +33,16 @@ from schemas.scene import (
     Shape,
     SphereShape,
 )
-from schemas.topics import GRIPPER_STATE, JOINT_STATES, SCENE, STATE_VALIDITY
-from services.arm.frames.transforms import Rigid, compose, from_message, from_rpy, to_message
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.arm.model.gripper import JAWS, jaw_objects, jaws_apart
-from services.planner.collision.scene_shapes import shape_of
-from services.planner.collision.world import World
-from services.planner.scene.grasp import width_of
-from services.planner.scene.scene_store import SceneStore
-from services.runtime.node import Node
+from gemelo.schemas.topics import GRIPPER_STATE, JOINT_STATES, SCENE, STATE_VALIDITY
+from gemelo.services.arm.frames.transforms import Rigid, compose, from_message, from_rpy, to_message
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.arm.model.gripper import JAWS, jaw_objects, jaws_apart
+from gemelo.services.planner.collision.scene_shapes import shape_of
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.scene.grasp import width_of
+from gemelo.services.planner.scene.scene_store import SceneStore
+from gemelo.services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner
 from tests.planner.test_scene_node import edit
 from tests.profiles import examples

@@ -10,9 +10,9 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from services.bench.any_arm.generated_arms import generated_arm
-from services.planner.collision_geometry.link_shapes import hull_mesh
-from services.planner.collision_geometry.solids import polytope_around
+from gemelo.services.bench.any_arm.generated_arms import generated_arm
+from gemelo.services.planner.collision_geometry.link_shapes import hull_mesh
+from gemelo.services.planner.collision_geometry.solids import polytope_around
 
 STEPS = np.linspace(-0.05, 0.05, 6)
 LATTICE = np.stack(np.meshgrid(STEPS, STEPS, STEPS), axis=-1).reshape(-1, 3)
@@ -53,8 +53,8 @@ def test_an_arm_of_hulls_is_planned_for_without_scipys_geometry():
     """`scipy.spatial` took half of the time to the first plan, in every worker."""
     folder = generated_arm("six_mesh").folder
     words = (
-        "import sys; from services.arm.model.description import load_arm; "
-        "from services.planner.core import Planner; "
+        "import sys; from gemelo.services.arm.model.description import load_arm; "
+        "from gemelo.services.planner.core import Planner; "
         f"planner = Planner(load_arm({str(folder)!r})); planner.prepare(); "
         "print(planner.checker.native(0.004) is not None, 'scipy.spatial' in sys.modules)"
     )

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import load_arm
-from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.targets import ToolTarget
-from services.planner.request.deadline import NEVER, Deadline
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.kinematics.ik import InverseKinematics
+from gemelo.services.planner.kinematics.targets import ToolTarget
+from gemelo.services.planner.request.deadline import NEVER, Deadline
 from tests.profiles import examples
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")

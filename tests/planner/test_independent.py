@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import JointGoal, PlanRequest
-from schemas.scene import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JointGoal, PlanRequest
+from gemelo.schemas.scene import (
     AllowedPair,
     BoxShape,
     CylinderShape,
@@ -23,11 +23,11 @@ from schemas.scene import (
     Shape,
     SphereShape,
 )
-from services.arm.interpolation import TrajectorySampler
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.planner.collision.world import World
-from services.planner.core import Planner
+from gemelo.services.arm.interpolation import TrajectorySampler
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
 from tests.planner.independent import Judge, resampled
 from tests.planner.native.scenes import star_mesh
 from tests.table import table

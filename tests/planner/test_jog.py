@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.joints import JointState
-from schemas.planning import JogCommand
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.jog.jog import DEAD_MAN, PERIOD, SILENCE, Jog
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JogCommand
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.jog.jog import DEAD_MAN, PERIOD, SILENCE, Jog
 from tests.planner.jogging import Jogged, arm_of, kinematics_of, world_of
 from tests.profiles import examples
 

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.frames import Transform
-from schemas.planning import JogCommand
-from schemas.scene import BoxShape, PlanningScene, SceneObject, SphereShape
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.collision.world import World
-from services.planner.jog.jog import PERIOD
-from services.planner.jog.jog_obstacles import CONTACT_SPEED
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.planning import JogCommand
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject, SphereShape
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.jog.jog import PERIOD
+from gemelo.services.planner.jog.jog_obstacles import CONTACT_SPEED
 from tests.planner.jogging import Array, Jogged, arm_of, kinematics_of
 from tests.profiles import examples
 

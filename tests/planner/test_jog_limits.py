@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.planning import JogCommand
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.jog.jog import PERIOD
+from gemelo.schemas.planning import JogCommand
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.jog.jog import PERIOD
 from tests.planner.jogging import Jogged, arm_of
 from tests.profiles import examples
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.joints import JointTargets
-from schemas.planning import JogCommand, JogInputs, JogStatus, JogTaken, JogTick, SceneVersion
-from services.planner.jog.jog_log import MOST, JogLog, digest_of
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.planning import JogCommand, JogInputs, JogStatus, JogTaken, JogTick, SceneVersion
+from gemelo.services.planner.jog.jog_log import MOST, JogLog, digest_of
 
 SCENE = SceneVersion(version=3, epoch=7)
 

@@ -7,11 +7,11 @@ import struct
 import numpy as np
 import pytest
 
-from schemas.frames import Transform
-from schemas.planning import JogCommand
-from schemas.scene import MeshShape, PlanningScene, SceneObject
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.collision.world import MANY, World
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.planning import JogCommand
+from gemelo.schemas.scene import MeshShape, PlanningScene, SceneObject
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision.world import MANY, World
 from tests.planner.jogging import Array, Jogged, arm_of, kinematics_of
 
 BANDS = 40  # 3200 triangles

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from schemas.joints import JointState
-from schemas.planning import JogCommand, JogLimit
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.jog.jog import PERIOD, SILENCE, Jog
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JogCommand, JogLimit
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.jog.jog import PERIOD, SILENCE, Jog
 from tests.planner.jogging import Jogged, arm_of, kinematics_of, world_of
 
 TURN = JogCommand(name=("brazo_joint",), velocity=(0.5,))

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from services.planner.kinematics import joint_ranges
-from services.planner.kinematics.joint_ranges import MOST_TURNS
+from gemelo.services.planner.kinematics import joint_ranges
+from gemelo.services.planner.kinematics.joint_ranges import MOST_TURNS
 from tests.table import table
 
 

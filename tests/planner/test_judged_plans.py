@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.planning import (
+from gemelo.schemas.planning import (
     CircularMotion,
     FkRequest,
     FreeMotion,
@@ -24,14 +24,14 @@ from schemas.planning import (
     PoseGoal,
     WaypointGoal,
 )
-from schemas.planning import (
+from gemelo.schemas.planning import (
     Motion as AskedMotion,
 )
-from schemas.scene import PlanningScene
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.core import Planner
-from services.planner.kinematics.kinematic_requests import KinematicRequests
-from services.planner.path.search import KNOWN
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
+from gemelo.services.planner.path.search import KNOWN
 from tests.planner.drawn_requests import INNER, cases, pose_goals, tool_cases
 from tests.planner.independent import Array, Judge, Motion
 from tests.planner.judging import (

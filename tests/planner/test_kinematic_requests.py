@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import (
     FkRequest,
     IkRequest,
     IkResponse,
@@ -21,15 +21,15 @@ from schemas.planning import (
     ValidityRequest,
     ValidityResponse,
 )
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import load_arm
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.collision.world import World
-from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.kinematic_requests import KinematicRequests
-from services.planner.kinematics.targets import ToolTarget
-from services.planner.request.deadline import NEVER
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.kinematics.ik import InverseKinematics
+from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
+from gemelo.services.planner.kinematics.targets import ToolTarget
+from gemelo.services.planner.request.deadline import NEVER
 from tests.profiles import examples
 
 ROOT = Path(__file__).parents[2] / "urdf"

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from schemas.joints import JointState
-from schemas.motion import MOST_POINTS
-from schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, Refusal, WaypointGoal
-from services.arm.model.description import load_arm
-from services.planner.core import Planner
-from services.planner.workers.plan_service import sendable
-from services.runtime.bus.wire import encoded
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.motion import MOST_POINTS
+from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, Refusal, WaypointGoal
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.workers.plan_service import sendable
+from gemelo.services.runtime.bus.wire import encoded
 
 LIMIT = 60.0  # [s] of the processor; twenty times what it takes
 
@@ -43,7 +43,7 @@ def test_a_path_of_ten_thousand_points_is_planned(blend: float) -> None:
 def test_a_path_with_more_points_than_are_followed_is_refused_with_both_numbers(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("services.planner.core.MOST_POINTS", 300)
+    monkeypatch.setattr("gemelo.services.planner.core.MOST_POINTS", 300)
     _, response = wave(100, "rm1", 0.0)
     assert response.refusal is not None
     assert (response.refusal.check, response.refusal.limit) == ("points", float(MOST_POINTS))

@@ -6,10 +6,10 @@ import gc
 import tracemalloc
 from random import Random
 
-from schemas.joints import JointState
-from schemas.planning import JointGoal, PlanCode, PlanRequest
-from services.arm.model.description import ArmDescription
-from services.planner.core import Planner
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.core import Planner
 
 WARM_UP, PLANS = 40, 60
 MOST = 20.0  # [B] a plan: less than one array of the smallest size

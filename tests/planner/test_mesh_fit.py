@@ -12,28 +12,28 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.arm.errors import DescriptionError
-from services.arm.kinematics.collision_matrix import collision_matrix
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.arm.model.srdf_edit import with_pairs
-from services.arm.model.urdf_edit import with_collisions
-from services.cli.robot_folder import plan_of
-from services.collision_fitting import cuts
-from services.collision_fitting.excess import SHARE, depth_in, depths
-from services.collision_fitting.fit_writing import HULLS, touching_states, write_fits
-from services.collision_fitting.fitted_shape import Fitted, FittedKind
-from services.collision_fitting.fitting import fitted
-from services.collision_fitting.hull import smallest_ball
-from services.collision_fitting.link_meshes import visual_mesh
-from services.collision_fitting.mesh_fit import fit_links, usual_bound
-from services.collision_fitting.mesh_part import MeshPart
-from services.collision_fitting.mesh_surface import MeshSurface
-from services.collision_fitting.parts import shapes_around
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.collision_geometry.coal_shapes import is_inside
-from services.planner.collision_geometry.link_shapes import link_shapes
-from services.planner.collision_geometry.shapes import ShapeKind, TriangleMesh
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.kinematics.collision_matrix import collision_matrix
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.arm.model.srdf_edit import with_pairs
+from gemelo.services.arm.model.urdf_edit import with_collisions
+from gemelo.services.cli.robot_folder import plan_of
+from gemelo.services.collision_fitting import cuts
+from gemelo.services.collision_fitting.excess import SHARE, depth_in, depths
+from gemelo.services.collision_fitting.fit_writing import HULLS, touching_states, write_fits
+from gemelo.services.collision_fitting.fitted_shape import Fitted, FittedKind
+from gemelo.services.collision_fitting.fitting import fitted
+from gemelo.services.collision_fitting.hull import smallest_ball
+from gemelo.services.collision_fitting.link_meshes import visual_mesh
+from gemelo.services.collision_fitting.mesh_fit import fit_links, usual_bound
+from gemelo.services.collision_fitting.mesh_part import MeshPart
+from gemelo.services.collision_fitting.mesh_surface import MeshSurface
+from gemelo.services.collision_fitting.parts import shapes_around
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision_geometry.coal_shapes import is_inside
+from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
+from gemelo.services.planner.collision_geometry.shapes import ShapeKind, TriangleMesh
 from tests.profiles import examples
 
 URDF = Path(__file__).parents[2] / "urdf"

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from schemas.planning import LinearMotion, NamedGoal, PlanCode, PointToPoint, WaypointGoal
-from services.arm.model.description import load_arm
-from services.planner.core import Planner
+from gemelo.schemas.planning import LinearMotion, NamedGoal, PlanCode, PointToPoint, WaypointGoal
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.core import Planner
 from tests.planner.judging import asked
 
 START = (0.4, -0.9, 0.06)

@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from schemas.frames import Transform
-from schemas.planning import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.planning import (
     FreeMotion,
     JointGoal,
     LinearMotion,
@@ -18,9 +18,9 @@ from schemas.planning import (
     PointToPoint,
     PoseGoal,
 )
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.core import Planner
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.core import Planner
 from tests.planner.independent import Array, Judge
 from tests.planner.judging import (
     asked,

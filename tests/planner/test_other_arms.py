@@ -9,16 +9,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import FreeMotion, JogCommand, LinearMotion, PointToPoint, PoseGoal, Timing
-from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, SphereShape
-from services.arm.checks.check import check
-from services.planner.collision.sphere_check import show_scene
-from services.planner.collision.world import World
-from services.planner.core import Planner
-from services.planner.jog.jog import PERIOD, Jog
-from services.planner.native.native_planner import NativePlanner
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import FreeMotion, JogCommand, LinearMotion, PointToPoint, PoseGoal, Timing
+from gemelo.schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, SphereShape
+from gemelo.services.arm.checks.check import check
+from gemelo.services.planner.collision.sphere_check import show_scene
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.jog.jog import PERIOD, Jog
+from gemelo.services.planner.native.native_planner import NativePlanner
 from tests.planner.drawn_requests import cases, pose_goals
 from tests.planner.independent import Judge
 from tests.planner.judging import (

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.parallel_axes import parallel_axes
-from services.planner.kinematics.targets import ToolTarget
-from services.planner.request.deadline import NEVER
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.planner.kinematics.ik import InverseKinematics
+from gemelo.services.planner.kinematics.parallel_axes import parallel_axes
+from gemelo.services.planner.kinematics.targets import ToolTarget
+from gemelo.services.planner.request.deadline import NEVER
 
 RM1 = Path(__file__).parents[2] / "urdf" / "rm1"
 BASE, UPPER, FORE, TOOL = "base_link", "brazo_link", "antebrazo_link", "efector_link"

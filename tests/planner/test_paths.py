@@ -13,25 +13,25 @@ import msgspec
 import numpy as np
 import pytest
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, Timing
-from schemas.scene import MeshShape, PlanningScene, SceneObject
-from services.arm.model.description import load_arm
-from services.bench.problems.problem_sets import path_length
-from services.bench.scenes import SCENES, box
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.collision.native_scene import native_scene
-from services.planner.collision.world import World
-from services.planner.core import Planner
-from services.planner.path.curve import spline_rows
-from services.planner.path.path import Path as JointPath
-from services.planner.path.path import PathNotFound
-from services.planner.path.search import KNOWN, Search
-from services.planner.request.deadline import Deadline, Stopwatch
-from services.planner.timing.profile import joint_limits
-from services.planner.timing.toppra_speeds import load_toppra
-from services.planner.verification.verify import limit_shares, require_ends, sample
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, Timing
+from gemelo.schemas.scene import MeshShape, PlanningScene, SceneObject
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.bench.problems.problem_sets import path_length
+from gemelo.services.bench.scenes import SCENES, box
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision.native_scene import native_scene
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.path.curve import spline_rows
+from gemelo.services.planner.path.path import Path as JointPath
+from gemelo.services.planner.path.path import PathNotFound
+from gemelo.services.planner.path.search import KNOWN, Search
+from gemelo.services.planner.request.deadline import Deadline, Stopwatch
+from gemelo.services.planner.timing.profile import joint_limits
+from gemelo.services.planner.timing.toppra_speeds import load_toppra
+from gemelo.services.planner.verification.verify import limit_shares, require_ends, sample
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.scenes import star_mesh, stl_of
 from tests.profiles import count

@@ -10,9 +10,9 @@ from queue import Empty, SimpleQueue
 import pytest
 from msgspec.structs import replace
 
-from schemas.planning import NamedGoal, PlanCode, PlanPhase, PlanRequest, PlanResponse
-from schemas.scene import PlanningScene
-from services.planner.workers.workers import LONGEST_ID, MOST, MOST_PLANS, Workers
+from gemelo.schemas.planning import NamedGoal, PlanCode, PlanPhase, PlanRequest, PlanResponse
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.planner.workers.workers import LONGEST_ID, MOST, MOST_PLANS, Workers
 from tests.planner.processes import planning_processes
 from tests.planner.walled import WALLED, past_the_wall
 

@@ -16,18 +16,18 @@ import numpy as np
 import psutil
 import pytest
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Timing
-from schemas.scene import BoxShape, MeshShape, PlanningScene, SceneObject
-from services.arm.model.description import load_arm
-from services.planner import core
-from services.planner.core import Planner
-from services.planner.workers import worker
-from services.planner.workers import workers as module
-from services.planner.workers.jobs import Job
-from services.planner.workers.process import PlannerProcess
-from services.planner.workers.workers import Workers
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Timing
+from gemelo.schemas.scene import BoxShape, MeshShape, PlanningScene, SceneObject
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner import core
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.workers import worker
+from gemelo.services.planner.workers import workers as module
+from gemelo.services.planner.workers.jobs import Job
+from gemelo.services.planner.workers.process import PlannerProcess
+from gemelo.services.planner.workers.workers import Workers
 from tests.descriptors import few_descriptors
 from tests.planner.native.scenes import star_mesh, stl_of
 from tests.planner.processes import planning_processes
@@ -260,9 +260,9 @@ def test_one_client_does_not_block_another(stack: Stack):
 
 def test_nothing_is_left_of_a_planner_that_is_killed_while_it_plans():
     code = (
-        "import time; from pathlib import Path; from schemas.planning import *;"
-        "from schemas.joints import JointState; from schemas.scene import PlanningScene;"
-        "from services.planner.workers.workers import Workers;"
+        "import time; from pathlib import Path; from gemelo.schemas.planning import *;"
+        "from gemelo.schemas.joints import JointState; from gemelo.schemas.scene import PlanningScene;"
+        "from gemelo.services.planner.workers.workers import Workers;"
         f"scene = PlanningScene(); project = Path({str(PROJECT)!r});"
         "w = Workers(project / 'urdf/rm1', project, lambda: (None, 0.0), lambda: scene);"
         f"home = JointState(name={HOME.name!r}, position=(0.0, 0.0, 0.0));"

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.joints import JointState
-from schemas.planning import (
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import (
     FreeMotion,
     JointGoal,
     LinearMotion,
@@ -24,10 +24,10 @@ from schemas.planning import (
     PoseGoal,
     Refusal,
 )
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.model.description import ArmDescription, load_arm
-from services.planner.collision.world import World
-from services.planner.core import Planner
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
 from tests.profiles import examples
 from tests.table import table
 

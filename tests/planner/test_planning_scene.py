@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import JointGoal, PlanCode, PlanRequest, PointToPoint, PoseGoal
-from schemas.scene import AllowedPair, BoxShape, PlanningScene, SceneObject, SphereShape
-from services.arm.model.description import ArmDescription
-from services.planner.collision.world import World
-from services.planner.core import Planner
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PointToPoint, PoseGoal
+from gemelo.schemas.scene import AllowedPair, BoxShape, PlanningScene, SceneObject, SphereShape
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
 
 GOAL = JointGoal(name=("brazo_joint",), position=(1.2,))
 REQUEST = PlanRequest(goal=GOAL, motion=PointToPoint())

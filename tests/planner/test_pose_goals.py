@@ -13,12 +13,12 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from schemas.planning import PlanCode, PoseGoal, Refusal
-from services.arm.kinematics.kinematics import FramePose, Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.planner.kinematics.goals import Goals, Start
-from services.planner.request.deadline import NEVER
-from services.planner.request.refusals import PlanRefused
+from gemelo.schemas.planning import PlanCode, PoseGoal, Refusal
+from gemelo.services.arm.kinematics.kinematics import FramePose, Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.planner.kinematics.goals import Goals, Start
+from gemelo.services.planner.request.deadline import NEVER
+from gemelo.services.planner.request.refusals import PlanRefused
 from tests.profiles import examples
 
 ROOT = Path(__file__).parents[2] / "urdf"

@@ -13,13 +13,13 @@ FIRST_PLAN = """
 import sys
 from pathlib import Path
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import FreeMotion, JointGoal, PlanRequest
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.model.description import load_arm
-from services.planner.core import Planner
-from services.planner.collision.world import World
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import FreeMotion, JointGoal, PlanRequest
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.collision.world import World
 
 arm = load_arm(Path("urdf/rm1"))
 planner = Planner(arm)

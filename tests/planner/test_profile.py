@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
-from schemas.motion import JointTrajectory
-from services.arm.interpolation import TrajectorySampler
-from services.arm.model.description import load_arm
-from services.planner.timing import profile
-from services.planner.timing.profile import joint_limits, straight_line
-from services.planner.verification.verify import require_ends, require_within_limits, sample
+from gemelo.schemas.motion import JointTrajectory
+from gemelo.services.arm.interpolation import TrajectorySampler
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.timing import profile
+from gemelo.services.planner.timing.profile import joint_limits, straight_line
+from gemelo.services.planner.verification.verify import require_ends, require_within_limits, sample
 from tests.profiles import examples
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")

@@ -9,17 +9,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from schemas.frames import Transform
-from schemas.scene import AllowedPair, MeshShape, PlanningScene, SceneObject
-from services.arm.kinematics import self_collisions
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.kinematics.self_collisions import driver_of, shape_reach
-from services.arm.model.description import ArmDescription, load_arm
-from services.bench.planner.scene_intake import drawn_scene
-from services.planner.collision import arm_geometry
-from services.planner.collision.world import World
-from services.planner.collision_geometry.coal_shapes import geometry_of
-from services.planner.collision_geometry.shapes import SIZES, CollisionShape, ShapeKind
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import AllowedPair, MeshShape, PlanningScene, SceneObject
+from gemelo.services.arm.kinematics import self_collisions
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.kinematics.self_collisions import driver_of, shape_reach
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.bench.planner.scene_intake import drawn_scene
+from gemelo.services.planner.collision import arm_geometry
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.collision_geometry.coal_shapes import geometry_of
+from gemelo.services.planner.collision_geometry.shapes import SIZES, CollisionShape, ShapeKind
 from tests.planner.test_world import configurations, stl_box
 
 SEVEN = Path(__file__).parent / "arms" / "seven"

@@ -10,10 +10,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint
-from schemas.scene import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint
+from gemelo.schemas.scene import (
     BoxShape,
     PlanningScene,
     SceneAdd,
@@ -26,11 +26,11 @@ from schemas.scene import (
     SceneResponse,
     SphereShape,
 )
-from schemas.topics import CONTACTS, JOINT_STATES, PLAN, SCENE, SCENE_EDIT
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.scene.scene_file import load_scene, save_scene
-from services.runtime.node import Node
+from gemelo.schemas.topics import CONTACTS, JOINT_STATES, PLAN, SCENE, SCENE_EDIT
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.scene.scene_file import load_scene, save_scene
+from gemelo.services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner
 
 WAIT = 5.0  # [s]

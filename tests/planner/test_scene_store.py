@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.frames import Transform
-from schemas.scene import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import (
     AllowedPair,
     BoxShape,
     CylinderShape,
@@ -35,12 +35,12 @@ from schemas.scene import (
     Shape,
     SphereShape,
 )
-from services.arm.frames.transforms import compose, from_message, to_message
-from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import load_arm
-from services.planner.scene.scene_check import require_scene
-from services.planner.scene.scene_file import DamagedScene, load_scene, put_aside, save_scene
-from services.planner.scene.scene_store import SceneStore
+from gemelo.services.arm.frames.transforms import compose, from_message, to_message
+from gemelo.services.arm.kinematics.chain import link_transforms
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.scene.scene_check import require_scene
+from gemelo.services.planner.scene.scene_file import DamagedScene, load_scene, put_aside, save_scene
+from gemelo.services.planner.scene.scene_store import SceneStore
 from tests.profiles import examples
 
 Poses = Mapping[str, Transform]

@@ -9,14 +9,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from schemas.planning import PoseGoal
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.planner.kinematics.goals import Goals
-from services.planner.kinematics.targets import AxisPointing, ToolTarget
-from services.planner.kinematics.task_space import TaskSpace, task_space
-from services.planner.request.deadline import NEVER
-from services.planner.request.refusals import PlanRefused
+from gemelo.schemas.planning import PoseGoal
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.planner.kinematics.goals import Goals
+from gemelo.services.planner.kinematics.targets import AxisPointing, ToolTarget
+from gemelo.services.planner.kinematics.task_space import TaskSpace, task_space
+from gemelo.services.planner.request.deadline import NEVER
+from gemelo.services.planner.request.refusals import PlanRefused
 
 ROOT = Path(__file__).parents[2] / "urdf"
 

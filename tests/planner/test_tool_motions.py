@@ -9,9 +9,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import (
     CircularMotion,
     FreeMotion,
     Goal,
@@ -27,14 +27,14 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.interpolation import TrajectorySampler
-from services.arm.model.description import load_arm
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.collision.world import World
-from services.planner.core import Planner
-from services.planner.timing.profile import joint_limits
-from services.planner.verification.verify import require_jerk, require_within_limits, sample
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.arm.interpolation import TrajectorySampler
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.timing.profile import joint_limits
+from gemelo.services.planner.verification.verify import require_jerk, require_within_limits, sample
 from tests.profiles import examples
 
 URDF = Path(__file__).parents[2] / "urdf"

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from services.arm.kinematics.kinematics import FramePose
-from services.planner.cartesian.arcs import arc_about, arc_through
-from services.planner.cartesian.tool_path import ToolPath, polyline
-from services.planner.path.path_curve import NO_LENGTH, CubicSpline, rounded_runs
-from services.planner.request.refusals import PlanRefused
+from gemelo.services.arm.kinematics.kinematics import FramePose
+from gemelo.services.planner.cartesian.arcs import arc_about, arc_through
+from gemelo.services.planner.cartesian.tool_path import ToolPath, polyline
+from gemelo.services.planner.path.path_curve import NO_LENGTH, CubicSpline, rounded_runs
+from gemelo.services.planner.request.refusals import PlanRefused
 from tests.profiles import examples
 
 NUMBERS = st.floats(-1.0, 1.0).map(lambda value: round(value, 4))

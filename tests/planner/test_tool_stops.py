@@ -10,8 +10,8 @@ from msgspec.structs import replace
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from schemas.frames import Transform
-from schemas.planning import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.planning import (
     CircularMotion,
     Goal,
     JointGoal,
@@ -24,7 +24,7 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
 from tests.planner.independent import Array, Judge, Motion, resampled
 from tests.planner.judging import asked, planner_of, show
 

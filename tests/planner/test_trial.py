@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.arm.checks.findings import Severity
-from services.arm.model.description import load_arm
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.planner.trial import looking_the_same, trial
+from gemelo.services.arm.checks.findings import Severity
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.planner.trial import looking_the_same, trial
 from tests.arm.editing import edit
 from tests.arm.plates import add_rigid_plates, add_turning_disc
 

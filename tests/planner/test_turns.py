@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from schemas.planning import FreeMotion, JointGoal, Motion, PlanCode, PlanResponse, PointToPoint
-from schemas.scene import PlanningScene
-from services.arm.model.description import load_arm
-from services.planner.core import Planner
+from gemelo.schemas.planning import FreeMotion, JointGoal, Motion, PlanCode, PlanResponse, PointToPoint
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.core import Planner
 from tests.planner.judging import asked, require_sound, show
 from tests.planner.walled import NAMES, wall
 

@@ -8,14 +8,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from schemas.motion import JointTrajectory
-from services.arm.interpolation import TrajectorySampler
-from services.arm.model.description import ArmDescription
-from services.planner.collision.clearance import first_collision
-from services.planner.core import Planner
-from services.planner.timing.profile import States, joint_limits, straight_line
-from services.planner.verification import verify
-from services.planner.verification.verify import BadTrajectory, require_ends, require_within_limits, sample
+from gemelo.schemas.motion import JointTrajectory
+from gemelo.services.arm.interpolation import TrajectorySampler
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.clearance import first_collision
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.timing.profile import States, joint_limits, straight_line
+from gemelo.services.planner.verification import verify
+from gemelo.services.planner.verification.verify import BadTrajectory, require_ends, require_within_limits, sample
 
 START, GOAL = (0.0, 0.0, 0.0), (1.0, -0.5, 0.1)
 

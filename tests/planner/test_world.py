@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from schemas.frames import Transform
-from schemas.scene import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import (
     AllowedPair,
     BoxShape,
     CylinderShape,
@@ -20,10 +20,10 @@ from schemas.scene import (
     Shape,
     SphereShape,
 )
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.planner.collision.scene_shapes import SceneError
-from services.planner.collision.world import World
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.planner.collision.scene_shapes import SceneError
+from gemelo.services.planner.collision.world import World
 
 LINK_PAIR_MARGIN = 0.05  # [m]
 ROUNDING = 2e-6  # [m] coal's GJK stops at 1e-6, from where it stopped last

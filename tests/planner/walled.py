@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import FreeMotion, JointGoal, PlanRequest
-from schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import FreeMotion, JointGoal, PlanRequest
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
 
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")
 

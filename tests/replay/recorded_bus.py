@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from schemas.topics import DESCRIPTION
-from services.arm.model.description import load_arm
-from services.recordings.channels import Entry
-from services.recordings.mcap_file import McapFile
-from services.recordings.table import recorded_topics
-from services.replay.planner import PLANS, TOPICS
-from services.runtime.deployment import project_root
-from services.runtime.node import Node
-from services.state_publisher.main import describe
+from gemelo.schemas.topics import DESCRIPTION
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.mcap_file import McapFile
+from gemelo.services.recordings.table import recorded_topics
+from gemelo.services.replay.planner import PLANS, TOPICS
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.node import Node
+from gemelo.services.state_publisher.main import describe
 from tests.planner.planning_node import beside_a_planner
 
 PATIENCE = 60.0  # [s]

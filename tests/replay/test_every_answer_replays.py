@@ -10,18 +10,27 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.message import Message
-from schemas.planning import FkRequest, IkRequest, JogCommand, JogTaken, JogTick, PlanCode, PoseGoal, ValidityRequest
-from schemas.scene import BoxShape, SceneAdd, SceneAttach, SceneMove, SceneObject, SceneRemove, SceneRequest
-from schemas.topics import FK, IK, JOG, JOINT_STATES, JOINT_TARGETS, SCENE_EDIT, STATE_VALIDITY
-from services.planner.jog.jog import SILENCE
-from services.recordings.channels import Entry
-from services.replay import planner_jog
-from services.replay.main import Replayed, replay, text_of
-from services.replay.planner_answers import UNKNOWN
-from services.replay.planner_jog import EARLIER, PERIODS
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import Message
+from gemelo.schemas.planning import (
+    FkRequest,
+    IkRequest,
+    JogCommand,
+    JogTaken,
+    JogTick,
+    PlanCode,
+    PoseGoal,
+    ValidityRequest,
+)
+from gemelo.schemas.scene import BoxShape, SceneAdd, SceneAttach, SceneMove, SceneObject, SceneRemove, SceneRequest
+from gemelo.schemas.topics import FK, IK, JOG, JOINT_STATES, JOINT_TARGETS, SCENE_EDIT, STATE_VALIDITY
+from gemelo.services.planner.jog.jog import SILENCE
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.replay import planner_jog
+from gemelo.services.replay.main import Replayed, replay, text_of
+from gemelo.services.replay.planner_answers import UNKNOWN
+from gemelo.services.replay.planner_jog import EARLIER, PERIODS
 from tests.replay.recorded_bus import PATIENCE, Recorder
 
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

@@ -9,15 +9,15 @@ import zlib
 import msgspec
 import pytest
 
-from schemas.system import LogLevel
-from schemas.topics import GRIPPER_STATE
-from services.replay.main import replay
-from services.replay.recorded import NotReplayable
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import FrameInput, Given, give, packed, unpacked
-from services.stepper_gateway.links.link import Kind
-from services.stepper_gateway.outputs import GoalFinished, LogLine, Publish
-from services.stepper_gateway.shell import Shell
+from gemelo.schemas.system import LogLevel
+from gemelo.schemas.topics import GRIPPER_STATE
+from gemelo.services.replay.main import replay
+from gemelo.services.replay.recorded import NotReplayable
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.inputs import FrameInput, Given, give, packed, unpacked
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.stepper_gateway.outputs import GoalFinished, LogLine, Publish
+from gemelo.services.stepper_gateway.shell import Shell
 from tests.replay.conftest import RECORDINGS, Messages
 
 GATEWAY = "stepper_gateway"

@@ -5,15 +5,15 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from schemas.frames import Transform
-from schemas.gripper import GripperState
-from schemas.joints import JointState
-from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest
-from schemas.scene import SceneAdd, SceneClear, SceneObject, SceneRequest, SphereShape
-from schemas.topics import GRIPPER_STATE, PLAN, SCENE_EDIT
-from services.replay.main import replay, text_of
-from services.replay.planner import PLANS, UNPLANNED
-from services.runtime.node import Node
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.gripper import GripperState
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest
+from gemelo.schemas.scene import SceneAdd, SceneClear, SceneObject, SceneRequest, SphereShape
+from gemelo.schemas.topics import GRIPPER_STATE, PLAN, SCENE_EDIT
+from gemelo.services.replay.main import replay, text_of
+from gemelo.services.replay.planner import PLANS, UNPLANNED
+from gemelo.services.runtime.node import Node
 from tests.replay.recorded_bus import PATIENCE, Recorder
 
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

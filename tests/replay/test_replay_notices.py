@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from services.planner import core as planner_core
-from services.replay.main import replay, text_of
-from services.state_publisher import core as publisher_core
+from gemelo.services.planner import core as planner_core
+from gemelo.services.replay.main import replay, text_of
+from gemelo.services.state_publisher import core as publisher_core
 from tests.replay.conftest import RECORDINGS, Messages
 
 

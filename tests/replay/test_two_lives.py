@@ -6,20 +6,20 @@ from pathlib import Path
 
 import pytest
 
-from schemas.topics import DESCRIPTION, GATEWAY_INPUTS
-from services.recordings.channels import Entry
-from services.recordings.mcap_file import McapFile
-from services.replay.main import replay, text_of
-from services.replay.recorded import NotReplayable
-from services.replay.stepper_gateway import EARLIER, OUTSIDE
-from services.state_publisher.main import describe
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.input_log import InputLog
-from services.stepper_gateway.inputs import BeganInput, LinkInput, StepInput
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import Publish
-from services.stepper_gateway.parameters import GatewayParameters
-from services.virtual_arm.virtual_arm import UNIX, rm1
+from gemelo.schemas.topics import DESCRIPTION, GATEWAY_INPUTS
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.mcap_file import McapFile
+from gemelo.services.replay.main import replay, text_of
+from gemelo.services.replay.recorded import NotReplayable
+from gemelo.services.replay.stepper_gateway import EARLIER, OUTSIDE
+from gemelo.services.state_publisher.main import describe
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.input_log import InputLog
+from gemelo.services.stepper_gateway.inputs import BeganInput, LinkInput, StepInput
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.outputs import Publish
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.virtual_arm.virtual_arm import UNIX, rm1
 from tests.replay.conftest import Messages
 
 PERIOD = 0.02  # [s]

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from schemas.joints import JointState
-from schemas.planning import NamedGoal, PlanCode, PlanRequest
-from services.arm.checks.check import Severity, check
-from services.arm.device.device_config import device_config
-from services.arm.model.description import ArmDescription, load_arm
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.planner.core import Planner
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest
+from gemelo.services.arm.checks.check import Severity, check
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.planner.core import Planner
 from tests.robot_import.exports import EXPORTS, Export, hobby
 
 

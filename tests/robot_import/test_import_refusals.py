@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from services.arm.checks.check import check
-from services.arm.checks.findings import Severity
-from services.arm.model.description import load_arm
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.robot_import.limits import ask_limits
-from services.robot_import.mending import mend
-from services.robot_import.questions import Questions
-from services.robot_import.source import find_source
+from gemelo.services.arm.checks.check import check
+from gemelo.services.arm.checks.findings import Severity
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.robot_import.limits import ask_limits
+from gemelo.services.robot_import.mending import mend
+from gemelo.services.robot_import.questions import Questions
+from gemelo.services.robot_import.source import find_source
 from tests.robot_import.exports import by_hand, joint, link, mesh, package, solidworks, workspace, write
 
 

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.arm.checks.check import check
-from services.arm.checks.findings import Severity
-from services.arm.kinematics.chain import link_transforms
-from services.arm.model.urdf import UrdfModel
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.robot_import.limits import ask_limits
-from services.robot_import.mended import Mended
-from services.robot_import.mending import mend
-from services.robot_import.questions import Questions
-from services.robot_import.source import find_source
+from gemelo.services.arm.checks.check import check
+from gemelo.services.arm.checks.findings import Severity
+from gemelo.services.arm.kinematics.chain import link_transforms
+from gemelo.services.arm.model.urdf import UrdfModel
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.robot_import.limits import ask_limits
+from gemelo.services.robot_import.mended import Mended
+from gemelo.services.robot_import.mending import mend
+from gemelo.services.robot_import.questions import Questions
+from gemelo.services.robot_import.source import find_source
 from tests.arm.bare_arm import write_bare_arm
 from tests.robot_import.exports import LIMIT, joint, link, mesh, write
 

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 import trimesh
 
-from schemas.joints import JointState
-from schemas.planning import PlanRequest, PoseGoal
-from services.arm.checks.findings import Severity
-from services.arm.checks.meshes import MOST_TRIANGLES
-from services.arm.model.description import load_arm
-from services.arm.model.srdf_edit import entries
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.planner.core import Planner
-from services.robot_import.coarser import coarser
-from services.robot_import.mesh_copies import MOST_COARSER
-from services.robot_import.rigid_groups import MOST_PARTS
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import PlanRequest, PoseGoal
+from gemelo.services.arm.checks.findings import Severity
+from gemelo.services.arm.checks.meshes import MOST_TRIANGLES
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.arm.model.srdf_edit import entries
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.planner.core import Planner
+from gemelo.services.robot_import.coarser import coarser
+from gemelo.services.robot_import.mesh_copies import MOST_COARSER
+from gemelo.services.robot_import.rigid_groups import MOST_PARTS
 from tests.robot_import.plain_arm import LIMIT, arm, body, boxes, hinge, hinges, meshed, part, stl
 from tests.robot_import.test_what_restricts_motion import jaws, survey
 

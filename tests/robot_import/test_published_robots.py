@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.errors import DescriptionError
-from services.arm.model.urdf import JointKind
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.robot_import.mended import Mended
-from services.robot_import.mending import mend
-from services.robot_import.source import find_source
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.urdf import JointKind
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.robot_import.mended import Mended
+from gemelo.services.robot_import.mending import mend
+from gemelo.services.robot_import.source import find_source
 from tests.robot_import.exports import LIMIT, joint, link, mesh, package, write
 
 BASE = ('<link name="ground"/>', '<link name="base"/>', '<link name="arm"/>')

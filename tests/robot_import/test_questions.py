@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.errors import DescriptionError
-from services.robot_import.parts import DRIVERS, MOTORS, driver_named, motor_named
-from services.robot_import.questions import Questions, above_zero, answers_text, read_answers, whole, yes_or_no
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.robot_import.parts import DRIVERS, MOTORS, driver_named, motor_named
+from gemelo.services.robot_import.questions import Questions, above_zero, answers_text, read_answers, whole, yes_or_no
 
 
 @contextlib.contextmanager

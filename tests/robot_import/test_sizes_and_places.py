@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.checks.findings import Severity
-from services.robot_import.mended import Mended
-from services.robot_import.mending import mend
-from services.robot_import.questions import Questions
-from services.robot_import.source import find_source
+from gemelo.services.arm.checks.findings import Severity
+from gemelo.services.robot_import.mended import Mended
+from gemelo.services.robot_import.mending import mend
+from gemelo.services.robot_import.questions import Questions
+from gemelo.services.robot_import.source import find_source
 from tests.robot_import.plain_arm import APART, arm, body, boxes, hinges, meshed, stl
 from tests.table import table
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from services.arm.errors import DescriptionError
-from services.arm.model.urdf import JointKind, UrdfJoint
-from services.arm.model.virtual_drive import driven_joints
-from services.robot_import.mended import Mended
-from services.robot_import.mending import mend
-from services.robot_import.poses import zero_state
-from services.robot_import.questions import Questions
-from services.robot_import.source import find_source
-from services.robot_import.standing import ask_who_stands
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.services.arm.model.virtual_drive import driven_joints
+from gemelo.services.robot_import.mended import Mended
+from gemelo.services.robot_import.mending import mend
+from gemelo.services.robot_import.poses import zero_state
+from gemelo.services.robot_import.questions import Questions
+from gemelo.services.robot_import.source import find_source
+from gemelo.services.robot_import.standing import ask_who_stands
 from tests.robot_import.exports import LIMIT, joint, write
 
 

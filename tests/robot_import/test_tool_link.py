@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.model.urdf import UrdfModel, urdf_of
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.robot_import.tool_link import other_tools, tool_link
+from gemelo.services.arm.model.urdf import UrdfModel, urdf_of
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.robot_import.tool_link import other_tools, tool_link
 from tests.robot_import.exports import LIMIT, joint, link, mesh, write
 
 

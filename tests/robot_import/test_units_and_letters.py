@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from services.arm.checks import meshes
-from services.arm.checks.meshes import MeshFacts, facts_of
-from services.arm.errors import DescriptionError
-from services.arm.model.urdf import Limit
-from services.robot_import.limits import ask_limits
-from services.robot_import.mending import mend
-from services.robot_import.mesh_copies import copy_meshes
-from services.robot_import.questions import Questions
-from services.robot_import.source import find_source
+from gemelo.services.arm.checks import meshes
+from gemelo.services.arm.checks.meshes import MeshFacts, facts_of
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.urdf import Limit
+from gemelo.services.robot_import.limits import ask_limits
+from gemelo.services.robot_import.mending import mend
+from gemelo.services.robot_import.mesh_copies import copy_meshes
+from gemelo.services.robot_import.questions import Questions
+from gemelo.services.robot_import.source import find_source
 from tests.robot_import.exports import joint, link, write
 
 TREE = '<link name="Eslabón"/><link name="arm"/>'

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.checks.findings import Severity
-from services.arm.checks.urdf import check_urdf
-from services.arm.model.description import load_arm
-from services.arm.model.srdf import read_srdf
-from services.arm.model.srdf_edit import entries
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.robot_import.questions import Questions
-from services.robot_import.source import find_source
-from services.robot_import.survey import Survey, surveyed
+from gemelo.services.arm.checks.findings import Severity
+from gemelo.services.arm.checks.urdf import check_urdf
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.arm.model.srdf import read_srdf
+from gemelo.services.arm.model.srdf_edit import entries
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.robot_import.questions import Questions
+from gemelo.services.robot_import.source import find_source
+from gemelo.services.robot_import.survey import Survey, surveyed
 from tests.robot_import.plain_arm import BOTH, LIMIT, arm, body, boxes, hinge, hinges, part
 
 JAW = '<geometry><box size="0.01 0.004 0.03"/></geometry>'

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.errors import DescriptionError
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.robot_import.source import find_source
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.robot_import.source import find_source
 from tests.robot_import.exports import joint
 
 OPEN = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'

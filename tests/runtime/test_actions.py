@@ -9,20 +9,20 @@ from contextlib import contextmanager
 import msgspec
 import pytest
 
-from schemas.actions import GoalStatusCode, ResultRequest
-from schemas.message import encode
-from schemas.motion import (
+from gemelo.schemas.actions import GoalStatusCode, ResultRequest
+from gemelo.schemas.message import encode
+from gemelo.schemas.motion import (
     FollowErrorCode,
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
     JointTrajectory,
 )
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from services.runtime.actions import ActionServer, GoalDecision, accept, refuse
-from services.runtime.actions import keys as keys
-from services.runtime.errors import GoalRefused, NoAnswer, RequestRefused, ServerLost
-from services.runtime.node import Node
+from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
+from gemelo.services.runtime.actions import ActionServer, GoalDecision, accept, refuse
+from gemelo.services.runtime.actions import keys as keys
+from gemelo.services.runtime.errors import GoalRefused, NoAnswer, RequestRefused, ServerLost
+from gemelo.services.runtime.node import Node
 from tests.runtime.support import Buses, hear, spinning, until
 
 Result = FollowJointTrajectoryResult
@@ -191,7 +191,7 @@ def test_the_answer_to_a_result_request_can_be_held_back(buses: Buses) -> None:
 
 
 def test_the_same_goal_sent_twice_is_accepted_once(buses: Buses) -> None:
-    from schemas.actions import GoalRequest
+    from gemelo.schemas.actions import GoalRequest
 
     with moving(buses) as arm:
         node = buses.node("client")
@@ -228,7 +228,7 @@ def test_a_restarted_server_does_not_know_the_goal(buses: Buses) -> None:
 
 
 def test_a_client_that_was_busy_itself_does_not_give_up(buses: Buses, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.runtime.actions.goal_handle.SERVER_TIMEOUT", 0.8)
+    monkeypatch.setattr("gemelo.services.runtime.actions.goal_handle.SERVER_TIMEOUT", 0.8)
     with moving(buses):
         node = buses.node("client")
         handle = node.action(FOLLOW).send(goal_of(110))
@@ -251,7 +251,7 @@ def test_a_node_that_spins_follows_its_goals_too(buses: Buses) -> None:
 def test_goals_that_are_no_goals_are_refused_and_nothing_dies(buses: Buses) -> None:
     from msgspec import Raw
 
-    from schemas.actions import CancelRequest, GoalRequest
+    from gemelo.schemas.actions import CancelRequest, GoalRequest
 
     with moving(buses) as arm:
         node = buses.node("client")
@@ -269,7 +269,7 @@ def test_goals_that_are_no_goals_are_refused_and_nothing_dies(buses: Buses) -> N
 
 @pytest.mark.parametrize("client", ["", "a//b", "@id/*/*/*", "@id/local/cli-1/*", "@alive/local/cli-1"])
 def test_an_attached_goal_of_a_client_whose_end_nobody_would_see_is_refused(buses: Buses, client: str) -> None:
-    from schemas.actions import GoalRequest
+    from gemelo.schemas.actions import GoalRequest
 
     with moving(buses) as arm:
         node, goal = buses.node("client"), msgspec.Raw(encode(goal_of(10)))

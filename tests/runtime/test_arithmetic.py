@@ -8,12 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-from services.runtime.process.arithmetic import KERNEL, VARIABLE
+from gemelo.services.runtime.process.arithmetic import KERNEL, VARIABLE
 
 CHOSEN = f"""
 import ctypes, os
 from pathlib import Path
-import services.planner, numpy
+import gemelo.services.planner, numpy
 libraries = Path(numpy.__file__).parents[1] / "numpy.libs"
 name = ctypes.CDLL(str(next(libraries.glob("*openblas*")))).scipy_openblas_get_corename64_
 name.restype = ctypes.c_char_p

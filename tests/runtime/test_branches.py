@@ -16,19 +16,19 @@ import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.deployment import Deployment, PathsSection, RouterSection
-from schemas.message import encode
-from schemas.roles import ROLE_OF_NODE, ROLES, SERVICES
-from schemas.system import Empty, NodeInfo, NodeStatistics
-from schemas.topics import JOG, JOINT_TARGETS, STATISTICS, Topic
-from services.runtime.bus import branches, identity
-from services.runtime.bus.branches import address_of, branch_of, name_in, read_under, served_under, writer_at
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.bus.zenoh_bus import ZenohBus
-from services.runtime.bus.zenoh_declarations import encoding_of
-from services.runtime.endpoints import info_request
-from services.runtime.errors import NoAnswer, NodeNameTaken
-from services.runtime.node import Node
+from gemelo.schemas.deployment import Deployment, PathsSection, RouterSection
+from gemelo.schemas.message import encode
+from gemelo.schemas.roles import ROLE_OF_NODE, ROLES, SERVICES
+from gemelo.schemas.system import Empty, NodeInfo, NodeStatistics
+from gemelo.schemas.topics import JOG, JOINT_TARGETS, STATISTICS, Topic
+from gemelo.services.runtime.bus import branches, identity
+from gemelo.services.runtime.bus.branches import address_of, branch_of, name_in, read_under, served_under, writer_at
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.services.runtime.bus.zenoh_declarations import encoding_of
+from gemelo.services.runtime.endpoints import info_request
+from gemelo.services.runtime.errors import NoAnswer, NodeNameTaken
+from gemelo.services.runtime.node import Node
 from tests.runtime.locks import Lock, LockedRouter, sessions
 from tests.runtime.support import RouterProcess, hear, spinning, until
 

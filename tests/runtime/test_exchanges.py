@@ -3,12 +3,12 @@
 import msgspec
 import pytest
 
-from schemas.actions import GoalEnd, GoalStatusCode
-from schemas.device import DeviceCommandRequest, DeviceCommandResponse, DeviceStopRequest
-from schemas.message import decode
-from schemas.motion import FollowJointTrajectoryGoal, FollowJointTrajectoryResult
-from schemas.system import Exchange, ParameterChange
-from schemas.topics import (
+from gemelo.schemas.actions import GoalEnd, GoalStatusCode
+from gemelo.schemas.device import DeviceCommandRequest, DeviceCommandResponse, DeviceStopRequest
+from gemelo.schemas.message import decode
+from gemelo.schemas.motion import FollowJointTrajectoryGoal, FollowJointTrajectoryResult
+from gemelo.schemas.system import Exchange, ParameterChange
+from gemelo.schemas.topics import (
     ACTIONS,
     DEVICE_COMMAND,
     DEVICE_STOP,
@@ -17,13 +17,13 @@ from schemas.topics import (
     REQUESTS,
     TOPICS,
 )
-from services.runtime.actions import accept, keys
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.bus.wire import MAX_PAYLOAD, MAX_PAYLOAD_OF
-from services.runtime.endpoints import info_request
-from services.runtime.errors import RequestRefused
-from services.runtime.node import Node
-from services.runtime.requests.exchanges import exchange_topic
+from gemelo.services.runtime.actions import accept, keys
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.bus.wire import MAX_PAYLOAD, MAX_PAYLOAD_OF
+from gemelo.services.runtime.endpoints import info_request
+from gemelo.services.runtime.errors import RequestRefused
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.requests.exchanges import exchange_topic
 from tests.runtime.support import spinning, until
 
 

@@ -10,15 +10,15 @@ import msgspec
 import pytest
 import zenoh
 
-from schemas.deployment import RouterSection
-from schemas.topics import PLAN
-from services.credentials.authority import Authority
-from services.credentials.private_files import AccessError
-from services.runtime.bus.connection import connect, refusal, require_certificate
-from services.runtime.bus.zenoh_bus import ZenohBus
-from services.runtime.bus.zenoh_config import client_config
-from services.runtime.errors import BusError
-from services.runtime.process.shutdown import ShutdownRequest
+from gemelo.schemas.deployment import RouterSection
+from gemelo.schemas.topics import PLAN
+from gemelo.services.credentials.authority import Authority
+from gemelo.services.credentials.private_files import AccessError
+from gemelo.services.runtime.bus.connection import connect, refusal, require_certificate
+from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.services.runtime.bus.zenoh_config import client_config
+from gemelo.services.runtime.errors import BusError
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.runtime.locks import Lock, LockedRouter
 from tests.runtime.support import RouterProcess, until
 

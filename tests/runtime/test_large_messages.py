@@ -6,23 +6,23 @@ import msgspec
 import pytest
 from _pytest.mark.structures import ParameterSet
 
-from schemas.actions import GoalRequest
-from schemas.message import Message, encode
-from schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, Refusal, WaypointGoal
-from schemas.scene import MeshShape, SceneAdd, SceneObject, SceneRequest, SceneResponse
-from schemas.system import Exchange, LogRecord
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, LOG, PLAN, SCENE_EDIT
-from services.arm.stl import MAX_TRIANGLES
-from services.runtime.actions import accept, refuse
-from services.runtime.actions.keys import goal_request, status_topic
-from services.runtime.bus.wire import LARGEST, MAX_PAYLOAD, MAX_PAYLOAD_OF, TooLarge, encoded, limit_of
-from services.runtime.bus.zenoh_config import MAX_MESSAGE_BYTES
-from services.runtime.errors import GoalRefused, RequestRefused
-from services.runtime.process.shutdown import ShutdownRequest
-from services.runtime.requests.exchanges import exchange_topic
-from services.runtime.requests.limits import MAX_WAITING_BYTES, MAX_WAITING_BYTES_OF_A_CLIENT, WaitingRequests
-from services.runtime.requests.server import MAX_REASON
+from gemelo.schemas.actions import GoalRequest
+from gemelo.schemas.message import Message, encode
+from gemelo.schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, Refusal, WaypointGoal
+from gemelo.schemas.scene import MeshShape, SceneAdd, SceneObject, SceneRequest, SceneResponse
+from gemelo.schemas.system import Exchange, LogRecord
+from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, LOG, PLAN, SCENE_EDIT
+from gemelo.services.arm.stl import MAX_TRIANGLES
+from gemelo.services.runtime.actions import accept, refuse
+from gemelo.services.runtime.actions.keys import goal_request, status_topic
+from gemelo.services.runtime.bus.wire import LARGEST, MAX_PAYLOAD, MAX_PAYLOAD_OF, TooLarge, encoded, limit_of
+from gemelo.services.runtime.bus.zenoh_config import MAX_MESSAGE_BYTES
+from gemelo.services.runtime.errors import GoalRefused, RequestRefused
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
+from gemelo.services.runtime.requests.exchanges import exchange_topic
+from gemelo.services.runtime.requests.limits import MAX_WAITING_BYTES, MAX_WAITING_BYTES_OF_A_CLIENT, WaitingRequests
+from gemelo.services.runtime.requests.server import MAX_REASON
 from tests.runtime.conftest import Buses
 from tests.runtime.support import hear, spinning
 

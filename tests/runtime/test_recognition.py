@@ -13,14 +13,14 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from schemas.device import DeviceCommandResponse
-from schemas.topics import DEVICE_STOP
-from services.chaos.proxy import ProxyThread
-from services.runtime.bus import zenoh_bus
-from services.runtime.bus.recognition import Recognition
-from services.runtime.errors import BusError
-from services.runtime.node import Node
-from services.stack.stack import free_ports
+from gemelo.schemas.device import DeviceCommandResponse
+from gemelo.schemas.topics import DEVICE_STOP
+from gemelo.services.chaos.proxy import ProxyThread
+from gemelo.services.runtime.bus import zenoh_bus
+from gemelo.services.runtime.bus.recognition import Recognition
+from gemelo.services.runtime.errors import BusError
+from gemelo.services.runtime.node import Node
+from gemelo.services.stack.stack import free_ports
 from tests.runtime.support import RouterProcess, until
 
 LENGTH = struct.Struct("<H")  # before every batch of Zenoh over TCP

@@ -8,21 +8,21 @@ from pathlib import Path
 
 import pytest
 
-from schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
-from schemas.message import Message, decode, encode
-from schemas.motion import FollowJointTrajectoryGoal
-from schemas.planning import PlanRequest, PlanResponse
-from schemas.topics import DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, PLAN
-from services.runtime.actions.client import PAUSE
-from services.runtime.actions.server import accept
-from services.runtime.bus.interface import UNREAD, Bus, BusReply, Query
-from services.runtime.bus.pace import Pace, Rate
-from services.runtime.bus.zenoh_bus import ZenohBus
-from services.runtime.bus.zenoh_declarations import QUERIES
-from services.runtime.clock import SystemClock
-from services.runtime.errors import NoAnswer
-from services.runtime.node import Node
-from services.runtime.requests.limits import (
+from gemelo.schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
+from gemelo.schemas.message import Message, decode, encode
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.planning import PlanRequest, PlanResponse
+from gemelo.schemas.topics import DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, PLAN
+from gemelo.services.runtime.actions.client import PAUSE
+from gemelo.services.runtime.actions.server import accept
+from gemelo.services.runtime.bus.interface import UNREAD, Bus, BusReply, Query
+from gemelo.services.runtime.bus.pace import Pace, Rate
+from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.services.runtime.bus.zenoh_declarations import QUERIES
+from gemelo.services.runtime.clock import SystemClock
+from gemelo.services.runtime.errors import NoAnswer
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.requests.limits import (
     KNOWN_AFTER,
     MAX_CLIENTS,
     MAX_PRINCIPALS,
@@ -36,7 +36,7 @@ from services.runtime.requests.limits import (
     RequestRates,
     WaitingRequests,
 )
-from services.runtime.requests.server import REPEAT
+from gemelo.services.runtime.requests.server import REPEAT
 from tests.runtime.support import Buses, RouterProcess, hear, spinning, until
 
 Answers = list[BusReply | None]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.runtime.serial_frames import (
+from gemelo.services.runtime.serial_frames import (
     LARGEST,
     BadPacket,
     JsonFrame,

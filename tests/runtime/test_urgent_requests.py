@@ -9,23 +9,23 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from schemas.actions import CancelRequest, CancelResponse, GoalRequest, GoalResponse
-from schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
-from schemas.message import Message, decode, encode
-from schemas.motion import FollowJointTrajectoryGoal
-from schemas.planning import PlanCode, PlanRequest, PlanResponse
-from schemas.system import Failure
-from schemas.topics import DEVICE_STOP, PLAN
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from services.runtime.actions import keys as keys
-from services.runtime.actions.server import accept
-from services.runtime.bus.interface import Bus, BusReply, Query
-from services.runtime.bus.zenoh_bus import ZenohBus
-from services.runtime.bus.zenoh_declarations import QUERIES
-from services.runtime.errors import NoAnswer
-from services.runtime.node import Node
-from services.runtime.requests.limits import MAX_WAITING_OF_A_CLIENT, RequestRates
-from services.runtime.requests.server import MAX_UNANSWERED, Pending
+from gemelo.schemas.actions import CancelRequest, CancelResponse, GoalRequest, GoalResponse
+from gemelo.schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
+from gemelo.schemas.message import Message, decode, encode
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.planning import PlanCode, PlanRequest, PlanResponse
+from gemelo.schemas.system import Failure
+from gemelo.schemas.topics import DEVICE_STOP, PLAN
+from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
+from gemelo.services.runtime.actions import keys as keys
+from gemelo.services.runtime.actions.server import accept
+from gemelo.services.runtime.bus.interface import Bus, BusReply, Query
+from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.services.runtime.bus.zenoh_declarations import QUERIES
+from gemelo.services.runtime.errors import NoAnswer
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.requests.limits import MAX_WAITING_OF_A_CLIENT, RequestRates
+from gemelo.services.runtime.requests.server import MAX_UNANSWERED, Pending
 from tests.runtime.support import Buses, RouterProcess, hear, spinning, until
 
 FROZEN = 1.5  # [s] of the router: longer than the lease of its links

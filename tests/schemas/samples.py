@@ -18,8 +18,8 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import inspect
 
-import schemas
-from schemas.message import Message, encode
+import gemelo.schemas
+from gemelo.schemas.message import Message, encode
 
 T = TypeVar("T")
 GOLDEN = Path(__file__).with_name("golden.json")
@@ -74,13 +74,13 @@ def one_a_line(records: dict[str, dict[str, Any]]) -> str:
 
 
 def _import_all() -> None:
-    for module in pkgutil.iter_modules(schemas.__path__):
-        importlib.import_module(f"schemas.{module.name}")
+    for module in pkgutil.iter_modules(gemelo.schemas.__path__):
+        importlib.import_module(f"gemelo.schemas.{module.name}")
 
 
 def _subclasses(kind: type[T]) -> Iterator[type[T]]:
     for each in kind.__subclasses__():
-        if each.__module__.startswith("schemas."):
+        if each.__module__.startswith("gemelo.schemas."):
             yield each
             yield from _subclasses(each)
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import msgspec
 
-from schemas.message import BadMessage, Message, decode, encode
-from schemas.system import Empty
+from gemelo.schemas.message import BadMessage, Message, decode, encode
+from gemelo.schemas.system import Empty
 from tests.schemas.samples import sample
 
 INTEGERS = (0, -1, 2**31, -(2**62), 2**63 - 1)

@@ -11,8 +11,8 @@ from typing import Any
 
 import msgspec
 
-from schemas.joints import JointState
-from schemas.message import Message, decode, encode
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import Message, decode, encode
 from tests.schemas.samples import (
     GOLDEN,
     GOLDEN_CODES,

@@ -13,11 +13,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.joints import JointState
-from schemas.message import BadMessage, Message, decode, encode
-from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from schemas.planning import JointGoal, NamedGoal, PlannedPath, PlanRequest, PoseGoal
-from schemas.system import Parameters, SetParameter
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import BadMessage, Message, decode, encode
+from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.schemas.planning import JointGoal, NamedGoal, PlannedPath, PlanRequest, PoseGoal
+from gemelo.schemas.system import Parameters, SetParameter
 from tests.schemas.samples import messages, sample
 from tests.table import table
 

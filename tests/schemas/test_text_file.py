@@ -12,17 +12,17 @@ import gemelo
 from gemelo.api.scene_files import read_scene, write_scene
 from gemelo.programs import Points
 from gemelo.programs.reading import read_program
-from schemas.scene import PlanningScene
-from schemas.text_file import NotUtf8, decode_text
-from services.arm.cell.cell_file import load_cell
-from services.arm.model.description import load_arm
-from services.cli.plan_file import read_plan
-from services.hosts.site_file import read_site
-from services.robot_import.questions import read_answers
-from services.runtime.deployment import load_deployment
-from services.runtime.errors import RequestRefused
-from services.runtime.saved_parameters import SavedParameters
-from services.state_publisher.main import describe
+from gemelo.schemas.scene import PlanningScene
+from gemelo.schemas.text_file import NotUtf8, decode_text
+from gemelo.services.arm.cell.cell_file import load_cell
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.cli.plan_file import read_plan
+from gemelo.services.hosts.site_file import read_site
+from gemelo.services.robot_import.questions import read_answers
+from gemelo.services.runtime.deployment import load_deployment
+from gemelo.services.runtime.errors import RequestRefused
+from gemelo.services.runtime.saved_parameters import SavedParameters
+from gemelo.services.state_publisher.main import describe
 
 ROOT = Path(__file__).parents[2]
 MARK = b"\xef\xbb\xbf"

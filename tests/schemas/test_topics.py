@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from schemas.message import Message
-from schemas.topics import ACTIONS, CAMERA_TOPICS, REQUESTS, TOPICS, Action, Delivery, Request, Topic
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import ACTIONS, CAMERA_TOPICS, REQUESTS, TOPICS, Action, Delivery, Request, Topic
 from tests.schemas.samples import messages
 from tests.table import table
 

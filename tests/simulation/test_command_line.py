@@ -7,8 +7,8 @@ import threading
 
 import pytest
 
-from services.cli.errors import ExitCode
-from services.cli.main import run
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
 
 
 @pytest.fixture(autouse=True)

@@ -11,8 +11,8 @@ import pytest
 
 import gemelo
 from gemelo.programs import Points, ProgramRun, Programs, RunStatus
-from schemas.ledger import VerifiedBy
-from services.runtime.bus.pace import OF_ALL_REQUESTS
+from gemelo.schemas.ledger import VerifiedBy
+from gemelo.services.runtime.bus.pace import OF_ALL_REQUESTS
 
 ROOT = Path(__file__).parents[2]
 

@@ -15,14 +15,14 @@ import pytest
 
 import gemelo
 from gemelo.api.simulation import SimulatedArm
-from schemas.device import DeviceCommandRequest, DeviceStopRequest, InjectRequest, StopKind
-from schemas.frames import Transform
-from schemas.joints import JointTargets
-from schemas.message import Message
-from schemas.planning import JogCommand, NamedGoal, PlanRequest
-from schemas.scene import BoxShape, SceneAdd, SceneObject, SceneRequest
-from schemas.system import Empty, SetParameter
-from schemas.topics import (
+from gemelo.schemas.device import DeviceCommandRequest, DeviceStopRequest, InjectRequest, StopKind
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.message import Message
+from gemelo.schemas.planning import JogCommand, NamedGoal, PlanRequest
+from gemelo.schemas.scene import BoxShape, SceneAdd, SceneObject, SceneRequest
+from gemelo.schemas.system import Empty, SetParameter
+from gemelo.schemas.topics import (
     CONTROL,
     DEVICE_COMMAND,
     DEVICE_INJECT,
@@ -36,12 +36,12 @@ from schemas.topics import (
     SCENE_EDIT,
     Request,
 )
-from services.runtime.actions.keys import result_request
-from services.runtime.bus import wire
-from services.runtime.endpoints import info_request, parameter_request, parameters_request
-from services.runtime.errors import RequestRefused
-from services.simulation import twin
-from services.simulation.twin import ServiceNode
+from gemelo.services.runtime.actions.keys import result_request
+from gemelo.services.runtime.bus import wire
+from gemelo.services.runtime.endpoints import info_request, parameter_request, parameters_request
+from gemelo.services.runtime.errors import RequestRefused
+from gemelo.services.simulation import twin
+from gemelo.services.simulation.twin import ServiceNode
 
 ROOT = Path(__file__).parents[2]
 AT_ONCE = -1  # fails where it begins; 0, 1, ...: at the first, second ... message that it encodes

@@ -13,18 +13,18 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import gemelo
-from schemas.message import encode
-from schemas.scene import BoxShape, MeshShape, PlanningScene, SceneMove, SceneObject, SceneRequest
-from schemas.scene_meshes import by_digest, mesh_digest, with_meshes
-from schemas.system import Exchange
-from schemas.topics import SCENE, SCENE_EDIT, scene_mesh
-from services.panel.model.readings import BusReadings
-from services.planner import main as planner_main
-from services.planner.scene.scene_keeper import SceneKeeper
-from services.recordings.subscriptions import Subscriptions
-from services.runtime.bus.wire import MAX_PAYLOAD_OF
-from services.runtime.requests.exchanges import exchange_topic
-from services.runtime.scene_meshes import SceneMeshes
+from gemelo.schemas.message import encode
+from gemelo.schemas.scene import BoxShape, MeshShape, PlanningScene, SceneMove, SceneObject, SceneRequest
+from gemelo.schemas.scene_meshes import by_digest, mesh_digest, with_meshes
+from gemelo.schemas.system import Exchange
+from gemelo.schemas.topics import SCENE, SCENE_EDIT, scene_mesh
+from gemelo.services.panel.model.readings import BusReadings
+from gemelo.services.planner import main as planner_main
+from gemelo.services.planner.scene.scene_keeper import SceneKeeper
+from gemelo.services.recordings.subscriptions import Subscriptions
+from gemelo.services.runtime.bus.wire import MAX_PAYLOAD_OF
+from gemelo.services.runtime.requests.exchanges import exchange_topic
+from gemelo.services.runtime.scene_meshes import SceneMeshes
 
 KEEPERS: list[SceneKeeper] = []
 FAR = (3.0, 0.0, 0.0)  # [m] from where no arm is in its way
@@ -176,8 +176,8 @@ def test_everybody_has_one_scene_whatever_sizes_are_added_and_removed_around_the
     arm.scene.clear()
     expected: dict[str, bytes] = {}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("services.planner.collision.scene_shapes.LARGEST_FILE", 42_000)
-        patch.setattr("services.planner.scene.scene_check.LARGEST_MESHES", 80_000)
+        patch.setattr("gemelo.services.planner.collision.scene_shapes.LARGEST_FILE", 42_000)
+        patch.setattr("gemelo.services.planner.scene.scene_check.LARGEST_MESHES", 80_000)
         patch.setitem(MAX_PAYLOAD_OF, "SceneRequest", 44_000)
         patch.setitem(MAX_PAYLOAD_OF, "PlanningScene", 1200)
         for name, size in steps:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from schemas.device import DeviceMode
+from gemelo.schemas.device import DeviceMode
 
 STEP = 0.015  # [rad] of the coarsest joint of rm1
 
@@ -152,7 +152,7 @@ def test_what_cannot_be_is_refused_in_a_sentence(options: dict[str, object], rea
 
 
 def test_a_part_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("services.planner.main", "pinocchio"):
+    for module in ("gemelo.services.planner.main", "pinocchio"):
         monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(gemelo.Error, match=r'a simulated planner needs: pip install "gemelo\[planner\]"'):
         gemelo.simulate("rm1")

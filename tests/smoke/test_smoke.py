@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from schemas.topics import DEVICE_STATE, JOINT_STATES, STEP_ERRORS
-from services.recordings.reader import MAGIC, RecordingReader
-from services.stack.stack import Stack
+from gemelo.schemas.topics import DEVICE_STATE, JOINT_STATES, STEP_ERRORS
+from gemelo.services.recordings.reader import MAGIC, RecordingReader
+from gemelo.services.stack.stack import Stack
 from tests.optional import lack, need
 from tests.panel.person import Person, until
 from tests.stacks.browser import SIZE

@@ -14,19 +14,19 @@ import sys
 import tempfile
 from pathlib import Path
 
-from schemas.device import DeviceEvent
-from schemas.frames import FrameTransforms
-from schemas.topics import DEVICE_EVENTS, FRAMES, JOINT_STATES
-from services.arm.model.description import load_arm
-from services.bench.figures import quantile
-from services.bench.handshake import joins
-from services.bench.latency import follow, sharp_start
-from services.bench.stack import Running, has_mosquitto
-from services.cli.text_table import table
-from services.hosts.checks import load_site
-from services.runtime.deployment import load_deployment, project_root
-from services.runtime.node import Node
-from services.stack.stack import Stack
+from gemelo.schemas.device import DeviceEvent
+from gemelo.schemas.frames import FrameTransforms
+from gemelo.schemas.topics import DEVICE_EVENTS, FRAMES, JOINT_STATES
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.bench.figures import quantile
+from gemelo.services.bench.handshake import joins
+from gemelo.services.bench.latency import follow, sharp_start
+from gemelo.services.bench.stack import Running, has_mosquitto
+from gemelo.services.cli.text_table import table
+from gemelo.services.hosts.checks import load_site
+from gemelo.services.runtime.deployment import load_deployment, project_root
+from gemelo.services.runtime.node import Node
+from gemelo.services.stack.stack import Stack
 from tests.stack.links import SITE
 from tests.stack.namespaces import Hosts, Lab
 

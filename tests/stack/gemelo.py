@@ -5,11 +5,11 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from services.cli.errors import ExitCode
-from services.stack.stack import Stack
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.stack.stack import Stack
 
 LONGEST = 120.0  # [s] of one command
-COMMAND = (sys.executable, "-m", "services.cli.main")
+COMMAND = (sys.executable, "-m", "gemelo.services.cli.main")
 
 
 def gemelo(stack: Stack, *words: str, code: ExitCode = ExitCode.OK) -> str:

@@ -19,14 +19,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
-from firmware.platform.host.slot_record import ROW, VARIABLE
-from services.arm.device.device_config import device_config
-from services.arm.model.description import load_arm
-from services.chaos.slots import SlotFile, steps_in, violations
-from services.cli.text_table import table
-from services.hosts.checks import load_site
-from services.hosts.layout import processes
-from services.runtime.deployment import project_root
+from gemelo.firmware.platform.host.slot_record import ROW, VARIABLE
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.chaos.slots import SlotFile, steps_in, violations
+from gemelo.services.cli.text_table import table
+from gemelo.services.hosts.checks import load_site
+from gemelo.services.hosts.layout import processes
+from gemelo.services.runtime.deployment import project_root
 from tests.stack.ethernet import Ethernet
 from tests.stack.link_cases import CASES, FINISHED, HELD, Case, expected, told_within
 from tests.stack.namespaces import Hosts, Lab

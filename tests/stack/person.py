@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from itertools import pairwise
 
-from schemas.device import DeviceCommandRequest, DeviceMode, DeviceStopRequest, ReferenceCommand, StopKind
-from schemas.joints import JointState
-from schemas.motion import FollowJointTrajectoryGoal
-from schemas.planning import JointGoal, PlanCode, PlanRequest
-from schemas.topics import (
+from gemelo.schemas.device import DeviceCommandRequest, DeviceMode, DeviceStopRequest, ReferenceCommand, StopKind
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest
+from gemelo.schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_SHAFT,
     DEVICE_STATE,
@@ -18,11 +18,11 @@ from schemas.topics import (
     JOINT_STATES,
     PLAN,
 )
-from services.arm.model.description import load_arm
-from services.runtime.deployment import load_deployment, project_root
-from services.runtime.errors import GoalRefused, NoAnswer, RequestRefused
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.runtime.deployment import load_deployment, project_root
+from gemelo.services.runtime.errors import GoalRefused, NoAnswer, RequestRefused
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
 
 HERE_OR_THERE = (0.45, -0.35)  # of the way from a joint's middle to its limits: two poses to go between
 SETTLE = 10.0  # [s] for a stack to accept a goal again

@@ -9,14 +9,14 @@ import msgspec
 import paho.mqtt.client as paho
 import pytest
 
-from schemas.actions import GoalStatusCode
-from schemas.deployment import RouterSection
-from schemas.device import DeviceState, DeviceStatus
-from schemas.message import encode
-from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from schemas.planning import JointGoal, PlanCode, PlanRequest
-from schemas.system import Failure, NodeStatistics
-from schemas.topics import (
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.deployment import RouterSection
+from gemelo.schemas.device import DeviceState, DeviceStatus
+from gemelo.schemas.message import encode
+from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest
+from gemelo.schemas.system import Failure, NodeStatistics
+from gemelo.schemas.topics import (
     ACTIONS,
     DEVICE_STATUS,
     JOINT_STATES,
@@ -27,11 +27,17 @@ from schemas.topics import (
     TOPICS,
     Delivery,
 )
-from services.runtime.actions.keys import cancel_request, feedback_topic, goal_request, result_request, status_topic
-from services.runtime.bus.zenoh_bus import ZenohBus
-from services.runtime.errors import GoalRefused
-from services.stepper_gateway.links.frames import Chunk, ChunkFlag, CommandFrame, Heartbeat
-from services.stepper_gateway.links.frames import encode as to_frame
+from gemelo.services.runtime.actions.keys import (
+    cancel_request,
+    feedback_topic,
+    goal_request,
+    result_request,
+    status_topic,
+)
+from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.services.runtime.errors import GoalRefused
+from gemelo.services.stepper_gateway.links.frames import Chunk, ChunkFlag, CommandFrame, Heartbeat
+from gemelo.services.stepper_gateway.links.frames import encode as to_frame
 from tests.schemas.samples import sample
 from tests.schemas.strays import strays_for
 from tests.stack.person import Operator

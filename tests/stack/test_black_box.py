@@ -12,9 +12,9 @@ from pathlib import Path
 
 from mcap.reader import make_reader
 
-from schemas.topics import STATISTICS
-from services.cli.errors import ExitCode
-from services.visualizer.program.rerun_program import rerun_binary
+from gemelo.schemas.topics import STATISTICS
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.visualizer.program.rerun_program import rerun_binary
 from tests.runtime.support import until
 from tests.stack.gemelo import gemelo
 

@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 
 import pytest
 
-from schemas.actions import GoalStatusCode
+from gemelo.schemas.actions import GoalStatusCode
 from tests.real_time import may_run_in_real_time
 from tests.stack.person import Operator, jumps
 

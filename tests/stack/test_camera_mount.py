@@ -7,19 +7,19 @@ import re
 import numpy as np
 import pytest
 
-from services.arm.cell.camera_file import CAMERA_FILE, MOUNT_BOARD, load_measured
-from services.arm.cell.camera_model import exact_info
-from services.arm.cell.cell_file import load_cell
-from services.arm.frames.transforms import to_message
-from services.arm.model.description import load_arm
-from services.bench.vision.mount_images import FIRST
-from services.bench.vision.mounting import tool_error
-from services.cli.errors import ExitCode
-from services.runtime.deployment import project_root
-from services.stack.stack import Stack
-from services.vision.boards import TagBoard
-from services.vision.calibration.reprojection import Carrier
-from services.vision.rigid import from_transform
+from gemelo.services.arm.cell.camera_file import CAMERA_FILE, MOUNT_BOARD, load_measured
+from gemelo.services.arm.cell.camera_model import exact_info
+from gemelo.services.arm.cell.cell_file import load_cell
+from gemelo.services.arm.frames.transforms import to_message
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.bench.vision.mount_images import FIRST
+from gemelo.services.bench.vision.mounting import tool_error
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.stack.stack import Stack
+from gemelo.services.vision.boards import TagBoard
+from gemelo.services.vision.calibration.reprojection import Carrier
+from gemelo.services.vision.rigid import from_transform
 from tests.stack.gemelo import gemelo
 
 ENOUGH = 1.5  # [mm] with 8 poses, of which some see nothing; with 15 `mount_images_mm` of the bench asks for 0.5

@@ -19,7 +19,7 @@ SEED = 1
 
 def reported(tmp_path, pytestconfig, *options, minutes, ends):
     """The report of a run of chaos that exits with 0 within `ends` [s]."""
-    command = [sys.executable, "-m", "services.chaos", *options, "--seed", str(SEED), "--minutes", str(minutes)]
+    command = [sys.executable, "-m", "gemelo.services.chaos", *options, "--seed", str(SEED), "--minutes", str(minutes)]
     done = subprocess.run(
         [*command, "--out", str(tmp_path / "out")],
         cwd=pytestconfig.rootpath, capture_output=True, text=True, timeout=ends,
@@ -30,7 +30,7 @@ def reported(tmp_path, pytestconfig, *options, minutes, ends):
 
 def test_a_minute_of_chaos_violates_nothing(tmp_path, pytestconfig):
     need("mosquitto")
-    command = [sys.executable, "-m", "services.cli.main", "chaos", "--minutes", "1", "--seed", str(SEED)]
+    command = [sys.executable, "-m", "gemelo.services.cli.main", "chaos", "--minutes", "1", "--seed", str(SEED)]
     done = subprocess.run(
         [*command, "--out", str(tmp_path / "out")],
         cwd=pytestconfig.rootpath, capture_output=True, text=True, timeout=240.0,
@@ -54,9 +54,9 @@ def test_the_clocks_of_the_host_and_of_single_processes_step_in_the_middle_of_mo
 @pytest.mark.parametrize(
     "command",
     [
-        ("services.chaos.soak", "--broker", "embedded", "--out"),
-        ("services.bench", "--only", "move_accept_to_first_step_ms", "--out"),
-        ("services.demo", "--broker", "embedded", "--no-picture", "--out"),
+        ("gemelo.services.chaos.soak", "--broker", "embedded", "--out"),
+        ("gemelo.services.bench", "--only", "move_accept_to_first_step_ms", "--out"),
+        ("gemelo.services.demo", "--broker", "embedded", "--no-picture", "--out"),
     ],
     ids=lambda command: command[0],
 )

@@ -9,12 +9,12 @@ import re
 import pytest
 
 import gemelo as api
-from schemas.topics import camera_truth
-from services.bench.vision.picks import FLOOR, PROCESSES
-from services.chaos.clocks import shifted
-from services.recordings.mcap_file import CLOCKS
-from services.recordings.reader import RecordingReader
-from services.stack.stack import Stack
+from gemelo.schemas.topics import camera_truth
+from gemelo.services.bench.vision.picks import FLOOR, PROCESSES
+from gemelo.services.chaos.clocks import shifted
+from gemelo.services.recordings.mcap_file import CLOCKS
+from gemelo.services.recordings.reader import RecordingReader
+from gemelo.services.stack.stack import Stack
 from tests.stack.gemelo import gemelo
 
 AHEAD = {

@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from schemas.control import ControlState
-from schemas.joints import JointState
-from services.stack.stack import Stack
-from services.stepper_gateway.parameters import GatewayParameters
+from gemelo.schemas.control import ControlState
+from gemelo.schemas.joints import JointState
+from gemelo.services.stack.stack import Stack
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
 from tests.stack.person import jumps
 from tests.stack.scripts import said, script
 

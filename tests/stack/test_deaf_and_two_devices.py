@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from firmware.platform.host.flash import Flash, NetworkCredentials
-from services.runtime.process.unwritten import UnwrittenFiles
-from services.stack.stack import Stack
+from gemelo.firmware.platform.host.flash import Flash, NetworkCredentials
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.services.stack.stack import Stack
 from tests.mqtt.packet_proxy import PacketProxy
 from tests.stack.gemelo import COMMAND
 from tests.stack.person import Operator
@@ -110,7 +110,7 @@ def test_a_forgotten_second_device_is_named_and_nothing_moves_until_it_is_gone(s
     site.moves_again()
     environment = {**site.stack.environment, "GEMELO_PATHS_RUN": str(tmp_path / "run")}
     second = subprocess.Popen(
-        [sys.executable, "-m", "firmware.platform.host.main"], cwd=site.stack.root, env=environment,
+        [sys.executable, "-m", "gemelo.firmware.platform.host.main"], cwd=site.stack.root, env=environment,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     try:

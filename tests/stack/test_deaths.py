@@ -8,15 +8,15 @@ import time
 import pytest
 from msgspec.structs import replace
 
-from schemas.actions import GoalRequest, GoalStatusCode, ResultRequest
-from schemas.device import ReferenceCommand
-from schemas.message import decode
-from schemas.motion import FollowErrorCode
-from schemas.system import Exchange
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY
-from services.runtime.actions.keys import goal_request, result_request
-from services.runtime.errors import NoAnswer, ServerLost
-from services.runtime.requests.exchanges import exchange_topic
+from gemelo.schemas.actions import GoalRequest, GoalStatusCode, ResultRequest
+from gemelo.schemas.device import ReferenceCommand
+from gemelo.schemas.message import decode
+from gemelo.schemas.motion import FollowErrorCode
+from gemelo.schemas.system import Exchange
+from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
+from gemelo.services.runtime.actions.keys import goal_request, result_request
+from gemelo.services.runtime.errors import NoAnswer, ServerLost
+from gemelo.services.runtime.requests.exchanges import exchange_topic
 from tests.stack.person import jumps
 
 SPEED = 0.6  # slow enough that the kill falls into the middle

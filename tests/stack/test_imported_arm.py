@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import shlex
 
-from schemas.actions import GoalStatusCode
-from schemas.motion import FollowJointTrajectoryGoal
-from schemas.planning import NamedGoal, PlanCode, PlanRequest
-from schemas.topics import PLAN
-from services.cli.errors import ExitCode
-from services.cli.main import run
-from services.stack.stack import Stack
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest
+from gemelo.schemas.topics import PLAN
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.stack.stack import Stack
 from tests.robot_import.exports import solidworks
 from tests.stack.gemelo import gemelo
 from tests.stack.person import Operator

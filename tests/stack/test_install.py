@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from services.hosts.checks import load_site
-from services.hosts.layout import processes
-from services.hosts.render import rendered
-from services.runtime.deployment import project_root
-from services.stack.stack import free_ports
+from gemelo.services.hosts.checks import load_site
+from gemelo.services.hosts.layout import processes
+from gemelo.services.hosts.render import rendered
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.stack.stack import free_ports
 from tests.optional import need
 from tests.runtime.support import until
 from tests.stack.other_host import OtherHost
@@ -56,7 +56,7 @@ class Lab:
         """`gemelo deploy` here."""
         command, *more = words
         return subprocess.run(
-            [sys.executable, "-m", "services.cli.main", "deploy", command, str(self.file), *more],
+            [sys.executable, "-m", "gemelo.services.cli.main", "deploy", command, str(self.file), *more],
             cwd=project_root(), env=os.environ | {"PATH": self.host.path, "GEMELO_PATHS_OUT": str(self.out)},
             capture_output=True, text=True, timeout=120.0, check=False,
         )  # fmt: skip

@@ -8,12 +8,12 @@ from itertools import pairwise
 
 import pytest
 
-from schemas.actions import GoalStatusCode
-from schemas.joints import JointState
-from schemas.motion import FollowJointTrajectoryGoal
-from schemas.planning import NamedGoal, PlanCode, PlanRequest
-from schemas.topics import PLAN, STEP_ERRORS
-from services.cli.errors import ExitCode
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest
+from gemelo.schemas.topics import PLAN, STEP_ERRORS
+from gemelo.services.cli.errors import ExitCode
 from tests.stack.gemelo import COMMAND, gemelo
 from tests.stack.person import jumps
 from tests.stack.typist import Typist

@@ -8,8 +8,8 @@ from pathlib import Path
 import psutil
 from mcap.reader import make_reader
 
-from services.mqtt import secure_folder
-from services.stack.stack import Stack
+from gemelo.services.mqtt import secure_folder
+from gemelo.services.stack.stack import Stack
 from tests.optional import need
 from tests.stack.gemelo import gemelo
 

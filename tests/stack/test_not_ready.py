@@ -8,7 +8,7 @@ import socket
 
 import pytest
 
-from services.stack.stack import Stack, StackError, free_ports
+from gemelo.services.stack.stack import Stack, StackError, free_ports
 from tests.runtime.support import until
 
 

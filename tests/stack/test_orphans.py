@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from services.runtime.deployment import project_root
-from services.stack.guard import Guard
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.stack.guard import Guard
 
 LAST = 40.0  # [s] that a busy machine may need to end two processes
 OWNER = """
 import sys, time
-from services.stack.stack import Stack
+from gemelo.services.stack.stack import Stack
 stack = Stack(processes=("router", "broker"))
 stack.start()
 print(stack.server.pid, *stack.pids().values(), stack.folder, flush=True)

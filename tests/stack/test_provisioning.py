@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from services.cli.errors import ExitCode
-from services.stack.stack import Stack
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.stack.stack import Stack
 from tests.optional import need
 from tests.stack.gemelo import gemelo
 

@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 import gemelo
-from services.stack.stack import Stack
+from gemelo.services.stack.stack import Stack
 from tests.stack.gemelo import gemelo as command
 from tests.stacks.shared import SharedStacks
 

@@ -9,8 +9,8 @@ import time
 import pytest
 
 import gemelo
-from schemas.planning import JointGoal
-from services.stack.stack import Stack
+from gemelo.schemas.planning import JointGoal
+from gemelo.services.stack.stack import Stack
 from tests.planner.walled import WALLED, past_the_wall
 from tests.stack.scripts import ended, said, script
 

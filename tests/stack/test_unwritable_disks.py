@@ -8,14 +8,14 @@ from contextlib import ExitStack, contextmanager, suppress
 
 import pytest
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceStopRequest
-from schemas.topics import DEVICE_STOP
-from services.chaos.descriptors import give_descriptors, take_descriptors
-from services.chaos.small_disk import SmallDisk
-from services.cli.errors import ExitCode
-from services.runtime.errors import NoAnswer, ServerLost
-from services.stack.stack import Stack
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceStopRequest
+from gemelo.schemas.topics import DEVICE_STOP
+from gemelo.services.chaos.descriptors import give_descriptors, take_descriptors
+from gemelo.services.chaos.small_disk import SmallDisk
+from gemelo.services.cli.errors import ExitCode
+from gemelo.services.runtime.errors import NoAnswer, ServerLost
+from gemelo.services.stack.stack import Stack
 from tests.optional import need_mounts
 from tests.stack.gemelo import gemelo
 from tests.stack.person import Operator, jumps

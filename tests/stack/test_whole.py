@@ -14,9 +14,9 @@ import psutil
 import pytest
 
 import gemelo as api
-from schemas.actions import GoalStatusCode
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from services.stack.stack import PROCESSES, Stack
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from gemelo.services.stack.stack import PROCESSES, Stack
 from tests.stack.person import jumps
 from tests.stacks.shared import found_by_scripts
 

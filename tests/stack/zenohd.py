@@ -8,8 +8,8 @@ import tempfile
 from pathlib import Path
 
 import gemelo
-from services.runtime.bus.zenoh_bus import router_answers
-from services.stack.stack import PROCESSES, Stack, free_ports
+from gemelo.services.runtime.bus.zenoh_bus import router_answers
+from gemelo.services.stack.stack import PROCESSES, Stack, free_ports
 from tests.runtime.support import until, zenohd
 
 LEFT_OUT = ("router", "viewer", "panel", "camera", "detector")

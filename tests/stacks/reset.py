@@ -13,10 +13,10 @@ import psutil
 import pytest
 
 import gemelo
-from schemas import system
-from schemas.topics import DEVICE_SHAFT, camera_truth
-from services.runtime.endpoints import parameter_request, parameters_request
-from services.stack.stack import Stack
+from gemelo.schemas import system
+from gemelo.schemas.topics import DEVICE_SHAFT, camera_truth
+from gemelo.services.runtime.endpoints import parameter_request, parameters_request
+from gemelo.services.stack.stack import Stack
 from tests.simulated import put_right, where_it_stands
 
 READY = 60.0  # [s] in which a process that a test has killed is there again

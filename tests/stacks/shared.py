@@ -11,8 +11,8 @@ from typing import NamedTuple
 import pytest
 
 import gemelo
-from services.runtime.deployment import project_root
-from services.stack.stack import PROCESSES, Stack
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.stack.stack import PROCESSES, Stack
 from tests.optional import need
 from tests.stacks.reset import Reset
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.state_publisher.core import Decimator
+from gemelo.services.state_publisher.core import Decimator
 
 T0 = 1_700_000_000_000_000_000
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from schemas.joints import JointState
-from services.arm.frames.frame_buffer import FrameBuffer
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.state_publisher.core import StatePublisher
+from gemelo.schemas.joints import JointState
+from gemelo.services.arm.frames.frame_buffer import FrameBuffer
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.state_publisher.core import StatePublisher
 
 STAMP = 1_700_000_000_123_456_789
 

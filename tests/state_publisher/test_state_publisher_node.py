@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from schemas.deployment import Deployment, PathsSection
-from schemas.joints import JointState
-from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
-from services.arm.model.description import ArmDescription
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
-from services.state_publisher.main import run
+from gemelo.schemas.deployment import Deployment, PathsSection
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
+from gemelo.services.state_publisher.main import run
 
 
 @pytest.fixture

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from pathlib import Path
 
-from schemas.message import Vector
-from schemas.motion import JointTrajectory, TrajectoryPoint
-from services.arm.model.description import ArmDescription
-from services.stepper_gateway.motion.knots import Knot, Limits
-from services.stepper_gateway.motion.paths import profile
-from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
+from gemelo.services.stepper_gateway.motion.paths import profile
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -11,12 +11,12 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from schemas.deployment import Broker, Deployment, MqttSection, PathsSection, Wire
+from gemelo.schemas.deployment import Broker, Deployment, MqttSection, PathsSection, Wire
 from tests.optional import need
 from tests.stepper_gateway.harness import ROOT
 
-BROKER = "services.broker.main"
-DEVICE = "firmware.platform.host.main"
+BROKER = "gemelo.services.broker.main"
+DEVICE = "gemelo.firmware.platform.host.main"
 
 
 def free_port() -> int:

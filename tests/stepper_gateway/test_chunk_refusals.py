@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from services.stepper_gateway.links.frames import NO_JOINT, Ack, Code
-from services.stepper_gateway.motion.stream import refusal
-from services.virtual_arm.virtual_arm import rm1
+from gemelo.services.stepper_gateway.links.frames import NO_JOINT, Ack, Code
+from gemelo.services.stepper_gateway.motion.stream import refusal
+from gemelo.services.virtual_arm.virtual_arm import rm1
 
 
 def refused(code: int, joint: int = 1) -> str:

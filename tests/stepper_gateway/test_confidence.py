@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from schemas.ledger import VerifiedBy
-from services.arm.motors.torque import BEYOND, torque_share
-from services.stepper_gateway.ledger.confidence import (
+from gemelo.schemas.ledger import VerifiedBy
+from gemelo.services.arm.motors.torque import BEYOND, torque_share
+from gemelo.services.stepper_gateway.ledger.confidence import (
     AGE,
     CLEAN,
     PROOF,
@@ -21,9 +21,9 @@ from services.stepper_gateway.ledger.confidence import (
     confidence,
     strong_enough,
 )
-from services.stepper_gateway.ledger.joint_watch import WATCHED, JointSample, JointWatch
-from services.stepper_gateway.ledger.tool_error import CERTAIN, bounds, tool_shift
-from services.virtual_arm.virtual_arm import rm1
+from gemelo.services.stepper_gateway.ledger.joint_watch import WATCHED, JointSample, JointWatch
+from gemelo.services.stepper_gateway.ledger.tool_error import CERTAIN, bounds, tool_shift
+from gemelo.services.virtual_arm.virtual_arm import rm1
 
 NOW = 1_800_000_000_000_000_000  # [ns]
 SECOND = 1_000_000_000

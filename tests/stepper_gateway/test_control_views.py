@@ -6,14 +6,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from schemas.control import ControlState
-from schemas.device import DeviceMode, DeviceState
-from services.cli.state import control_text, snapshot, text_of
-from services.panel.model.availability import OF_THE_HOLDER, other_holder, reasons
-from services.panel.model.readings import Readings
-from services.panel.words.words import Words
-from services.virtual_arm.virtual_arm import rm1
-from services.visualizer.content.panel import PanelInputs, panel
+from gemelo.schemas.control import ControlState
+from gemelo.schemas.device import DeviceMode, DeviceState
+from gemelo.services.cli.state import control_text, snapshot, text_of
+from gemelo.services.panel.model.availability import OF_THE_HOLDER, other_holder, reasons
+from gemelo.services.panel.model.readings import Readings
+from gemelo.services.panel.words.words import Words
+from gemelo.services.virtual_arm.virtual_arm import rm1
+from gemelo.services.visualizer.content.panel import PanelInputs, panel
 
 HELD = ControlState(held=True, name="ana `x`", node="cli-1", host="desk", members=("cli-1",))
 IDLE = DeviceState(mode=DeviceMode.IDLE, armed=True, referenced=(True, True, True), name=rm1().joint_names)

@@ -11,10 +11,10 @@ from typing import Any
 import msgspec
 import pytest
 
-from schemas.device import DeviceCommandKind, StopKind
-from schemas.scene import PlanningScene
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import (
+from gemelo.schemas.device import DeviceCommandKind, StopKind
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.inputs import (
     BeganInput,
     CancelInput,
     CommandInput,
@@ -35,10 +35,10 @@ from services.stepper_gateway.inputs import (
     packed,
     unpacked,
 )
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.parameters import GatewayParameters
-from services.virtual_arm.gateway_driver import MotionCaller
-from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.virtual_arm.gateway_driver import MotionCaller
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.stepper_gateway.harness import move
 
 WAYS: dict[str, Any] = {  # of the core's methods: the input that stands for a call

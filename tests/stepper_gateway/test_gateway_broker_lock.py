@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from firmware.platform.host.link import COMMANDS, REPORTS
-from schemas.deployment import Broker, MqttSection
-from services.credentials.authority import Authority
-from services.mqtt import secure_folder
-from services.mqtt.access import device_access, gateway_access
-from services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind
-from services.stepper_gateway.links.mqtt import MqttLink
+from gemelo.firmware.platform.host.link import COMMANDS, REPORTS
+from gemelo.schemas.deployment import Broker, MqttSection
+from gemelo.services.credentials.authority import Authority
+from gemelo.services.mqtt import secure_folder
+from gemelo.services.mqtt.access import device_access, gateway_access
+from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind
+from gemelo.services.stepper_gateway.links.mqtt import MqttLink
 from tests.stepper_gateway.locked import Mosquitto, external, locked, published, reason_of, renew, secret, wait_for
 from tests.stepper_gateway.processes import free_port
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.stepper_gateway.device.clock import ClockSync
+from gemelo.services.stepper_gateway.device.clock import ClockSync
 
 OFFSET = 7_000_000.0  # [us]
 

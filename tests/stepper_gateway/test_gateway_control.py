@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.actions import GoalStatusCode
-from schemas.control import ControlGive, ControlJoin, ControlState, ControlTake
-from schemas.device import (
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.control import ControlGive, ControlJoin, ControlState, ControlTake
+from gemelo.schemas.device import (
     ArmCommand,
     DeviceMode,
     HomeCommand,
@@ -21,13 +21,13 @@ from schemas.device import (
     SpeedCommand,
     StopKind,
 )
-from schemas.joints import JointTargets
-from schemas.motion import FollowErrorCode
-from schemas.system import LogLevel
-from schemas.topics import CONTROL
-from services.stepper_gateway.control.control import MOST_MEMBERS
-from services.virtual_arm.gateway_driver import MotionCaller
-from services.virtual_arm.virtual_arm import GatewayParameters, VirtualArm
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.motion import FollowErrorCode
+from gemelo.schemas.system import LogLevel
+from gemelo.schemas.topics import CONTROL
+from gemelo.services.stepper_gateway.control.control import MOST_MEMBERS
+from gemelo.services.virtual_arm.gateway_driver import MotionCaller
+from gemelo.services.virtual_arm.virtual_arm import GatewayParameters, VirtualArm
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 

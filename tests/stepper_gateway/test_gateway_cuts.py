@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceMode, InjectKind, InjectRequest, StopKind
-from schemas.motion import FollowJointTrajectoryGoal
-from schemas.topics import DEVICE_STATUS
-from services.stepper_gateway.links.frames import Code, CommandReply, decode
-from services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind
-from services.virtual_arm.gateway_driver import asked
-from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceCommandKind, DeviceMode, InjectKind, InjectRequest, StopKind
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.topics import DEVICE_STATUS
+from gemelo.services.stepper_gateway.links.frames import Code, CommandReply, decode
+from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind
+from gemelo.services.virtual_arm.gateway_driver import asked
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 from tests.profiles import examples
 from tests.stepper_gateway.harness import move
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceMode
-from services.stepper_gateway.links.link import TO_DEVICE
-from services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceMode
+from gemelo.services.stepper_gateway.links.link import TO_DEVICE
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import move
 
 HOME, READY = (0.0, 0.0, 0.0), (0.6, -1.2, 0.08)

@@ -8,13 +8,13 @@ from contextlib import closing
 
 import pytest
 
-from firmware.bindings.library import load_library
-from schemas.deployment import MqttSection
-from services.mqtt.access import gateway_access
-from services.stepper_gateway.links.foreign.ra_link import RaLink
-from services.stepper_gateway.links.mqtt import MqttLink
-from services.stepper_gateway.links.serial import SerialLink
-from services.virtual_arm.virtual_arm import rm1
+from gemelo.firmware.bindings.library import load_library
+from gemelo.schemas.deployment import MqttSection
+from gemelo.services.mqtt.access import gateway_access
+from gemelo.services.stepper_gateway.links.foreign.ra_link import RaLink
+from gemelo.services.stepper_gateway.links.mqtt import MqttLink
+from gemelo.services.stepper_gateway.links.serial import SerialLink
+from gemelo.services.virtual_arm.virtual_arm import rm1
 from tests.descriptors import few_descriptors
 from tests.runtime.support import until
 from tests.stepper_gateway.processes import Processes

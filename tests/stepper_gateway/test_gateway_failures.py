@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceMode
-from schemas.motion import FollowErrorCode
-from schemas.topics import DEVICE_STATUS, JOINT_STATES
-from services.stepper_gateway.links.frames import Ack, CommandReply, StateFrame, SyncReply, encode
-from services.stepper_gateway.links.link import Kind
-from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceCommandKind, DeviceMode
+from gemelo.schemas.motion import FollowErrorCode
+from gemelo.schemas.topics import DEVICE_STATUS, JOINT_STATES
+from gemelo.services.stepper_gateway.links.frames import Ack, CommandReply, StateFrame, SyncReply, encode
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 

@@ -7,13 +7,13 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace
 
-from schemas.actions import GoalStatusCode
-from schemas.device import StopKind
-from schemas.message import Vector
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from schemas.scene import PlanningScene
-from schemas.topics import COMMANDS, JOINT_STATES
-from services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import StopKind
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from gemelo.schemas.scene import PlanningScene
+from gemelo.schemas.topics import COMMANDS, JOINT_STATES
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import assert_within_limits, move
 from tests.stepper_gateway.test_gateway_moves import HOME, READY, expected_steps
 

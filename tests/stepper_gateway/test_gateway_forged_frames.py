@@ -13,13 +13,13 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceMode, SpeedCommand
-from schemas.message import encode as encode_message
-from schemas.topics import JOINT_STATES
-from services.stepper_gateway.links.frames import SyncReply, decode, encode
-from services.stepper_gateway.links.link import FROM_DEVICE, Kind
-from services.virtual_arm.virtual_arm import BOOTED, GATEWAY_ZERO, VirtualArm
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceMode, SpeedCommand
+from gemelo.schemas.message import encode as encode_message
+from gemelo.schemas.topics import JOINT_STATES
+from gemelo.services.stepper_gateway.links.frames import SyncReply, decode, encode
+from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, Kind
+from gemelo.services.virtual_arm.virtual_arm import BOOTED, GATEWAY_ZERO, VirtualArm
 from tests.stepper_gateway.harness import move
 
 HOME = (0.0, 0.0, 0.0)

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.stepper_gateway.links.frames import (
+from gemelo.services.stepper_gateway.links.frames import (
     Ack,
     BadFrame,
     Chunk,
@@ -25,7 +25,7 @@ from services.stepper_gateway.links.frames import (
     decode,
     encode,
 )
-from services.stepper_gateway.links.reports import (
+from gemelo.services.stepper_gateway.links.reports import (
     ConfigAckReport,
     EventReport,
     ShaftReport,

@@ -8,8 +8,8 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from schemas.actions import GoalStatusCode
-from schemas.device import (
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import (
     DeviceCommand,
     DeviceCommandKind,
     DeviceCommandResponse,
@@ -19,13 +19,13 @@ from schemas.device import (
     OutputCommand,
     SpeedCommand,
 )
-from schemas.message import BadMessage, decode
-from schemas.topics import JOINT_STATES
-from services.arm.device.device_config import device_config
-from services.arm.model.description import load_arm
-from services.stepper_gateway.links.link import Kind
-from services.virtual_arm.gateway_driver import asked
-from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.schemas.message import BadMessage, decode
+from gemelo.schemas.topics import JOINT_STATES
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.virtual_arm.gateway_driver import asked
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import ROOT, assert_within_limits, move
 
 ARM, DISARM, HOME = DeviceCommandKind.ARM, DeviceCommandKind.DISARM, DeviceCommandKind.HOME

@@ -6,14 +6,14 @@ import math
 
 import pytest
 
-from schemas.device import DeviceMode
-from schemas.planning import JogCommand, JogStatus
-from schemas.topics import DEVICE_EVENTS, JOINT_STATES
-from services.arm.kinematics.kinematics import Kinematics
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.collision.world import World
-from services.planner.jog.jog import PERIOD, Jog
-from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.schemas.device import DeviceMode
+from gemelo.schemas.planning import JogCommand, JogStatus
+from gemelo.schemas.topics import DEVICE_EVENTS, JOINT_STATES
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.jog.jog import PERIOD, Jog
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 CALM = ("boot", "armed", "hold", "connected", "accepted", "started", "finished", "stopped")

@@ -16,8 +16,8 @@ import pytest
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
-from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
-from services.stepper_gateway.links.frames import (
+from gemelo.services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
+from gemelo.services.stepper_gateway.links.frames import (
     Ack,
     CommandFrame,
     CommandReply,
@@ -27,9 +27,9 @@ from services.stepper_gateway.links.frames import (
     decode,
     encode,
 )
-from services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind, Link, Received
-from services.stepper_gateway.links.mqtt import MqttLink
-from services.stepper_gateway.links.serial import FRAMES, TYPES, SerialLink
+from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind, Link, Received
+from gemelo.services.stepper_gateway.links.mqtt import MqttLink
+from gemelo.services.stepper_gateway.links.serial import FRAMES, TYPES, SerialLink
 from tests.stepper_gateway.processes import BROKER, Processes
 from tests.stepper_gateway.wired import plain
 

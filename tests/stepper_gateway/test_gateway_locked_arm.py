@@ -12,13 +12,13 @@ from pathlib import Path
 import psutil
 import pytest
 
-from schemas.actions import GoalStatusCode
-from schemas.deployment import Wire
-from schemas.motion import FollowErrorCode
-from services.mqtt import secure_folder
-from services.mqtt.access import BrokerAccess, gateway_access
-from services.stepper_gateway.links.link import Kind
-from services.stepper_gateway.links.mqtt import MqttLink
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.deployment import Wire
+from gemelo.schemas.motion import FollowErrorCode
+from gemelo.services.mqtt import secure_folder
+from gemelo.services.mqtt.access import BrokerAccess, gateway_access
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.stepper_gateway.links.mqtt import MqttLink
 from tests.stepper_gateway.harness import ROOT
 from tests.stepper_gateway.locked import wait_for
 from tests.stepper_gateway.processes import BROKER, DEVICE, Processes
@@ -38,7 +38,7 @@ def lock(tmp_path: Path) -> Path:
 
 
 def secured(folder: Path, *words: str, port: int = 8883) -> str:
-    command = [sys.executable, "-m", "services.cli.main", "broker", "secure", "--folder", str(folder), *words]
+    command = [sys.executable, "-m", "gemelo.services.cli.main", "broker", "secure", "--folder", str(folder), *words]
     command += ["--host", "127.0.0.1", "--device", "rm1", "--port", str(port)]
     environment = {**os.environ, "GEMELO_WIFI_PASSWORD": "correct horse"}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60)

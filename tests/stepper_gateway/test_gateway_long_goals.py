@@ -6,13 +6,13 @@ import math
 
 import pytest
 
-from schemas.device import GatewayInputs
-from schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from services.runtime.bus.wire import encoded
-from services.stepper_gateway.input_log import InputLog
-from services.stepper_gateway.inputs import BeganInput, GoalInput, unpacked
-from services.stepper_gateway.parameters import GatewayParameters
-from services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.schemas.device import GatewayInputs
+from gemelo.schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.services.runtime.bus.wire import encoded
+from gemelo.services.stepper_gateway.input_log import InputLog
+from gemelo.services.stepper_gateway.inputs import BeganInput, GoalInput, unpacked
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm
 
 
 def wave(points: int, arm: VirtualArm, with_velocities: bool) -> FollowJointTrajectoryGoal:

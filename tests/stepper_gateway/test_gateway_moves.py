@@ -5,15 +5,21 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from schemas.actions import GoalStatusCode
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
-from schemas.topics import COMMAND_ACKS, COMMANDS, JOINT_STATES, STEP_ERRORS
-from services.stepper_gateway.goals.active_goal import ActiveGoal
-from services.stepper_gateway.goals.goal_validator import GoalValidator
-from services.stepper_gateway.links.frames import StateFrame
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.parameters import GatewayParameters
-from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.motion import (
+    FollowErrorCode,
+    FollowJointTrajectoryGoal,
+    JointTolerance,
+    JointTrajectory,
+    TrajectoryPoint,
+)
+from gemelo.schemas.topics import COMMAND_ACKS, COMMANDS, JOINT_STATES, STEP_ERRORS
+from gemelo.services.stepper_gateway.goals.active_goal import ActiveGoal
+from gemelo.services.stepper_gateway.goals.goal_validator import GoalValidator
+from gemelo.services.stepper_gateway.links.frames import StateFrame
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)

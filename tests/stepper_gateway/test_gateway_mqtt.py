@@ -14,15 +14,15 @@ from paho.mqtt import publish
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
-from schemas.actions import GoalStatusCode
-from schemas.device import ArmCommand, DeviceCommandKind, DeviceStatus, ReferenceCommand, StopKind
-from schemas.device_config import config_crc, config_text
-from schemas.motion import FollowErrorCode
-from services.arm.device.device_config import device_config
-from services.stepper_gateway.links.frames import Chunk, CommandFrame, decode
-from services.stepper_gateway.links.link import Kind
-from services.stepper_gateway.links.mqtt import MqttLink
-from services.virtual_arm.virtual_arm import rm1
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import ArmCommand, DeviceCommandKind, DeviceStatus, ReferenceCommand, StopKind
+from gemelo.schemas.device_config import config_crc, config_text
+from gemelo.schemas.motion import FollowErrorCode
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.stepper_gateway.links.frames import Chunk, CommandFrame, decode
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.stepper_gateway.links.mqtt import MqttLink
+from gemelo.services.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.processes import BROKER, DEVICE, Processes, free_port
 from tests.stepper_gateway.wired import WiredGateway, plain
 

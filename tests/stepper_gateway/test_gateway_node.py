@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from schemas.actions import GoalStatusCode
-from schemas.device import (
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import (
     ConfigureRequest,
     DeviceCommandRequest,
     InjectKind,
@@ -20,11 +20,11 @@ from schemas.device import (
     ResetCommand,
     ResumeCommand,
 )
-from schemas.joints import JointState, JointTargets
-from schemas.message import encode
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from schemas.scene import PlanningScene
-from schemas.topics import (
+from gemelo.schemas.joints import JointState, JointTargets
+from gemelo.schemas.message import encode
+from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from gemelo.schemas.scene import PlanningScene
+from gemelo.schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURE,
     DEVICE_INJECT,
@@ -33,11 +33,11 @@ from schemas.topics import (
     JOINT_TARGETS,
     SCENE,
 )
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.errors import GoalRefused
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
-from services.stepper_gateway.main import run
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.errors import GoalRefused
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
+from gemelo.services.stepper_gateway.main import run
 from tests.stepper_gateway.harness import move
 from tests.stepper_gateway.processes import DEVICE, Processes
 

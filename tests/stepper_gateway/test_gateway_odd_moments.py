@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceMode, OutputCommand, ReferenceCommand
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
-from schemas.topics import DEVICE_STATE, JOINT_STATES
-from services.stepper_gateway.device.clock import ENOUGH, ClockSync
-from services.stepper_gateway.links.link import Kind
-from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceCommandKind, DeviceMode, OutputCommand, ReferenceCommand
+from gemelo.schemas.motion import (
+    FollowErrorCode,
+    FollowJointTrajectoryGoal,
+    JointTolerance,
+    JointTrajectory,
+    TrajectoryPoint,
+)
+from gemelo.schemas.topics import DEVICE_STATE, JOINT_STATES
+from gemelo.services.stepper_gateway.device.clock import ENOUGH, ClockSync
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)

@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.message import Vector
-from schemas.motion import JointTrajectory, TrajectoryPoint
-from services.arm.interpolation import TrajectorySampler
-from services.stepper_gateway.device.clock import ClockSync
-from services.stepper_gateway.goals.limit_checks import within
-from services.stepper_gateway.motion.commanded_path import CommandedPath
-from services.stepper_gateway.motion.knot_sources import PathKnots
-from services.stepper_gateway.motion.knots import Knot, Limits, StepEncoder, StepKnot, whole_steps
-from services.stepper_gateway.motion.paths import (
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
+from gemelo.services.arm.interpolation import TrajectorySampler
+from gemelo.services.stepper_gateway.device.clock import ClockSync
+from gemelo.services.stepper_gateway.goals.limit_checks import within
+from gemelo.services.stepper_gateway.motion.commanded_path import CommandedPath
+from gemelo.services.stepper_gateway.motion.knot_sources import PathKnots
+from gemelo.services.stepper_gateway.motion.knots import Knot, Limits, StepEncoder, StepKnot, whole_steps
+from gemelo.services.stepper_gateway.motion.paths import (
     JoinedPath,
     RoundedPath,
     SampledPath,
@@ -26,7 +26,7 @@ from services.stepper_gateway.motion.paths import (
     join_path,
     profile,
 )
-from services.virtual_arm.virtual_arm import rm1
+from gemelo.services.virtual_arm.virtual_arm import rm1
 from tests.profiles import examples
 from tests.stepper_gateway.harness import ROOT, move
 
@@ -159,5 +159,7 @@ def test_the_clock_trusts_the_shortest_round_trip() -> None:
 
 def test_the_gateway_needs_neither_the_planner_nor_the_viewer() -> None:
     heavy = "('pinocchio', 'pin', 'coal', 'rerun', 'yourdfpy', 'trimesh')"
-    program = f"import sys, services.stepper_gateway.main; sys.exit(bool([m for m in {heavy} if m in sys.modules]))"
+    program = (
+        f"import sys, gemelo.services.stepper_gateway.main; sys.exit(bool([m for m in {heavy} if m in sys.modules]))"
+    )
     assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from schemas.actions import GoalStatusCode
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from schemas.scene import PlanningScene
-from services.stepper_gateway.goals.goal_executor import GoalVerdict
-from services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import move
 
 HOME, THERE = (0.0, 0.0, 0.0), (0.1, -0.2, 0.01)

@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import pytest
 
-from schemas.topics import DEVICE_SHAFT, SENSORS
-from services.stepper_gateway.links.link import Kind
-from services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.schemas.topics import DEVICE_SHAFT, SENSORS
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm
 
 
 def warnings(rig: VirtualArm) -> list[str]:

@@ -8,14 +8,14 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceMode, HomeCommand, ReferenceCommand
-from schemas.joints import JointTargets
-from schemas.message import Vector
-from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from schemas.topics import JOINT_STATES
-from services.virtual_arm.gateway_driver import asked
-from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceCommandKind, DeviceMode, HomeCommand, ReferenceCommand
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.schemas.topics import JOINT_STATES
+from gemelo.services.virtual_arm.gateway_driver import asked
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 

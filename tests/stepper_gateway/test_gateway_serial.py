@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from schemas.actions import GoalStatusCode
-from schemas.deployment import Deployment, DeviceKind, SerialSection, Wire
-from schemas.device import DeviceMode, InjectKind, InjectRequest
-from services.stepper_gateway.main import open_link, serial_device
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.deployment import Deployment, DeviceKind, SerialSection, Wire
+from gemelo.schemas.device import DeviceMode, InjectKind, InjectRequest
+from gemelo.services.stepper_gateway.main import open_link, serial_device
 from tests.stepper_gateway.processes import DEVICE, Processes
 from tests.stepper_gateway.wired import WiredGateway
 

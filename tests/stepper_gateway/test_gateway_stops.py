@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceMode, InjectKind, InjectRequest, SpeedCommand, StopKind
-from services.stepper_gateway.device.clock import ClockSync
-from services.stepper_gateway.device.pending_commands import MOST_TICKETS, MOST_UNDER_WAY, PendingCommands
-from services.stepper_gateway.links.frames import CommandFrame, decode
-from services.stepper_gateway.links.link import Kind
-from services.stepper_gateway.moment import Moment
-from services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceCommandKind, DeviceMode, InjectKind, InjectRequest, SpeedCommand, StopKind
+from gemelo.services.stepper_gateway.device.clock import ClockSync
+from gemelo.services.stepper_gateway.device.pending_commands import MOST_TICKETS, MOST_UNDER_WAY, PendingCommands
+from gemelo.services.stepper_gateway.links.frames import CommandFrame, decode
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 ZERO = (0.0, 0.0, 0.0)

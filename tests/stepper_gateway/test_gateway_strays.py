@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from firmware.bindings.device import CoreDevice
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceMode
-from schemas.topics import JOINT_STATES
-from services.arm.device.device_config import device_config
-from services.runtime.serial_frames import packet
-from services.stepper_gateway.links.frames import (
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceCommandKind, DeviceMode
+from gemelo.schemas.topics import JOINT_STATES
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.runtime.serial_frames import packet
+from gemelo.services.stepper_gateway.links.frames import (
     Ack,
     Code,
     CommandFrame,
@@ -22,8 +22,8 @@ from services.stepper_gateway.links.frames import (
     decode,
     encode,
 )
-from services.stepper_gateway.links.link import Kind
-from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import move
 
 HOME = (0.0, 0.0, 0.0)

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceMode
-from schemas.joints import JointState
-from schemas.topics import DEVICE_EVENTS, JOINT_STATES
-from services.stepper_gateway.motion.knots import Knot, Limits
-from services.stepper_gateway.motion.target_tracker import TargetTracker
-from services.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceCommandKind, DeviceMode
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.topics import DEVICE_EVENTS, JOINT_STATES
+from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
+from gemelo.services.stepper_gateway.motion.target_tracker import TargetTracker
+from gemelo.services.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 
@@ -138,7 +138,7 @@ def test_a_target_beyond_a_limit_is_refused_by_name_and_the_one_before_stays() -
 def test_a_malformed_target_is_refused_and_nothing_moves(
     names: tuple[str, ...], positions: tuple[float, ...], said: str
 ) -> None:
-    from schemas.joints import JointTargets
+    from gemelo.schemas.joints import JointTargets
 
     rig = VirtualArm().ready()
     rig.stream(JointTargets(name=names, position=positions))
@@ -192,15 +192,15 @@ def test_whatever_the_targets_the_tracker_keeps_every_limit(
 
 
 ENDS = """
-from services.arm.model.description import load_arm
-from services.runtime.deployment import project_root
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.knots import Limits
-from services.stepper_gateway.motion.target_tracker import TargetTracker
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.motion.knots import Knot
+from gemelo.services.stepper_gateway.motion.knots import Limits
+from gemelo.services.stepper_gateway.motion.target_tracker import TargetTracker
 
 arm = load_arm(project_root() / "urdf/rm1")
 core = GatewayCore(arm, 1)

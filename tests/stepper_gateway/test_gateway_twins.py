@@ -7,12 +7,12 @@ from collections.abc import Callable
 from hypothesis import Phase, given
 from hypothesis import strategies as st
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceMode, StopKind
-from services.stepper_gateway.links.frames import Ack, Code, decode
-from services.stepper_gateway.links.link import Kind
-from services.virtual_arm.gateway_driver import GatewayDriver, Moment
-from services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceMode, StopKind
+from gemelo.services.stepper_gateway.links.frames import Ack, Code, decode
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.virtual_arm.gateway_driver import GatewayDriver, Moment
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm
 from tests.profiles import examples
 from tests.stepper_gateway.harness import move
 

@@ -9,13 +9,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from schemas.message import Vector
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
-from services.stepper_gateway.goals.goal_validator import GoalValidator, MotionStart
-from services.stepper_gateway.goals.rejections import GoalRejected
-from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.parameters import GatewayParameters
-from services.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import (
+    FollowErrorCode,
+    FollowJointTrajectoryGoal,
+    JointTolerance,
+    JointTrajectory,
+    TrajectoryPoint,
+)
+from gemelo.services.stepper_gateway.goals.goal_validator import GoalValidator, MotionStart
+from gemelo.services.stepper_gateway.goals.rejections import GoalRejected
+from gemelo.services.stepper_gateway.motion.knots import Knot
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 from tests.table import table

@@ -14,22 +14,22 @@ from pathlib import Path
 
 import pytest
 
-from schemas.deployment import Deployment, PathsSection
-from schemas.device import DeviceStopRequest, StopKind
-from schemas.topics import DEVICE_STOP
-from services.arm.model.description import load_arm
-from services.runtime.bus.identity import identify
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.bus.name_holder import AGAIN, STOPPED
-from services.runtime.errors import NodeNameTaken
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import BeganInput
-from services.stepper_gateway.ledger.ledger_file import LedgerFile
-from services.stepper_gateway.links.link import Kind, Received
-from services.stepper_gateway.parameters import GatewayParameters
-from services.stepper_gateway.shell import Shell
+from gemelo.schemas.deployment import Deployment, PathsSection
+from gemelo.schemas.device import DeviceStopRequest, StopKind
+from gemelo.schemas.topics import DEVICE_STOP
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.runtime.bus.identity import identify
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.bus.name_holder import AGAIN, STOPPED
+from gemelo.services.runtime.errors import NodeNameTaken
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.inputs import BeganInput
+from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile
+from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.stepper_gateway.shell import Shell
 from tests.runtime.support import ROOT, spinning, until
 
 STAND = 1.5 * STOPPED  # [s]

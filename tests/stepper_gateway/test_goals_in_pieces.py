@@ -11,11 +11,11 @@ from types import FrameType
 import pytest
 from msgspec.structs import replace
 
-from schemas.message import BadMessage, encode
-from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from services.stepper_gateway.goals.goal_reading import read_goal
-from services.stepper_gateway.goals.pieces import PIECE, Pieces
-from services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.schemas.message import BadMessage, encode
+from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.services.stepper_gateway.goals.goal_reading import read_goal
+from gemelo.services.stepper_gateway.goals.pieces import PIECE, Pieces
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.test_gateway_long_goals import wave
 
 POINTS = 20_000

@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.bindings.injection import InjectRefused, inject
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, InjectKind, InjectRequest, OutputCommand, StopKind
-from schemas.gripper import GripperCommandGoal, GripperState
-from schemas.robot import ServoGripper
-from schemas.topics import GRIPPER_STATE
-from services.arm.model.description import ArmDescription, load_arm
-from services.arm.model.gripper import opening_of, pulse_of
-from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.firmware.bindings.injection import InjectRefused, inject
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceCommandKind, InjectKind, InjectRequest, OutputCommand, StopKind
+from gemelo.schemas.gripper import GripperCommandGoal, GripperState
+from gemelo.schemas.robot import ServoGripper
+from gemelo.schemas.topics import GRIPPER_STATE
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.arm.model.gripper import opening_of, pulse_of
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.profiles import examples
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -6,14 +6,22 @@ import zlib
 
 import pytest
 
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.input_log import HELD_BACK, PERIOD, InputLog
-from services.stepper_gateway.inputs import BeganInput, LinkInput, SceneInput, StepInput, digest_of, give, unpacked
-from services.stepper_gateway.links.link import Kind
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import SendFrame
-from services.stepper_gateway.parameters import GatewayParameters
-from services.virtual_arm.virtual_arm import rm1
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.input_log import HELD_BACK, PERIOD, InputLog
+from gemelo.services.stepper_gateway.inputs import (
+    BeganInput,
+    LinkInput,
+    SceneInput,
+    StepInput,
+    digest_of,
+    give,
+    unpacked,
+)
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.outputs import SendFrame
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.virtual_arm.virtual_arm import rm1
 
 BEGAN = BeganInput(7, GatewayParameters())
 

@@ -8,11 +8,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from schemas.device import EchoResponse
-from services.cli.link_bench import plot, result_of, text_of, write_csv
-from services.virtual_arm.gateway_driver import GatewayDriver
-from services.virtual_arm.sketch_arm import SketchArm
-from services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
+from gemelo.schemas.device import EchoResponse
+from gemelo.services.cli.link_bench import plot, result_of, text_of, write_csv
+from gemelo.services.virtual_arm.gateway_driver import GatewayDriver
+from gemelo.services.virtual_arm.sketch_arm import SketchArm
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 
 
 def echo(arm: GatewayDriver, ticket: int = 1) -> EchoResponse:

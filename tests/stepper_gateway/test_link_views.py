@@ -6,14 +6,14 @@ from typing import Any
 
 import pytest
 
-from schemas.device import DeviceState, DeviceStatus
-from schemas.scene import PlanningScene
-from schemas.topics import DEVICE_STATE, DEVICE_STATUS
-from services.cli import device_status, doctor, state
-from services.cli.device_snapshot import device_snapshot
-from services.stepper_gateway.links.link import Kind
-from services.virtual_arm.virtual_arm import VirtualArm, rm1
-from services.visualizer.content.panel import PanelInputs, panel
+from gemelo.schemas.device import DeviceState, DeviceStatus
+from gemelo.schemas.scene import PlanningScene
+from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS
+from gemelo.services.cli import device_status, doctor, state
+from gemelo.services.cli.device_snapshot import device_snapshot
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.services.visualizer.content.panel import PanelInputs, panel
 from tests.stepper_gateway.test_gateway_twins import Twins
 from tests.stepper_gateway.test_gateway_two_devices import TwoDevices
 

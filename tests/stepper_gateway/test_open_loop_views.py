@@ -6,14 +6,14 @@ from typing import Any
 
 import pytest
 
-from schemas.actions import GoalStatusCode
-from schemas.motion import FollowJointTrajectoryResult
-from services.cli import device_status
-from services.cli.move_report import MoveReport, summary
-from services.cli.state import snapshot, text_of
-from services.panel.words.words import Words
-from services.virtual_arm.sketch_arm import SketchArm
-from services.visualizer.content.panel import PanelInputs, panel
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.motion import FollowJointTrajectoryResult
+from gemelo.services.cli import device_status
+from gemelo.services.cli.move_report import MoveReport, summary
+from gemelo.services.cli.state import snapshot, text_of
+from gemelo.services.panel.words.words import Words
+from gemelo.services.virtual_arm.sketch_arm import SketchArm
+from gemelo.services.visualizer.content.panel import PanelInputs, panel
 from tests.stepper_gateway.harness import move
 from tests.stepper_gateway.test_ra_sketch import HOME
 

@@ -9,26 +9,33 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from schemas.actions import GoalRequest, ResultRequest, ResultResponse
-from schemas.deployment import Deployment, PathsSection
-from schemas.device import DeviceCommandRequest, DeviceStopRequest, SpeedCommand, StopKind
-from schemas.gripper import GripperCommandGoal
-from schemas.message import Message, decode, encode
-from schemas.motion import FollowJointTrajectoryGoal
-from schemas.system import Empty, Failure
-from schemas.topics import ACTIONS, DEVICE_COMMAND, DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, GATEWAY, GRIPPER_COMMAND
-from services.arm.model.description import load_arm
-from services.runtime.actions.keys import goal_request, result_request
-from services.runtime.bus.interface import BusReply
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.endpoints import info_request
-from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
-from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.inputs import BeganInput
-from services.stepper_gateway.ledger.ledger_file import LedgerFile
-from services.stepper_gateway.parameters import GatewayParameters
-from services.stepper_gateway.shell import Shell
+from gemelo.schemas.actions import GoalRequest, ResultRequest, ResultResponse
+from gemelo.schemas.deployment import Deployment, PathsSection
+from gemelo.schemas.device import DeviceCommandRequest, DeviceStopRequest, SpeedCommand, StopKind
+from gemelo.schemas.gripper import GripperCommandGoal
+from gemelo.schemas.message import Message, decode, encode
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.system import Empty, Failure
+from gemelo.schemas.topics import (
+    ACTIONS,
+    DEVICE_COMMAND,
+    DEVICE_STOP,
+    FOLLOW_JOINT_TRAJECTORY,
+    GATEWAY,
+    GRIPPER_COMMAND,
+)
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.runtime.actions.keys import goal_request, result_request
+from gemelo.services.runtime.bus.interface import BusReply
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.endpoints import info_request
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
+from gemelo.services.stepper_gateway.core import GatewayCore
+from gemelo.services.stepper_gateway.inputs import BeganInput
+from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.services.stepper_gateway.shell import Shell
 from tests.runtime.support import ROOT, spinning, until
 
 MOVING = (

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind
-from services.arm.errors import DescriptionError
-from services.arm.model.description import load_arm
-from services.stepper_gateway.main import open_device
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceCommandKind
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.stepper_gateway.main import open_device
 from tests.stepper_gateway.dialects import robot_with
 from tests.stepper_gateway.processes import DEVICE, Processes
 from tests.stepper_gateway.wired import WiredGateway

@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware.platform.host.sketch import AustinStepper, HostSketch
-from schemas.robot import Sketch as SketchTable
-from services.arm.errors import DescriptionError
-from services.arm.model.description import load_arm
-from services.arm.motors.relative_moves import Ramp, ramp_of
-from services.stepper_gateway.links.foreign.ra_messages import (
+from gemelo.firmware.platform.host.sketch import AustinStepper, HostSketch
+from gemelo.schemas.robot import Sketch as SketchTable
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.arm.motors.relative_moves import Ramp, ramp_of
+from gemelo.services.stepper_gateway.links.foreign.ra_messages import (
     BadRaMessage,
     degrees,
     joints_message,
@@ -25,8 +25,8 @@ from services.stepper_gateway.links.foreign.ra_messages import (
     read_sensors,
     read_states,
 )
-from services.stepper_gateway.links.foreign.ra_sender import RaSender
-from services.virtual_arm.sketch_arm import ra_arm
+from gemelo.services.stepper_gateway.links.foreign.ra_sender import RaSender
+from gemelo.services.virtual_arm.sketch_arm import ra_arm
 from tests.stepper_gateway.harness import ROOT
 
 RAMPS = tuple(ramp_of(joint.drive) for joint in ra_arm().joints)

@@ -9,19 +9,19 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from schemas.device import DeviceCommandKind, DeviceMode
-from schemas.ledger import StepLedger, VerifiedBy
-from schemas.topics import STEP_LEDGER
-from services.arm.model.description import load_arm
-from services.bench.stopping import smooth_move
-from services.runtime.process.unwritten import UnwrittenFiles
-from services.stepper_gateway.ledger.confidence import REBOOT
-from services.stepper_gateway.ledger.ledger_file import LedgerFile, read_ledger, write_ledger
-from services.stepper_gateway.ledger.record import LedgerRecord
-from services.stepper_gateway.ledger.step_ledger import KEEP_EVERY, KEEP_SOON
-from services.stepper_gateway.links.link import Kind
-from services.virtual_arm.sketch_arm import SketchArm
-from services.virtual_arm.virtual_arm import BOOTED, VirtualArm, rm1
+from gemelo.schemas.device import DeviceCommandKind, DeviceMode
+from gemelo.schemas.ledger import StepLedger, VerifiedBy
+from gemelo.schemas.topics import STEP_LEDGER
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.bench.stopping import smooth_move
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.services.stepper_gateway.ledger.confidence import REBOOT
+from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile, read_ledger, write_ledger
+from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.stepper_gateway.ledger.step_ledger import KEEP_EVERY, KEEP_SOON
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.virtual_arm.sketch_arm import SketchArm
+from gemelo.services.virtual_arm.virtual_arm import BOOTED, VirtualArm, rm1
 from tests.runtime.support import until
 from tests.stepper_gateway.harness import ROOT, move
 from tests.stepper_gateway.test_ra_sketch import HOME as AT_HOME

@@ -14,16 +14,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.actions import GoalStatusCode
-from schemas.deployment import Deployment, SerialSection
-from schemas.device import DeviceCommandKind
-from schemas.robot import Dialect
-from services.arm.model.description import ArmDescription, heard_by_the_board, load_arm
-from services.stepper_gateway.links.foreign.text_exchange import RETRIES, TextExchange
-from services.stepper_gateway.links.foreign.text_link import TextLink
-from services.stepper_gateway.links.foreign.text_messages import AnswerReader, LineAnswer, line_of, read_answer
-from services.stepper_gateway.main import baud_of, open_device
-from services.virtual_arm.virtual_arm import rm1
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.deployment import Deployment, SerialSection
+from gemelo.schemas.device import DeviceCommandKind
+from gemelo.schemas.robot import Dialect
+from gemelo.services.arm.model.description import ArmDescription, heard_by_the_board, load_arm
+from gemelo.services.stepper_gateway.links.foreign.text_exchange import RETRIES, TextExchange
+from gemelo.services.stepper_gateway.links.foreign.text_link import TextLink
+from gemelo.services.stepper_gateway.links.foreign.text_messages import AnswerReader, LineAnswer, line_of, read_answer
+from gemelo.services.stepper_gateway.main import baud_of, open_device
+from gemelo.services.virtual_arm.virtual_arm import rm1
 from tests.profiles import examples
 from tests.stepper_gateway.dialects import robot_with
 from tests.stepper_gateway.processes import DEVICE, Processes

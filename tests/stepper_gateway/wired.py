@@ -8,13 +8,13 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from schemas.device import InjectRequest, InjectResponse
-from services.arm.model.description import ArmDescription
-from services.mqtt.access import BrokerAccess
-from services.stepper_gateway.links.link import Link
-from services.stepper_gateway.links.mqtt import MqttLink
-from services.virtual_arm.gateway_driver import GatewayDriver, Kind, Moment
-from services.virtual_arm.virtual_arm import rm1
+from gemelo.schemas.device import InjectRequest, InjectResponse
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.mqtt.access import BrokerAccess
+from gemelo.services.stepper_gateway.links.link import Link
+from gemelo.services.stepper_gateway.links.mqtt import MqttLink
+from gemelo.services.virtual_arm.gateway_driver import GatewayDriver, Kind, Moment
+from gemelo.services.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.harness import move
 
 

@@ -15,11 +15,11 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.arm.checks.check import check
-from services.arm.kinematics.chain import link_transforms
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import load_arm
-from services.arm.motors.speed import speed_limits
+from gemelo.services.arm.checks.check import check
+from gemelo.services.arm.kinematics.chain import link_transforms
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.arm.motors.speed import speed_limits
 from tests.profiles import examples
 from tests.urdf.nearness import nearest_distances
 

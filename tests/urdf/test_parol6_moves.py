@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.joints import JointState
-from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
-from services.arm.model.description import Joint, load_arm
-from services.planner.core import Planner
-from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.targets import ToolTarget
-from services.planner.request.deadline import NEVER
-from services.planner.timing.profile import joint_limits
-from services.planner.verification.verify import require_within_limits, sample
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
+from gemelo.services.arm.model.description import Joint, load_arm
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.kinematics.ik import InverseKinematics
+from gemelo.services.planner.kinematics.targets import ToolTarget
+from gemelo.services.planner.request.deadline import NEVER
+from gemelo.services.planner.timing.profile import joint_limits
+from gemelo.services.planner.verification.verify import require_within_limits, sample
 from tests.profiles import examples
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.collision_geometry.link_shapes import link_shapes
-from services.planner.collision_geometry.shapes import ShapeKind
-from services.planner.collision_geometry.solids import Box, Cylinder
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
+from gemelo.services.planner.collision_geometry.shapes import ShapeKind
+from gemelo.services.planner.collision_geometry.solids import Box, Cylinder
 from tests.urdf.nearness import nearest_distances
 
 SEED = {

@@ -8,15 +8,22 @@ import cv2
 import numpy as np
 import pytest
 
-from services.arm.model.description import ArmDescription, load_arm
-from services.bench.vision.mounting import MountingTrial, closed_form, level_trial, looking, six_joint_trial, tool_error
-from services.runtime.deployment import project_root
-from services.vision.boards import Sighting, TagBoard
-from services.vision.calibration.mount import fit_mount
-from services.vision.calibration.reprojection import Carrier
-from services.vision.calibration.touches import fit_touches, spread_points
-from services.vision.camera_model import of_field_of_view
-from services.vision.rigid import apply, inverse, rigid
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.bench.vision.mounting import (
+    MountingTrial,
+    closed_form,
+    level_trial,
+    looking,
+    six_joint_trial,
+    tool_error,
+)
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.vision.boards import Sighting, TagBoard
+from gemelo.services.vision.calibration.mount import fit_mount
+from gemelo.services.vision.calibration.reprojection import Carrier
+from gemelo.services.vision.calibration.touches import fit_touches, spread_points
+from gemelo.services.vision.camera_model import of_field_of_view
+from gemelo.services.vision.rigid import apply, inverse, rigid
 
 MODEL = of_field_of_view(np.radians(60.0), 640, 480)
 NINE, ONE = TagBoard(), TagBoard(columns=1, rows=1)

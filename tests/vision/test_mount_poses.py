@@ -9,9 +9,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import load_arm
-from services.bench.vision.mount_images import (
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.bench.vision.mount_images import (
     Setup,
     Sight,
     Taken,
@@ -22,17 +22,17 @@ from services.bench.vision.mount_images import (
     tag_on_level_tool,
     take,
 )
-from services.bench.vision.mounting import looking, tool_error
-from services.runtime.deployment import project_root
-from services.vision.boards import Sighting, TagBoard
-from services.vision.calibration.link_pose import LinkAt, link_pose
-from services.vision.calibration.mount import fit_mount
-from services.vision.calibration.poses import Belief, Chosen, choose_poses
-from services.vision.calibration.reprojection import BoardView, Carrier
-from services.vision.calibration.shots import one_of, without_hidden
-from services.vision.camera_model import of_field_of_view
-from services.vision.rigid import Array, from_transform, inverse, rigid, turn
-from services.vision.tag_pose import square
+from gemelo.services.bench.vision.mounting import looking, tool_error
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.vision.boards import Sighting, TagBoard
+from gemelo.services.vision.calibration.link_pose import LinkAt, link_pose
+from gemelo.services.vision.calibration.mount import fit_mount
+from gemelo.services.vision.calibration.poses import Belief, Chosen, choose_poses
+from gemelo.services.vision.calibration.reprojection import BoardView, Carrier
+from gemelo.services.vision.calibration.shots import one_of, without_hidden
+from gemelo.services.vision.camera_model import of_field_of_view
+from gemelo.services.vision.rigid import Array, from_transform, inverse, rigid, turn
+from gemelo.services.vision.tag_pose import square
 
 MODEL = of_field_of_view(np.radians(66.0), 640, 480)
 WAYS = {

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from schemas.device import DeviceEvent, DeviceMode, DeviceState, DeviceStatus, ShaftPositions
-from schemas.joints import JointState, StepErrors
-from schemas.planning import PlannedPath
-from schemas.system import LogLevel, LogRecord
-from services.visualizer.core import Visualizer
-from services.visualizer.model.urdf import parse_urdf
-from services.visualizer.render.layout import ArmLayout, blueprint
-from services.visualizer.render.sink import APPLICATION, Sink
+from gemelo.schemas.device import DeviceEvent, DeviceMode, DeviceState, DeviceStatus, ShaftPositions
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.planning import PlannedPath
+from gemelo.schemas.system import LogLevel, LogRecord
+from gemelo.services.visualizer.core import Visualizer
+from gemelo.services.visualizer.model.urdf import parse_urdf
+from gemelo.services.visualizer.render.layout import ArmLayout, blueprint
+from gemelo.services.visualizer.render.sink import APPLICATION, Sink
 
 START = 1_795_000_000_000_000_000
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.joints import JointState
-from services.arm.model.description import load_arm
-from services.runtime.deployment import project_root
-from services.visualizer.content import entities
-from services.visualizer.core import Visualizer
-from services.visualizer.model.urdf import parse_urdf
-from services.visualizer.render.arms_layout import arms_blueprint
-from services.visualizer.render.layout import ArmLayout, blueprint
-from services.visualizer.render.sink import Sink
+from gemelo.schemas.joints import JointState
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.core import Visualizer
+from gemelo.services.visualizer.model.urdf import parse_urdf
+from gemelo.services.visualizer.render.arms_layout import arms_blueprint
+from gemelo.services.visualizer.render.layout import ArmLayout, blueprint
+from gemelo.services.visualizer.render.sink import Sink
 from tests.visualizer.listener import Listener, views
 
 NAMES = ("rm1", "parol6")

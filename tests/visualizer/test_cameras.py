@@ -11,16 +11,16 @@ import pytest
 import rerun as rr
 import rerun.blueprint as rrb
 
-from schemas.camera import CameraImage, CameraInfo
-from schemas.detections import Detection, Detections
-from schemas.frames import Transform
-from services.visualizer.content import entities
-from services.visualizer.content.cameras import CameraView
-from services.visualizer.content.updates import Frustum, Labels, Outlines, PictureUpdate
-from services.visualizer.core import Visualizer
-from services.visualizer.program.rerun_program import rerun_binary
-from services.visualizer.render.layout import ArmLayout, blueprint
-from services.visualizer.render.sink import APPLICATION, Sink
+from gemelo.schemas.camera import CameraImage, CameraInfo
+from gemelo.schemas.detections import Detection, Detections
+from gemelo.schemas.frames import Transform
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.content.cameras import CameraView
+from gemelo.services.visualizer.content.updates import Frustum, Labels, Outlines, PictureUpdate
+from gemelo.services.visualizer.core import Visualizer
+from gemelo.services.visualizer.program.rerun_program import rerun_binary
+from gemelo.services.visualizer.render.layout import ArmLayout, blueprint
+from gemelo.services.visualizer.render.sink import APPLICATION, Sink
 
 NOW = 1_795_000_000_000_000_000
 TENTH = 100_000_000

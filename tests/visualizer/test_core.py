@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from schemas.device import (
+from gemelo.schemas.device import (
     DeviceEvent,
     DeviceFault,
     DeviceMode,
@@ -17,13 +17,13 @@ from schemas.device import (
     SensorReadings,
     ShaftPositions,
 )
-from schemas.joints import JointState, StepErrors
-from schemas.planning import PlannedPath
-from schemas.system import LogLevel, LogRecord
-from services.visualizer.content import entities
-from services.visualizer.content.thinning import KEEP_ALIVE, ThinnedSeries
-from services.visualizer.content.updates import LineStrip, LogLines, Poses, Scalars, StateUpdate, TextPanel, Tint
-from services.visualizer.core import AHEAD
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.planning import PlannedPath
+from gemelo.schemas.system import LogLevel, LogRecord
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.content.thinning import KEEP_ALIVE, ThinnedSeries
+from gemelo.services.visualizer.content.updates import LineStrip, LogLines, Poses, Scalars, StateUpdate, TextPanel, Tint
+from gemelo.services.visualizer.core import AHEAD
 
 START = 1_795_000_000_000_000_000
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

@@ -10,9 +10,9 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
-from services.runtime.process.own_names import own_names
-from services.runtime.process.ports import PortTaken
-from services.visualizer.program.host_check import (
+from gemelo.services.runtime.process.own_names import own_names
+from gemelo.services.runtime.process.ports import PortTaken
+from gemelo.services.visualizer.program.host_check import (
     HTTP2_PREFACE,
     MOST_CONNECTIONS,
     MOST_OF_A_HEAD,
@@ -20,7 +20,7 @@ from services.visualizer.program.host_check import (
     refusal,
     unguessable_host,
 )
-from services.visualizer.program.screenshot import free_port
+from gemelo.services.visualizer.program.screenshot import free_port
 
 LOOPBACK = "127.0.0.1"
 LARGE = bytes(range(256)) * 40_000  # 10 MB: more than any buffer on its way

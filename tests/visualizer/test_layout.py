@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 import rerun as rr
 
-from services.visualizer.content import entities
-from services.visualizer.content.updates import Tint
-from services.visualizer.model.urdf import parse_urdf
-from services.visualizer.render.layout import ArmLayout, blueprint
-from services.visualizer.render.sink import Sink
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.content.updates import Tint
+from gemelo.services.visualizer.model.urdf import parse_urdf
+from gemelo.services.visualizer.render.layout import ArmLayout, blueprint
+from gemelo.services.visualizer.render.sink import Sink
 from tests.visualizer.listener import Listener, views
 
 

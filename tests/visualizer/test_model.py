@@ -9,11 +9,11 @@ import yourdfpy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.visualizer.model.mesh_files import mesh_path, missing_meshes
-from services.visualizer.model.rotations import multiply, quaternion, rotate
-from services.visualizer.model.triangle_meshes import primitive_mesh
-from services.visualizer.model.urdf import parse_urdf, tool_link
-from services.visualizer.model.visual_model import VisualShape
+from gemelo.services.visualizer.model.mesh_files import mesh_path, missing_meshes
+from gemelo.services.visualizer.model.rotations import multiply, quaternion, rotate
+from gemelo.services.visualizer.model.triangle_meshes import primitive_mesh
+from gemelo.services.visualizer.model.urdf import parse_urdf, tool_link
+from gemelo.services.visualizer.model.visual_model import VisualShape
 
 
 def joint(parent, child, more=""):

@@ -9,17 +9,17 @@ from contextlib import contextmanager
 import pytest
 from rerun.experimental import ViewerClient
 
-from schemas.deployment import ViewerMode, ViewerSection
-from schemas.joints import JointState
-from services.runtime.process.unwritten import RETRY
-from services.visualizer.content import entities
-from services.visualizer.core import Visualizer
-from services.visualizer.program.rerun_program import environment, rerun_binary
-from services.visualizer.program.screenshot import free_port
-from services.visualizer.render.arms_layout import SharedView
-from services.visualizer.render.layout import ArmLayout
-from services.visualizer.render.outputs import Outputs, VisualizerParameters
-from services.visualizer.render.recording_file import FLUSHED
+from gemelo.schemas.deployment import ViewerMode, ViewerSection
+from gemelo.schemas.joints import JointState
+from gemelo.services.runtime.process.unwritten import RETRY
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.core import Visualizer
+from gemelo.services.visualizer.program.rerun_program import environment, rerun_binary
+from gemelo.services.visualizer.program.screenshot import free_port
+from gemelo.services.visualizer.render.arms_layout import SharedView
+from gemelo.services.visualizer.render.layout import ArmLayout
+from gemelo.services.visualizer.render.outputs import Outputs, VisualizerParameters
+from gemelo.services.visualizer.render.recording_file import FLUSHED
 from tests.optional import need
 
 START = 1_795_000_000_000_000_000

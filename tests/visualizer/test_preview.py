@@ -6,13 +6,13 @@ import math
 
 import pytest
 
-from schemas.joints import JointState
-from schemas.planning import PlannedPath
-from schemas.scene import PlanningScene, SceneObject, SphereShape
-from services.visualizer.content import entities
-from services.visualizer.content.preview import REST, TIMES, PlanPreview
-from services.visualizer.content.updates import ClearEntity, Poses, SolidMesh, TranslucentArm
-from services.visualizer.core import Visualizer
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import PlannedPath
+from gemelo.schemas.scene import PlanningScene, SceneObject, SphereShape
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.content.preview import REST, TIMES, PlanPreview
+from gemelo.services.visualizer.content.updates import ClearEntity, Poses, SolidMesh, TranslucentArm
+from gemelo.services.visualizer.core import Visualizer
 
 NOW = 1_795_000_000_000_000_000
 SECOND = 1_000_000_000

@@ -8,20 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from schemas.device import DeviceMode, DeviceState
-from schemas.joints import JointState, StepErrors
-from schemas.message import Message
-from schemas.topics import DESCRIPTION, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS, Delivery, Topic
-from services.arm.model.description import load_arm
-from services.recordings.channels import Entry
-from services.recordings.incidents import Happening, Incident, IncidentKind, incident_metadata
-from services.recordings.mcap_file import ROBOT, McapFile
-from services.recordings.reader import BadRecording
-from services.recordings.view_layout import ViewLayout, layout_metadata
-from services.state_publisher.main import describe
-from services.visualizer.content import entities
-from services.visualizer.program.rerun_program import rerun_binary
-from services.visualizer.recorded import story_text, write_view
+from gemelo.schemas.device import DeviceMode, DeviceState
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import DESCRIPTION, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS, Delivery, Topic
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.recordings.channels import Entry
+from gemelo.services.recordings.incidents import Happening, Incident, IncidentKind, incident_metadata
+from gemelo.services.recordings.mcap_file import ROBOT, McapFile
+from gemelo.services.recordings.reader import BadRecording
+from gemelo.services.recordings.view_layout import ViewLayout, layout_metadata
+from gemelo.services.state_publisher.main import describe
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.program.rerun_program import rerun_binary
+from gemelo.services.visualizer.recorded import story_text, write_view
 
 SECOND = 1_000_000_000
 START = 1_795_000_000 * SECOND

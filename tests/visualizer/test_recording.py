@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from services.visualizer.content import entities
-from services.visualizer.program.rerun_program import rerun_binary
-from services.visualizer.program.screenshot import save_screenshot
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.program.rerun_program import rerun_binary
+from gemelo.services.visualizer.program.screenshot import save_screenshot
 from tests.optional import need
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.scene import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.scene import (
     BoxShape,
     Contact,
     Contacts,
@@ -24,17 +24,17 @@ from schemas.scene import (
     Shape,
     SphereShape,
 )
-from services.arm.model.description import load_arm
-from services.arm.model.gripper import JAWS, jaw_objects
-from services.visualizer.content import entities, palette
-from services.visualizer.content.scene import SceneView
-from services.visualizer.content.updates import ClearEntity, Labels, Poses, SolidMesh, TranslucentArm
-from services.visualizer.core import Visualizer
-from services.visualizer.model.mesh_files import scene_mesh
-from services.visualizer.model.visual_model import VisualModel
-from services.visualizer.program.rerun_program import rerun_binary
-from services.visualizer.render.layout import ArmLayout, blueprint
-from services.visualizer.render.sink import APPLICATION, Sink
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.arm.model.gripper import JAWS, jaw_objects
+from gemelo.services.visualizer.content import entities, palette
+from gemelo.services.visualizer.content.scene import SceneView
+from gemelo.services.visualizer.content.updates import ClearEntity, Labels, Poses, SolidMesh, TranslucentArm
+from gemelo.services.visualizer.core import Visualizer
+from gemelo.services.visualizer.model.mesh_files import scene_mesh
+from gemelo.services.visualizer.model.visual_model import VisualModel
+from gemelo.services.visualizer.program.rerun_program import rerun_binary
+from gemelo.services.visualizer.render.layout import ArmLayout, blueprint
+from gemelo.services.visualizer.render.sink import APPLICATION, Sink
 
 NOW = 1_795_000_000_000_000_000
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

@@ -15,11 +15,11 @@ import psutil
 import pytest
 import rerun as rr
 
-from schemas.deployment import ViewerMode, ViewerSection
-from services.visualizer.program.rerun_program import environment, rerun_binary
-from services.visualizer.program.screenshot import free_port
-from services.visualizer.program.viewer_connection import ViewerConnection
-from services.visualizer.viewer import CUT_OFF, address, command, resolved
+from gemelo.schemas.deployment import ViewerMode, ViewerSection
+from gemelo.services.visualizer.program.rerun_program import environment, rerun_binary
+from gemelo.services.visualizer.program.screenshot import free_port
+from gemelo.services.visualizer.program.viewer_connection import ViewerConnection
+from gemelo.services.visualizer.viewer import CUT_OFF, address, command, resolved
 
 
 class Viewer:
@@ -36,7 +36,7 @@ class Viewer:
             "GEMELO_VIEWER_PORT": str(self.section.port), "GEMELO_VIEWER_WEB_PORT": str(self.section.web_port),
         }  # fmt: skip
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "services.visualizer.viewer"],
+            [sys.executable, "-m", "gemelo.services.visualizer.viewer"],
             env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         return self.process

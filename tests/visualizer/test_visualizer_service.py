@@ -6,15 +6,15 @@ import time
 
 import pytest
 
-from schemas.frames import RobotDescription
-from schemas.joints import JointState
-from schemas.topics import DESCRIPTION, JOINT_STATES
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.deployment import load_deployment
-from services.runtime.node import Node
-from services.visualizer.content import entities
-from services.visualizer.main import run
-from services.visualizer.program.rerun_program import rerun_binary
+from gemelo.schemas.frames import RobotDescription
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.topics import DESCRIPTION, JOINT_STATES
+from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.services.runtime.deployment import load_deployment
+from gemelo.services.runtime.node import Node
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.main import run
+from gemelo.services.visualizer.program.rerun_program import rerun_binary
 
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")
 

@@ -9,18 +9,18 @@ from pathlib import Path
 
 import msgspec
 
-from firmware.bindings.device import ConfigError, CoreDevice, joint_count
-from firmware.bindings.parsers import ProvisionRefused, asks_for_factory_reset
-from firmware.platform.host.firmware_slots import Booted, FirmwareSlots
-from firmware.platform.host.flash import Flash, NetworkCredentials
-from firmware.platform.host.memory import BootState, PositionStore, StoredPosition
-from schemas.device_config import config_text
-from schemas.robot import Motor
-from services.arm.device.device_config import device_config, reference_steps
-from services.arm.model.description import ArmDescription
-from services.arm.model.gripper import gripper_unit
-from services.runtime.clock import SYSTEM, Clock
-from services.runtime.process.unwritten import UnwrittenFiles, remedy_of
+from gemelo.firmware.bindings.device import ConfigError, CoreDevice, joint_count
+from gemelo.firmware.bindings.parsers import ProvisionRefused, asks_for_factory_reset
+from gemelo.firmware.platform.host.firmware_slots import Booted, FirmwareSlots
+from gemelo.firmware.platform.host.flash import Flash, NetworkCredentials
+from gemelo.firmware.platform.host.memory import BootState, PositionStore, StoredPosition
+from gemelo.schemas.device_config import config_text
+from gemelo.schemas.robot import Motor
+from gemelo.services.arm.device.device_config import device_config, reference_steps
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.gripper import gripper_unit
+from gemelo.services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles, remedy_of
 
 
 class DeviceClock:

@@ -18,11 +18,11 @@ from typing import NamedTuple
 
 import msgspec
 
-from firmware.bindings.firmware_slot import SlotRefused
-from firmware.bindings.library import LIBRARY, LibraryMissing, load_library
-from services.runtime.firmware_update import HEADER, NoImage, read_header
-from services.runtime.process.unwritten import Attempts, UnwrittenFiles
-from services.runtime.signatures import SignatureError, is_signed
+from gemelo.firmware.bindings.firmware_slot import SlotRefused
+from gemelo.firmware.bindings.library import LIBRARY, LibraryMissing, load_library
+from gemelo.services.runtime.firmware_update import HEADER, NoImage, read_header
+from gemelo.services.runtime.process.unwritten import Attempts, UnwrittenFiles
+from gemelo.services.runtime.signatures import SignatureError, is_signed
 
 log = logging.getLogger("virtual_esp32")
 

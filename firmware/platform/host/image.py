@@ -1,4 +1,4 @@
-"""`python -m firmware.platform.host.image FILE [LIBRARY]`: an image for virtual devices, of a built core."""
+"""`python -m gemelo.firmware.platform.host.image FILE [LIBRARY]`: an image for virtual devices, of a built core."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import re
 import sys
 from pathlib import Path
 
-from firmware.bindings.library import LIBRARY
-from services.runtime.firmware_update import VIRTUAL_CHIP, ImageHeader, build_header
+from gemelo.firmware.bindings.library import LIBRARY
+from gemelo.services.runtime.firmware_update import VIRTUAL_CHIP, ImageHeader, build_header
 
 VERSION = re.compile(r'kFirmwareVersion = "([^"]+)"')
 REPORT = Path(__file__).parents[2] / "core" / "report.h"

@@ -12,29 +12,29 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from firmware.bindings.device import ConfigError
-from firmware.bindings.library import LibraryMissing
-from firmware.bindings.motor import MotorError
-from firmware.platform.host.board import Board
-from firmware.platform.host.link import Item, ShutdownRequested
-from firmware.platform.host.network import Network
-from firmware.platform.host.pty import SerialLine
-from firmware.platform.host.slot_record import VARIABLE, SlotRecord
-from firmware.platform.host.virtual_esp32 import VirtualEsp32
-from firmware.platform.host.virtual_sketch import VirtualSketch
-from firmware.platform.host.wires import Wires
-from schemas.deployment import Deployment, DeviceKind, Wire
-from schemas.robot import Dialect
-from services.arm.errors import DescriptionError
-from services.arm.model.description import load_arm
-from services.credentials.private_files import AccessError
-from services.mqtt.access import device_access
-from services.runtime.deployment import DeploymentError, load_deployment, project_root
-from services.runtime.process.logs import LEVELS, line_logger
-from services.runtime.process.priority import step_ahead
-from services.runtime.process.readiness import Readiness
-from services.runtime.process.shutdown import ShutdownRequest, end_with_any_thread
-from services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.firmware.bindings.device import ConfigError
+from gemelo.firmware.bindings.library import LibraryMissing
+from gemelo.firmware.bindings.motor import MotorError
+from gemelo.firmware.platform.host.board import Board
+from gemelo.firmware.platform.host.link import Item, ShutdownRequested
+from gemelo.firmware.platform.host.network import Network
+from gemelo.firmware.platform.host.pty import SerialLine
+from gemelo.firmware.platform.host.slot_record import VARIABLE, SlotRecord
+from gemelo.firmware.platform.host.virtual_esp32 import VirtualEsp32
+from gemelo.firmware.platform.host.virtual_sketch import VirtualSketch
+from gemelo.firmware.platform.host.wires import Wires
+from gemelo.schemas.deployment import Deployment, DeviceKind, Wire
+from gemelo.schemas.robot import Dialect
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.credentials.private_files import AccessError
+from gemelo.services.mqtt.access import device_access
+from gemelo.services.runtime.deployment import DeploymentError, load_deployment, project_root
+from gemelo.services.runtime.process.logs import LEVELS, line_logger
+from gemelo.services.runtime.process.priority import step_ahead
+from gemelo.services.runtime.process.readiness import Readiness
+from gemelo.services.runtime.process.shutdown import ShutdownRequest, end_with_any_thread
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles
 
 NAME = "virtual_esp32"
 BEAT = 1.0  # [s] between two touches of the readiness file

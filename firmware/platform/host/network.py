@@ -10,11 +10,11 @@ import ssl
 import time
 from urllib.parse import urlsplit
 
-from firmware.bindings.device import CoreDevice
-from firmware.bindings.frames import OutFrame
-from firmware.platform.host.flash import NetworkCredentials
-from firmware.platform.host.link import REPORTS, DeviceLink, Item
-from services.mqtt.access import BrokerAccess
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.firmware.bindings.frames import OutFrame
+from gemelo.firmware.platform.host.flash import NetworkCredentials
+from gemelo.firmware.platform.host.link import REPORTS, DeviceLink, Item
+from gemelo.services.mqtt.access import BrokerAccess
 
 log = logging.getLogger("virtual_esp32")
 

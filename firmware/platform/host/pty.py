@@ -11,8 +11,8 @@ import time
 import tty
 from pathlib import Path
 
-from firmware.platform.host.link import Item, SerialBytes
-from services.runtime.process.unwritten import Attempts, UnwrittenFiles
+from gemelo.firmware.platform.host.link import Item, SerialBytes
+from gemelo.services.runtime.process.unwritten import Attempts, UnwrittenFiles
 
 MAX_READ = 4096  # [bytes] read at once
 

@@ -10,7 +10,7 @@ import os
 import struct
 from contextlib import suppress
 
-from firmware.bindings.device import CoreDevice
+from gemelo.firmware.bindings.device import CoreDevice
 
 VARIABLE = "GEMELO_SLOTS"
 SLOT = 1000  # [us]

@@ -7,12 +7,12 @@ import queue
 from collections.abc import Callable
 from functools import partial
 
-from firmware.bindings.device import CoreDevice
-from firmware.bindings.frames import PlatformRequest
-from firmware.bindings.injection import InjectRefused, inject, read_injection, within
-from firmware.bindings.parsers import ProvisionRefused
-from firmware.platform.host.board import Board, DeviceClock, provision, provision_answer
-from firmware.platform.host.link import (
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.firmware.bindings.frames import PlatformRequest
+from gemelo.firmware.bindings.injection import InjectRefused, inject, read_injection, within
+from gemelo.firmware.bindings.parsers import ProvisionRefused
+from gemelo.firmware.platform.host.board import Board, DeviceClock, provision, provision_answer
+from gemelo.firmware.platform.host.link import (
     Connected,
     Denied,
     Disconnected,
@@ -21,13 +21,13 @@ from firmware.platform.host.link import (
     SerialBytes,
     ShutdownRequested,
 )
-from firmware.platform.host.slot_record import SlotRecord
-from firmware.platform.host.wires import Wires, say_event
-from schemas.device import InjectKind, InjectRequest
-from services.runtime.clock import SYSTEM, Clock
-from services.runtime.process.readiness import Readiness
-from services.runtime.process.unwritten import remedy_of
-from services.runtime.serial_frames import JsonFrame
+from gemelo.firmware.platform.host.slot_record import SlotRecord
+from gemelo.firmware.platform.host.wires import Wires, say_event
+from gemelo.schemas.device import InjectKind, InjectRequest
+from gemelo.services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.process.readiness import Readiness
+from gemelo.services.runtime.process.unwritten import remedy_of
+from gemelo.services.runtime.serial_frames import JsonFrame
 
 log = logging.getLogger("virtual_esp32")
 

@@ -8,13 +8,13 @@ import time
 
 from paho.mqtt import client as paho
 
-from firmware.platform.host.link import Item, MqttMessage, ShutdownRequested
-from firmware.platform.host.sketch import HostSketch
-from services.arm.model.description import ArmDescription
-from services.arm.motors.relative_moves import ramp_of
-from services.mqtt.access import BrokerAccess
-from services.mqtt.client import MqttClient
-from services.runtime.process.readiness import Readiness
+from gemelo.firmware.platform.host.link import Item, MqttMessage, ShutdownRequested
+from gemelo.firmware.platform.host.sketch import HostSketch
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.motors.relative_moves import ramp_of
+from gemelo.services.mqtt.access import BrokerAccess
+from gemelo.services.mqtt.client import MqttClient
+from gemelo.services.runtime.process.readiness import Readiness
 
 log = logging.getLogger("virtual_esp32")
 

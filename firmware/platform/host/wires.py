@@ -6,11 +6,11 @@ import json
 import logging
 from typing import Protocol
 
-from firmware.bindings.device import CoreDevice
-from firmware.bindings.frames import OutFrame
-from firmware.platform.host.flash import NetworkCredentials
-from firmware.platform.host.pty import SerialLine
-from services.runtime.serial_frames import JsonFrame
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.firmware.bindings.frames import OutFrame
+from gemelo.firmware.platform.host.flash import NetworkCredentials
+from gemelo.firmware.platform.host.pty import SerialLine
+from gemelo.services.runtime.serial_frames import JsonFrame
 
 log = logging.getLogger("virtual_esp32")
 

@@ -11,7 +11,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from firmware.tests.rv32 import measure, toolchain
+from gemelo.firmware.tests.rv32 import measure, toolchain
 
 
 def main() -> int:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from firmware.tests.rv32.toolchain import PREFIX, run
+from gemelo.firmware.tests.rv32.toolchain import PREFIX, run
 
 TICK = "_ZN6gemelo7Stepper4tickERKNS_6LevelsE"
 OF_TICK = ("_ZN6gemelo7Stepper", "_ZNK6gemelo7Stepper", "_ZN6gemelo10InputWatch", "_ZNK6gemelo10InputWatch")

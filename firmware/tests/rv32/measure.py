@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import zip_longest
 from pathlib import Path
 
-from firmware.tests.rv32 import calls, toolchain
+from gemelo.firmware.tests.rv32 import calls, toolchain
 
 JOINTS = 6
 DEFAULT_JOINTS = 8  # that the core is built for unless told

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import msgspec
 
-from schemas.cell import CameraFile, MeasuredCamera
-from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.robot_file import read_robot_data, read_text, where_of
+from gemelo.schemas.cell import CameraFile, MeasuredCamera
+from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.services.arm.model.robot_file import read_robot_data, read_text, where_of
 
 CAMERA_FILE = "camera.toml"
 MOUNT_BOARD = "mount_board"  # in the planning scene: the tags on the arm, while `gemelo camera mount` shows them

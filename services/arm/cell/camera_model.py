@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from schemas.camera import CameraInfo
-from schemas.cell import CameraRecord, Point, VirtualSource
-from services.arm.cell.cell_file import Cell
-from services.arm.frames.transforms import Quaternion, Rigid, from_axis_angle, multiply, to_message
+from gemelo.schemas.camera import CameraInfo
+from gemelo.schemas.cell import CameraRecord, Point, VirtualSource
+from gemelo.services.arm.cell.cell_file import Cell
+from gemelo.services.arm.frames.transforms import Quaternion, Rigid, from_axis_angle, multiply, to_message
 
 ALONG = 0.999  # cosine from which a camera looks along the parent's z
 

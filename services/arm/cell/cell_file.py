@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import msgspec
 
-from schemas.cell import (
+from gemelo.schemas.cell import (
     CameraRecord,
     CellFile,
     CellTexts,
@@ -25,11 +25,11 @@ from schemas.cell import (
     TagThing,
     Thing,
 )
-from schemas.deployment import Deployment
-from services.arm.cell.camera_file import CAMERA_FILE, measured_of
-from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.description import ArmDescription, load_arm
-from services.arm.model.robot_file import Keys, line_of, read_robot_data, read_text, where_of
+from gemelo.schemas.deployment import Deployment
+from gemelo.services.arm.cell.camera_file import CAMERA_FILE, measured_of
+from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.arm.model.robot_file import Keys, line_of, read_robot_data, read_text, where_of
 
 TAG_COUNTS = {
     TagFamily.APRILTAG_36H11: 587,

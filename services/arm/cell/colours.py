@@ -5,7 +5,7 @@ from __future__ import annotations
 import colorsys
 from collections.abc import Sequence
 
-from schemas.cell import Colour
+from gemelo.schemas.cell import Colour
 
 Rgb = tuple[int, int, int]  # 0 to 255
 RGB: dict[Colour, Rgb] = {

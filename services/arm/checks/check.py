@@ -6,20 +6,20 @@ from pathlib import Path
 
 import msgspec
 
-from schemas.robot import RobotFile
-from services.arm.checks.cross_check import check_with_yourdfpy
-from services.arm.checks.device import check_device
-from services.arm.checks.findings import Finding, Severity, error, note, once
-from services.arm.checks.homing import check_homing
-from services.arm.checks.meshes import check_meshes, mesh_facts
-from services.arm.checks.motors import check_motors
-from services.arm.checks.pull_out import check_pull_out
-from services.arm.checks.srdf import check_srdf
-from services.arm.checks.urdf import check_urdf, fault_finding
-from services.arm.device.device_config import device_config
-from services.arm.errors import DescriptionError
-from services.arm.model.description import DEFAULT_URDF, ROBOT_FILE, load_arm
-from services.arm.model.robot_file import (
+from gemelo.schemas.robot import RobotFile
+from gemelo.services.arm.checks.cross_check import check_with_yourdfpy
+from gemelo.services.arm.checks.device import check_device
+from gemelo.services.arm.checks.findings import Finding, Severity, error, note, once
+from gemelo.services.arm.checks.homing import check_homing
+from gemelo.services.arm.checks.meshes import check_meshes, mesh_facts
+from gemelo.services.arm.checks.motors import check_motors
+from gemelo.services.arm.checks.pull_out import check_pull_out
+from gemelo.services.arm.checks.srdf import check_srdf
+from gemelo.services.arm.checks.urdf import check_urdf, fault_finding
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.description import DEFAULT_URDF, ROBOT_FILE, load_arm
+from gemelo.services.arm.model.robot_file import (
     dotted,
     line_of,
     not_finite,
@@ -29,9 +29,9 @@ from services.arm.model.robot_file import (
     unknown_keys,
     where_of,
 )
-from services.arm.model.srdf import read_srdf
-from services.arm.model.urdf import UrdfModel, survey_urdf
-from services.arm.model.virtual_drive import NO_MOTORS, TO_DRIVE, lacks_motors, with_virtual_drive
+from gemelo.services.arm.model.srdf import read_srdf
+from gemelo.services.arm.model.urdf import UrdfModel, survey_urdf
+from gemelo.services.arm.model.virtual_drive import NO_MOTORS, TO_DRIVE, lacks_motors, with_virtual_drive
 
 __all__ = ["Finding", "Severity", "check"]
 

@@ -6,9 +6,9 @@ import logging
 import math
 from pathlib import Path
 
-from services.arm.checks.findings import Finding, error, warning
-from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import ArmDescription
+from gemelo.services.arm.checks.findings import Finding, error, warning
+from gemelo.services.arm.kinematics.chain import link_transforms
+from gemelo.services.arm.model.description import ArmDescription
 
 TOLERANCE = 1e-9  # [m]
 

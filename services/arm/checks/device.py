@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-from schemas.device_config import InputRole, SensorKind
-from schemas.robot import Input, RobotFile, Sensor, ServoGripper
-from services.arm.checks.findings import Finding, error
-from services.arm.errors import suggestion
-from services.arm.model.description import ROBOT_FILE
+from gemelo.schemas.device_config import InputRole, SensorKind
+from gemelo.schemas.robot import Input, RobotFile, Sensor, ServoGripper
+from gemelo.services.arm.checks.findings import Finding, error
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.description import ROBOT_FILE
 
 RESERVED_NAMES = ("t_us", "boot_id")  # by the message that carries the readings
 

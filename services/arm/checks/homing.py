@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from schemas.device_config import InputRole
-from schemas.robot import Homing, HomingDirection, Input, RobotFile, StepperJoint
-from services.arm.checks.findings import Finding, error, warning
-from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.description import ROBOT_FILE
-from services.arm.model.urdf import JointKind, Limit, UrdfModel
-from services.arm.motors.speed import SpeedLimits, speed_limits
+from gemelo.schemas.device_config import InputRole
+from gemelo.schemas.robot import Homing, HomingDirection, Input, RobotFile, StepperJoint
+from gemelo.services.arm.checks.findings import Finding, error, warning
+from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.services.arm.model.description import ROBOT_FILE
+from gemelo.services.arm.model.urdf import JointKind, Limit, UrdfModel
+from gemelo.services.arm.motors.speed import SpeedLimits, speed_limits
 
 END_OF = {InputRole.LIMIT_LOWER: HomingDirection.LOWER, InputRole.LIMIT_UPPER: HomingDirection.UPPER}
 

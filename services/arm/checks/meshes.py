@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from services.arm.checks.findings import Finding, error, warning
-from services.arm.model.urdf import Geometry, UrdfLink, UrdfModel
+from gemelo.services.arm.checks.findings import Finding, error, warning
+from gemelo.services.arm.model.urdf import Geometry, UrdfLink, UrdfModel
 
 if TYPE_CHECKING:
     import trimesh

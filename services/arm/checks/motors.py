@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 
-from schemas.robot import Driver, RobotFile, StepperJoint, Transmission
-from services.arm.checks.findings import Finding, error, warning
-from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.description import ROBOT_FILE
-from services.arm.model.urdf import JointKind, Limit, UrdfJoint, UrdfModel
-from services.arm.motors.speed import speed_limits
-from services.arm.motors.steps import Q8, step_scale
-from services.arm.motors.tick import fastest_steps
+from gemelo.schemas.robot import Driver, RobotFile, StepperJoint, Transmission
+from gemelo.services.arm.checks.findings import Finding, error, warning
+from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.services.arm.model.description import ROBOT_FILE
+from gemelo.services.arm.model.urdf import JointKind, Limit, UrdfJoint, UrdfModel
+from gemelo.services.arm.motors.speed import speed_limits
+from gemelo.services.arm.motors.steps import Q8, step_scale
+from gemelo.services.arm.motors.tick import fastest_steps
 
 WIRE_RANGE = 2**31 / Q8  # [steps] that fit the wire's Q24.8
 COARSE = 0.02  # [rad] a step beyond which a joint is said to be coarse

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from schemas.robot import PullOut, RobotFile, StepperJoint
-from services.arm.checks.findings import Finding, error, warning
-from services.arm.errors import DescriptionError
-from services.arm.model.description import ROBOT_FILE
-from services.arm.motors.speed import speed_limits
-from services.arm.motors.torque import torque_at
+from gemelo.schemas.robot import PullOut, RobotFile, StepperJoint
+from gemelo.services.arm.checks.findings import Finding, error, warning
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.description import ROBOT_FILE
+from gemelo.services.arm.motors.speed import speed_limits
+from gemelo.services.arm.motors.torque import torque_at
 
 
 def check_pull_out(robot: RobotFile) -> list[Finding]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from schemas.robot import RobotFile
-from services.arm.checks.findings import Finding, error, warning
-from services.arm.errors import suggestion
-from services.arm.model.srdf import Group, NamedState, SrdfModel
-from services.arm.model.urdf import UrdfModel
+from gemelo.schemas.robot import RobotFile
+from gemelo.services.arm.checks.findings import Finding, error, warning
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.srdf import Group, NamedState, SrdfModel
+from gemelo.services.arm.model.urdf import UrdfModel
 
 
 def check_srdf(srdf: SrdfModel, robot: RobotFile, model: UrdfModel) -> list[Finding]:

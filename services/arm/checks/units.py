@@ -7,9 +7,9 @@ import statistics
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from services.arm.checks.findings import Finding, Severity, error, warning
-from services.arm.checks.meshes import IN_MILLIMETRES
-from services.arm.model.urdf import Inertial, Origin, UrdfModel
+from gemelo.services.arm.checks.findings import Finding, Severity, error, warning
+from gemelo.services.arm.checks.meshes import IN_MILLIMETRES
+from gemelo.services.arm.model.urdf import Inertial, Origin, UrdfModel
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 FARTHEST = 50.0  # [m] all joints together: in millimetres every arm above 5 cm is beyond it, in metres none

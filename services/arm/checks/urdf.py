@@ -11,12 +11,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from services.arm.checks.findings import Finding, error, warning
-from services.arm.checks.units import LARGEST_GYRATION, check_units, gyration
-from services.arm.errors import nearest_name, suggestion
-from services.arm.model.description import ROUNDING
-from services.arm.model.urdf import NO_SHAPE, Geometry, Inertial, JointKind, Limit, UrdfJoint, UrdfLink, UrdfModel
-from services.arm.model.xml_reader import XmlFault
+from gemelo.services.arm.checks.findings import Finding, error, warning
+from gemelo.services.arm.checks.units import LARGEST_GYRATION, check_units, gyration
+from gemelo.services.arm.errors import nearest_name, suggestion
+from gemelo.services.arm.model.description import ROUNDING
+from gemelo.services.arm.model.urdf import (
+    NO_SHAPE,
+    Geometry,
+    Inertial,
+    JointKind,
+    Limit,
+    UrdfJoint,
+    UrdfLink,
+    UrdfModel,
+)
+from gemelo.services.arm.model.xml_reader import XmlFault
 
 UNTOUCHED = "can be seen but not touched: it has no <collision>"
 COLLISION_REMEDY = "add a box or a cylinder, or let `gemelo collision fit --meshes` fit some"

@@ -7,14 +7,14 @@ from fractions import Fraction
 
 from msgspec import UNSET, UnsetType
 
-from schemas.device_config import DeviceConfig, HomingConfig, JointConfig, ServoConfig
-from schemas.robot import Homing, HomingDirection, PinLevel, ServoGripper
-from services.arm.device.device_parts import input_config, output_config, sensor_config
-from services.arm.device.device_values import device_name, int32, nearest, pin_or_unused
-from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.description import ArmDescription, Joint
-from services.arm.model.gripper import pulse_speed
-from services.arm.motors.steps import Q8, StepScale
+from gemelo.schemas.device_config import DeviceConfig, HomingConfig, JointConfig, ServoConfig
+from gemelo.schemas.robot import Homing, HomingDirection, PinLevel, ServoGripper
+from gemelo.services.arm.device.device_parts import input_config, output_config, sensor_config
+from gemelo.services.arm.device.device_values import device_name, int32, nearest, pin_or_unused
+from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.services.arm.model.gripper import pulse_speed
+from gemelo.services.arm.motors.steps import Q8, StepScale
 
 # Knots are rounded to 1/256 step and sampled from profiles that touch their limits.
 HEADROOM = 1.02

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from schemas.device_config import UNUSED, InputConfig, InputRole, OutputConfig, SensorConfig
-from schemas.robot import DigitalOutput, Input, PinLevel, Sensor
-from services.arm.device.device_values import device_name, int32, nearest, pin_or_unused
-from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.description import ArmDescription
+from gemelo.schemas.device_config import UNUSED, InputConfig, InputRole, OutputConfig, SensorConfig
+from gemelo.schemas.robot import DigitalOutput, Input, PinLevel, Sensor
+from gemelo.services.arm.device.device_values import device_name, int32, nearest, pin_or_unused
+from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.services.arm.model.description import ArmDescription
 
 
 def input_config(switch: Input, arm: ArmDescription) -> InputConfig:

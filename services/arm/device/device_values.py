@@ -6,9 +6,9 @@ import math
 import re
 from fractions import Fraction
 
-from schemas.device_config import UNUSED
-from services.arm.errors import DescriptionError
-from services.arm.model.virtual_drive import MAX_NAME
+from gemelo.schemas.device_config import UNUSED
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.virtual_drive import MAX_NAME
 
 NAME = re.compile(rf"[A-Za-z0-9_-]{{1,{MAX_NAME}}}")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from threading import Condition
 
-from schemas.frames import FrameTransform, FrameTransforms, Transform
-from services.arm.errors import suggestion
-from services.arm.frames.frame_errors import (
+from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.frames.frame_errors import (
     FrameError,
     FutureError,
     PastError,
@@ -17,8 +17,8 @@ from services.arm.frames.frame_errors import (
     WaitTimeout,
     seconds,
 )
-from services.arm.frames.time_cache import TimeCache
-from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
+from gemelo.services.arm.frames.time_cache import TimeCache
+from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
 
 __all__ = [
     "FrameBuffer",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_left
 
-from services.arm.frames.frame_errors import FrameError, FutureError, PastError, SingleSampleError, seconds
-from services.arm.frames.transforms import Rigid, interpolate
+from gemelo.services.arm.frames.frame_errors import FrameError, FutureError, PastError, SingleSampleError, seconds
+from gemelo.services.arm.frames.transforms import Rigid, interpolate
 
 _TRIM = 64  # samples that may be too old before they are cut off together
 

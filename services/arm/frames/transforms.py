@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from schemas.frames import Transform
+from gemelo.schemas.frames import Transform
 
 Point = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

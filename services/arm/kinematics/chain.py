@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_axis_angle, from_rpy
-from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
+from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose, from_axis_angle, from_rpy
+from gemelo.services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
 
 
 def origin_of(joint: UrdfJoint) -> Rigid:

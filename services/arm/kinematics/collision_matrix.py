@@ -14,12 +14,12 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.drawn_links import DrawnLinks
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.kinematics.link_distances import LinkDistances
-from services.arm.kinematics.self_collisions import LinkPair
-from services.arm.model.description import ArmDescription
-from services.arm.model.urdf import JointKind
+from gemelo.services.arm.kinematics.drawn_links import DrawnLinks
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.kinematics.link_distances import LinkDistances
+from gemelo.services.arm.kinematics.self_collisions import LinkPair
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.urdf import JointKind
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.errors import DescriptionError
-from services.arm.model.description import ArmDescription
-from services.arm.model.urdf import UrdfJoint
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.urdf import UrdfJoint
 
 Vector = NDArray[np.float64]
 

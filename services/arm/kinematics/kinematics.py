@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from schemas.frames import Transform
-from services.arm.errors import DescriptionError
-from services.arm.kinematics.joint_mapping import JointMapping
-from services.arm.kinematics.self_collisions import SelfCollisionChecker
-from services.arm.model.description import ArmDescription
+from gemelo.schemas.frames import Transform
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.kinematics.joint_mapping import JointMapping
+from gemelo.services.arm.kinematics.self_collisions import SelfCollisionChecker
+from gemelo.services.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 Positions = Sequence[float] | Array

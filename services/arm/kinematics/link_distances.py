@@ -11,9 +11,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.kinematics.joint_mapping import JointMapping
-from services.arm.kinematics.self_collisions import LinkPair, load_collision_geometry
-from services.arm.model.description import ArmDescription
+from gemelo.services.arm.kinematics.joint_mapping import JointMapping
+from gemelo.services.arm.kinematics.self_collisions import LinkPair, load_collision_geometry
+from gemelo.services.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 

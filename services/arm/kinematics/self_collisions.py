@@ -10,10 +10,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.errors import DescriptionError
-from services.arm.kinematics.convex_meshes import convex_or_same
-from services.arm.kinematics.joint_mapping import JointMapping
-from services.arm.model.description import ArmDescription
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.kinematics.convex_meshes import convex_or_same
+from gemelo.services.arm.kinematics.joint_mapping import JointMapping
+from gemelo.services.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 LinkPair = tuple[str, str]

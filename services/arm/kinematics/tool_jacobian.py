@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from services.arm.frames.transforms import Point, Rigid, compose, inverse, rotate
-from services.arm.kinematics.chain import complete, joint_transform, link_transforms, origin_of
-from services.arm.model.description import ArmDescription
-from services.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.services.arm.frames.transforms import Point, Rigid, compose, inverse, rotate
+from gemelo.services.arm.kinematics.chain import complete, joint_transform, link_transforms, origin_of
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
 
 
 class ToolJacobian:

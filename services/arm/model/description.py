@@ -10,8 +10,8 @@ from pathlib import Path
 
 import msgspec
 
-from schemas.deployment import DeviceKind
-from schemas.robot import (
+from gemelo.schemas.deployment import DeviceKind
+from gemelo.schemas.robot import (
     CLEARANCE,
     DeviceRecord,
     Dialect,
@@ -24,15 +24,15 @@ from schemas.robot import (
     StepperJoint,
     Transmission,
 )
-from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.gripper import require_gripper
-from services.arm.model.robot_file import read_robot_data, read_text, typed_robot, where_of
-from services.arm.model.srdf import SrdfModel, read_srdf
-from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel, read_urdf
-from services.arm.model.virtual_drive import NO_MOTORS, TO_DRIVE, lacks_motors, with_virtual_drive
-from services.arm.motors.relative_moves import ramp_of
-from services.arm.motors.speed import speed_limits
-from services.arm.motors.steps import StepScale, step_scale
+from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.services.arm.model.gripper import require_gripper
+from gemelo.services.arm.model.robot_file import read_robot_data, read_text, typed_robot, where_of
+from gemelo.services.arm.model.srdf import SrdfModel, read_srdf
+from gemelo.services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel, read_urdf
+from gemelo.services.arm.model.virtual_drive import NO_MOTORS, TO_DRIVE, lacks_motors, with_virtual_drive
+from gemelo.services.arm.motors.relative_moves import ramp_of
+from gemelo.services.arm.motors.speed import speed_limits
+from gemelo.services.arm.motors.steps import StepScale, step_scale
 
 ROBOT_FILE = "robot.toml"
 DEFAULT_URDF = "robot.urdf"

@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from schemas.device_config import SensorKind
-from schemas.frames import Transform
-from schemas.gripper import GripperState
-from schemas.robot import Gripper, OutputGripper, RobotFile, Sensor, ServoGripper
-from schemas.scene import BoxShape, SceneObject
-from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.robot_file import line_of
+from gemelo.schemas.device_config import SensorKind
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.gripper import GripperState
+from gemelo.schemas.robot import Gripper, OutputGripper, RobotFile, Sensor, ServoGripper
+from gemelo.schemas.scene import BoxShape, SceneObject
+from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.services.arm.model.robot_file import line_of
 
 if TYPE_CHECKING:
-    from services.arm.model.description import ArmDescription
+    from gemelo.services.arm.model.description import ArmDescription
 
 METRES = {"mm": 0.001, "m": 1.0}  # [m] of a sensor's unit
 JAW = (0.01, 0.005, 0.02)  # [m] the edges of a jaw that robot.toml does not give

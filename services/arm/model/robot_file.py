@@ -12,10 +12,10 @@ from typing import get_args, get_origin, get_type_hints
 
 import msgspec
 
-from schemas import text_file
-from schemas.robot import RobotFile
-from services.arm.errors import DescriptionError, suggestion
-from services.arm.motors.tick import chosen_tick
+from gemelo.schemas import text_file
+from gemelo.schemas.robot import RobotFile
+from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.services.arm.motors.tick import chosen_tick
 
 Keys = tuple[str | int, ...]
 TAG_FIELD = "kind"  # of tables of which there are several kinds

@@ -7,8 +7,8 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
 
-from services.arm.errors import DescriptionError
-from services.arm.model.robot_file import read_text
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.robot_file import read_text
 
 
 @dataclass(frozen=True)

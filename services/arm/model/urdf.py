@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
-from services.arm.errors import DescriptionError, nearest_name
-from services.arm.model.robot_file import read_text
-from services.arm.model.xml_reader import Triple as Triple
-from services.arm.model.xml_reader import XmlFault, XmlReader, joined, parse_xml
+from gemelo.services.arm.errors import DescriptionError, nearest_name
+from gemelo.services.arm.model.robot_file import read_text
+from gemelo.services.arm.model.xml_reader import Triple as Triple
+from gemelo.services.arm.model.xml_reader import XmlFault, XmlReader, joined, parse_xml
 
 ZERO: Triple = (0.0, 0.0, 0.0)
 DEFAULT_AXIS: Triple = (1.0, 0.0, 0.0)

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from hashlib import sha256
 from pathlib import Path
 
-from services.arm.errors import DescriptionError
-from services.arm.model.urdf import JointKind, Limit, UrdfJoint, UrdfModel
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.model.urdf import JointKind, Limit, UrdfJoint, UrdfModel
 
 MAX_NAME = 31  # bytes of a device, the firmware's
 MARK = 4  # letters that tell two names apart which are cut

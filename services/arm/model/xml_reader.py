@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from services.arm.errors import DescriptionError
+from gemelo.services.arm.errors import DescriptionError
 
 Triple = tuple[float, float, float]
 MINUSES = str.maketrans({"\u2212": "-", "\u2013": "-", "\u2012": "-", "\ufe63": "-", "\uff0d": "-"})  # of print

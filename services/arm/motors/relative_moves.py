@@ -10,9 +10,9 @@ import math
 from fractions import Fraction
 from typing import NamedTuple
 
-from schemas.robot import Sketch, StepperJoint
-from services.arm.motors.speed import speed_limits
-from services.arm.motors.steps import exact_ratio, step_scale
+from gemelo.schemas.robot import Sketch, StepperJoint
+from gemelo.services.arm.motors.speed import speed_limits
+from gemelo.services.arm.motors.steps import exact_ratio, step_scale
 
 # The approximation is slower than the exact ramp by a few per cent in short moves, and by some steps at either end.
 SLOWER = 1.10

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from schemas.robot import StepperJoint
-from services.arm.errors import DescriptionError
-from services.arm.motors.steps import StepScale, step_scale
+from gemelo.schemas.robot import StepperJoint
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.motors.steps import StepScale, step_scale
 
 RANGES = {  # of what a builder can mean
     "max_speed_rpm": (1e-3, 1e6),  # [rev/min]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
-from schemas.robot import StepperJoint, Transmission
-from services.arm.errors import DescriptionError
+from gemelo.schemas.robot import StepperJoint, Transmission
+from gemelo.services.arm.errors import DescriptionError
 
 TAU = 2.0 * math.pi
 Q8 = 256  # the wire's positions are 1/256 steps

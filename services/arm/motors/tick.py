@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from schemas.robot import Driver, RobotFile
-from services.arm.errors import DescriptionError
-from services.arm.motors.speed import speed_limits
+from gemelo.schemas.robot import Driver, RobotFile
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.motors.speed import speed_limits
 
 ROOM = 0.8  # of the highest rate possible that a joint may need
 # [Hz] in the order of preference: the firmware's 50 kHz, faster, then slower for drivers that want long pulses.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from schemas.robot import Motor, PullOut
+from gemelo.schemas.robot import Motor, PullOut
 
 NO_CURVE = 0.08  # chosen: of the torque, at the joint's limits, for a motor without a pull-out curve: as rm1's need
 BEYOND = 1e3  # the share where the curve gives no torque any more

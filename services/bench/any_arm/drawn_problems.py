@@ -11,16 +11,16 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.joints import JointState
-from schemas.planning import JointGoal, PlanRequest
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.bench.any_arm.families import FAMILIES, Setting, ToolPose, settings
-from services.bench.problems.problem_sets import ALLOWED, tool_pose
-from services.planner.collision.world import World
-from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.targets import ToolTarget
-from services.planner.request.deadline import NEVER
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JointGoal, PlanRequest
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.any_arm.families import FAMILIES, Setting, ToolPose, settings
+from gemelo.services.bench.problems.problem_sets import ALLOWED, tool_pose
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.kinematics.ik import InverseKinematics
+from gemelo.services.planner.kinematics.targets import ToolTarget
+from gemelo.services.planner.request.deadline import NEVER
 
 Array = NDArray[np.float64]
 

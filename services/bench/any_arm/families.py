@@ -14,10 +14,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.frames import Transform
-from schemas.message import Vector
-from schemas.scene import CylinderShape, PlanningScene, SceneObject
-from services.bench.scenes import box
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.message import Vector
+from gemelo.schemas.scene import CylinderShape, PlanningScene, SceneObject
+from gemelo.services.bench.scenes import box
 
 Array = NDArray[np.float64]
 

@@ -13,19 +13,19 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.motion import JointTrajectory
-from schemas.planning import PlanResponse
-from services.bench.any_arm.drawn_problems import DrawnProblem, problems
-from services.bench.any_arm.families import FAMILIES
-from services.bench.any_arm.generated_arms import ARMS, generated_arm
-from services.bench.figures import Figure, NotMeasured, of_samples, quantile, rounded
-from services.bench.planner.references import CoalChecker, PlainOmpl, Reference, ReferenceResult, Roboplan
-from services.bench.planner.trials import PHASES, WARMING, spread
-from services.bench.problems.problem_sets import ALLOWED, path_length
-from services.planner.collision.world import World
-from services.planner.core import Planner
-from services.planner.native.paths import FreePath
-from services.planner.verification.verify import at_times
+from gemelo.schemas.motion import JointTrajectory
+from gemelo.schemas.planning import PlanResponse
+from gemelo.services.bench.any_arm.drawn_problems import DrawnProblem, problems
+from gemelo.services.bench.any_arm.families import FAMILIES
+from gemelo.services.bench.any_arm.generated_arms import ARMS, generated_arm
+from gemelo.services.bench.figures import Figure, NotMeasured, of_samples, quantile, rounded
+from gemelo.services.bench.planner.references import CoalChecker, PlainOmpl, Reference, ReferenceResult, Roboplan
+from gemelo.services.bench.planner.trials import PHASES, WARMING, spread
+from gemelo.services.bench.problems.problem_sets import ALLOWED, path_length
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.native.paths import FreePath
+from gemelo.services.planner.verification.verify import at_times
 
 Array = NDArray[np.float64]
 

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.bench.figures import Figure, NotMeasured, of_samples, quantile
-from services.bench.planner.references import CoalChecker
-from services.bench.scenes import CHECK_SCENE, parol6, random_configurations, rm1
-from services.planner.collision.native_scene import native_scene
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.figures import Figure, NotMeasured, of_samples, quantile
+from gemelo.services.bench.planner.references import CoalChecker
+from gemelo.services.bench.scenes import CHECK_SCENE, parol6, random_configurations, rm1
+from gemelo.services.planner.collision.native_scene import native_scene
 
 if TYPE_CHECKING:
-    from services.planner.native.native_planner import NativePlanner
+    from gemelo.services.planner.native.native_planner import NativePlanner
 
 Array = NDArray[np.float64]
 Question = TypeVar("Question")
@@ -41,7 +41,7 @@ def state_check_us() -> Figure:
         samples.append((time.thread_time() - started) / BATCH * 1e6)
     reference = {
         "pinocchio + coal, same scene": coal_us(arm),
-        "services.arm.kinematics, self only": self_us(arm),
+        "gemelo.services.arm.kinematics, self only": self_us(arm),
         "motion core, one configuration a call": single_us(core, rows),
         "rm1, motion core": batch_us(rm1()),
         "rm1, pinocchio + coal, same scene": coal_us(rm1()),
@@ -56,7 +56,7 @@ def state_check_us() -> Figure:
 def loaded_core(arm: ArmDescription, kernel: str | None = None) -> NativePlanner:
     """A motion core with the check scene, its best kernel if none is named; raises NotMeasured if not compiled."""
     try:
-        from services.planner.native.native_planner import NativePlanner  # fails where it is not compiled
+        from gemelo.services.planner.native.native_planner import NativePlanner  # fails where it is not compiled
     except ImportError as error:
         raise NotMeasured(str(error)) from error
     core = NativePlanner(arm) if kernel is None else NativePlanner(arm, kernel=kernel)
@@ -101,7 +101,7 @@ def collision_checks_per_s() -> Figure:
     """Configurations checked per second of CPU time along straight joint paths, self and scene, on one core."""
     arm = parol6()
     loaded_core(arm)  # says where it is not compiled
-    from services.planner.native.binding import motion  # fails where it is not compiled
+    from gemelo.services.planner.native.binding import motion  # fails where it is not compiled
 
     paths = straight_paths(random_configurations(arm, 2 * PATHS))
     samples = {name: check_rates(loaded_core(arm, name).free, paths) for name in motion.kernel_names()}

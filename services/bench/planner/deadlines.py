@@ -8,16 +8,16 @@ from itertools import product
 
 import numpy as np
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest
-from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.model.description import ArmDescription
-from services.bench.figures import Figure, FigureGoal, of_samples, quantile
-from services.bench.planner.mesh_planning import dented_ball
-from services.bench.scenes import rm1
-from services.planner.collision.world import World
-from services.planner.core import Planner
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest
+from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.figures import Figure, FigureGoal, of_samples, quantile
+from gemelo.services.bench.planner.mesh_planning import dented_ball
+from gemelo.services.bench.scenes import rm1
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
 
 ALLOWED = (0.1, 0.3)  # [s]
 PLANNERS = ("native", "RRTConnect", "PRM", "")

@@ -9,15 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.frames.transforms import inverse, multiply
-from services.arm.kinematics.chain import link_transforms
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
-from services.bench.scenes import parol6, random_configurations, rm1
-from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.targets import ToolTarget
-from services.planner.request.deadline import NEVER
+from gemelo.services.arm.frames.transforms import inverse, multiply
+from gemelo.services.arm.kinematics.chain import link_transforms
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
+from gemelo.services.bench.scenes import parol6, random_configurations, rm1
+from gemelo.services.planner.kinematics.ik import InverseKinematics
+from gemelo.services.planner.kinematics.targets import ToolTarget
+from gemelo.services.planner.request.deadline import NEVER
 
 Array = NDArray[np.float64]
 

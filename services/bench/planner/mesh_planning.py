@@ -17,19 +17,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.planning import JointGoal, PlanRequest, PlanResponse
-from schemas.scene import MeshShape, PlanningScene, SceneObject
-from services.arm.model.description import ArmDescription
-from services.bench.figures import Figure, of_samples
-from services.bench.planner.trials import spread
-from services.bench.problems.problem_sets import ALLOWED
-from services.bench.scenes import TABLE, parol6
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.collision.world import World
-from services.planner.core import Planner
-from services.runtime.deployment import project_root
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JointGoal, PlanRequest, PlanResponse
+from gemelo.schemas.scene import MeshShape, PlanningScene, SceneObject
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.figures import Figure, of_samples
+from gemelo.services.bench.planner.trials import spread
+from gemelo.services.bench.problems.problem_sets import ALLOWED
+from gemelo.services.bench.scenes import TABLE, parol6
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
+from gemelo.services.runtime.deployment import project_root
 
 Array = NDArray[np.float64]
 
@@ -52,10 +52,10 @@ LINK = """
 PROGRAM = """
 import sys, time
 from pathlib import Path
-from schemas.joints import JointState
-from schemas.planning import NamedGoal, PlanCode, PlanRequest
-from services.arm.model.description import load_arm
-from services.planner.core import Planner
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.core import Planner
 began = time.process_time()
 arm = load_arm(Path(sys.argv[1]))
 planner = Planner(arm)

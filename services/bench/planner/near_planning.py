@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from services.bench.any_arm.drawn_problems import DrawnProblem, ProblemDrawer
-from services.bench.any_arm.families import FAMILIES
-from services.bench.any_arm.generated_arms import ARMS, generated_arm
-from services.bench.figures import Figure, NotMeasured, rounded
-from services.bench.planner.any_planning import NAMED, REFERENCES, SUCCESS_GOAL, has_contact, planned
-from services.bench.planner.trials import spread
-from services.planner.core import Planner
+from gemelo.services.bench.any_arm.drawn_problems import DrawnProblem, ProblemDrawer
+from gemelo.services.bench.any_arm.families import FAMILIES
+from gemelo.services.bench.any_arm.generated_arms import ARMS, generated_arm
+from gemelo.services.bench.figures import Figure, NotMeasured, rounded
+from gemelo.services.bench.planner.any_planning import NAMED, REFERENCES, SUCCESS_GOAL, has_contact, planned
+from gemelo.services.bench.planner.trials import spread
+from gemelo.services.planner.core import Planner
 
 
 def plan_near_success(count: int) -> Figure:

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 from ruckig import InputParameter, Ruckig, Trajectory
 
-from services.bench.figures import Figure, NotMeasured, of_samples, rounded
-from services.bench.planner.trials import Trial, every_trial, spread
-from services.bench.problems.problem_sets import path_length
-from services.bench.scenes import parol6, rm1
-from services.planner.timing.profile import JointLimits, joint_limits
-from services.planner.timing.toppra_speeds import load_toppra
+from gemelo.services.bench.figures import Figure, NotMeasured, of_samples, rounded
+from gemelo.services.bench.planner.trials import Trial, every_trial, spread
+from gemelo.services.bench.problems.problem_sets import path_length
+from gemelo.services.bench.scenes import parol6, rm1
+from gemelo.services.planner.timing.profile import JointLimits, joint_limits
+from gemelo.services.planner.timing.toppra_speeds import load_toppra
 
 Array = NDArray[np.float64]
 

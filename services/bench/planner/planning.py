@@ -9,12 +9,12 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
-from services.bench.planner.references import PlainOmpl, Reference, Roboplan
-from services.bench.planner.trials import PHASES, Trial, every_trial, spread, trials
-from services.bench.problems.problem_sets import ALLOWED, COUNT, problem_set, problem_sets
-from services.bench.scenes import SCENES, parol6, rm1
-from services.planner.core import Planner
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
+from gemelo.services.bench.planner.references import PlainOmpl, Reference, Roboplan
+from gemelo.services.bench.planner.trials import PHASES, Trial, every_trial, spread, trials
+from gemelo.services.bench.problems.problem_sets import ALLOWED, COUNT, problem_set, problem_sets
+from gemelo.services.bench.scenes import SCENES, parol6, rm1
+from gemelo.services.planner.core import Planner
 
 GOAL = FigureGoal(median=2.0, p99=20.0)  # [ms]
 REFERENCED = 40  # problems a scene and arm for the references, which take a hundred times as long
@@ -114,8 +114,8 @@ PYTHON_TIMEOUT = 400.0  # [s]
 # The core's import fails in this process, as where it is not compiled: OMPL searches and coal checks everything.
 PROGRAM = """
 import sys
-sys.modules["services.planner.native.binding"] = None
-from services.bench.planner.planning import print_runs
+sys.modules["gemelo.services.planner.native.binding"] = None
+from gemelo.services.bench.planner.planning import print_runs
 print_runs(int(sys.argv[1]), float(sys.argv[2]))
 """
 

@@ -16,12 +16,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from schemas.frames import Transform
-from schemas.scene import BoxShape, CylinderShape, PlanningScene, Shape
-from services.arm.kinematics.joint_mapping import JointMapping
-from services.arm.model.description import ArmDescription
-from services.bench.figures import NotMeasured
-from services.bench.problems.problem_sets import ALLOWED
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import BoxShape, CylinderShape, PlanningScene, Shape
+from gemelo.services.arm.kinematics.joint_mapping import JointMapping
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.figures import NotMeasured
+from gemelo.services.bench.problems.problem_sets import ALLOWED
 
 Array = NDArray[np.float64]
 JointValues = tuple[float, ...]  # [rad] or [m], in the arm's order

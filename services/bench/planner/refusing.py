@@ -7,15 +7,15 @@ from collections.abc import Iterator
 
 import msgspec
 
-from schemas.planning import PlanCode, PlanRequest, PoseGoal
-from services.bench.any_arm.drawn_problems import DrawnProblem, ProblemDrawer
-from services.bench.any_arm.families import FAMILIES
-from services.bench.any_arm.generated_arms import ARMS, generated_arm
-from services.bench.figures import Figure, FigureGoal, of_samples
-from services.bench.planner.trials import WARMING, spread
-from services.bench.problems.problem_sets import tool_pose
-from services.planner.collision.world import World
-from services.planner.core import Planner
+from gemelo.schemas.planning import PlanCode, PlanRequest, PoseGoal
+from gemelo.services.bench.any_arm.drawn_problems import DrawnProblem, ProblemDrawer
+from gemelo.services.bench.any_arm.families import FAMILIES
+from gemelo.services.bench.any_arm.generated_arms import ARMS, generated_arm
+from gemelo.services.bench.figures import Figure, FigureGoal, of_samples
+from gemelo.services.bench.planner.trials import WARMING, spread
+from gemelo.services.bench.problems.problem_sets import tool_pose
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
 
 BEYOND = 3.0  # times as far from the base as the drawn pose: no arm of these reaches so far
 GOAL = FigureGoal(median=10.0, p99=100.0)  # [ms]

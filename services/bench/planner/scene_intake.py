@@ -10,15 +10,15 @@ from functools import partial
 import numpy as np
 import pinocchio as pin
 
-from schemas.frames import Transform
-from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, SphereShape
-from services.arm.kinematics.self_collisions import load_collision_geometry
-from services.bench.figures import Figure, FigureGoal, of_samples, quantile
-from services.bench.scenes import parol6, rm1
-from services.planner.collision.scene_shapes import shape_of
-from services.planner.collision.world import World
-from services.planner.collision_geometry.coal_shapes import geometry_of
-from services.planner.core import Planner
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, SphereShape
+from gemelo.services.arm.kinematics.self_collisions import load_collision_geometry
+from gemelo.services.bench.figures import Figure, FigureGoal, of_samples, quantile
+from gemelo.services.bench.scenes import parol6, rm1
+from gemelo.services.planner.collision.scene_shapes import shape_of
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.collision_geometry.coal_shapes import geometry_of
+from gemelo.services.planner.core import Planner
 
 OBJECTS, SCENES = 40, 40
 GOAL = FigureGoal(median=5.0)  # [ms]

@@ -7,21 +7,21 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.joints import JointState
-from schemas.planning import JogCommand, LinearMotion, PlanCode, PlanRequest, PoseGoal
-from schemas.scene import PlanningScene
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.bench.figures import Figure, FigureGoal, of_samples, quantile
-from services.bench.planner.path_quality import least_time
-from services.bench.scenes import CHECK_SCENE, parol6, rm1
-from services.planner.collision.world import World
-from services.planner.core import Planner
-from services.planner.jog.jog import PERIOD, Jog
-from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.targets import ToolTarget
-from services.planner.request.deadline import NEVER
-from services.planner.timing.profile import joint_limits
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JogCommand, LinearMotion, PlanCode, PlanRequest, PoseGoal
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.figures import Figure, FigureGoal, of_samples, quantile
+from gemelo.services.bench.planner.path_quality import least_time
+from gemelo.services.bench.scenes import CHECK_SCENE, parol6, rm1
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.jog.jog import PERIOD, Jog
+from gemelo.services.planner.kinematics.ik import InverseKinematics
+from gemelo.services.planner.kinematics.targets import ToolTarget
+from gemelo.services.planner.request.deadline import NEVER
+from gemelo.services.planner.timing.profile import joint_limits
 
 Array = NDArray[np.float64]
 

@@ -12,13 +12,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.motion import JointTrajectory
-from schemas.planning import PlanningTimes, PlanResponse
-from services.bench.figures import quantile
-from services.bench.problems.problem_sets import ALLOWED, COUNT, PlanningProblem, problem_set, request_of
-from services.bench.scenes import SCENES, parol6, rm1
-from services.planner.collision.world import World
-from services.planner.core import Planner
+from gemelo.schemas.motion import JointTrajectory
+from gemelo.schemas.planning import PlanningTimes, PlanResponse
+from gemelo.services.bench.figures import quantile
+from gemelo.services.bench.problems.problem_sets import ALLOWED, COUNT, PlanningProblem, problem_set, request_of
+from gemelo.services.bench.scenes import SCENES, parol6, rm1
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
 
 Array = NDArray[np.float64]
 

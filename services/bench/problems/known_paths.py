@@ -15,19 +15,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import ArmDescription
-from services.bench.problems.problem_sets import path_length
-from services.planner.collision.checker import CollisionChecker
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.native.paths import NoPath
-from services.planner.path.ompl_search import ompl_corners
-from services.planner.path.path import PathNotFound
-from services.planner.path.smoothing import shorten
-from services.planner.path.validity import ValidityChecker
-from services.planner.request.deadline import Deadline
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.problems.problem_sets import path_length
+from gemelo.services.planner.collision.checker import CollisionChecker
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.native.paths import NoPath
+from gemelo.services.planner.path.ompl_search import ompl_corners
+from gemelo.services.planner.path.path import PathNotFound
+from gemelo.services.planner.path.smoothing import shorten
+from gemelo.services.planner.path.validity import ValidityChecker
+from gemelo.services.planner.request.deadline import Deadline
 
 if TYPE_CHECKING:
-    from services.planner.native.native_planner import NativePlanner
+    from gemelo.services.planner.native.native_planner import NativePlanner
 
 Array = NDArray[np.float64]
 

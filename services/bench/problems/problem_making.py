@@ -1,4 +1,4 @@
-"""Makes `problem_sets.json`: `python -m services.bench.problems.problem_making [arm/scene ...]`, in many minutes.
+"""Makes `problem_sets.json`: `python -m gemelo.services.bench.problems.problem_making [arm/scene ...]`, in many minutes.
 
 Pairs of random free configurations are drawn until enough have a known path. Pairs without one are left out: for rm1 a
 grid over all configurations decides whether a path exists, for parol6 searches of several seconds do. So a planner
@@ -14,10 +14,10 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.bench.problems.known_paths import JointGrid, shortest
-from services.bench.problems.problem_sets import (
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.problems.known_paths import JointGrid, shortest
+from gemelo.services.bench.problems.problem_sets import (
     COUNT,
     FILE,
     PlanningProblem,
@@ -27,16 +27,16 @@ from services.bench.problems.problem_sets import (
     request_of,
     text_of,
 )
-from services.bench.scenes import SCENES, parol6, rm1
-from services.planner.collision.checker import CollisionChecker
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.collision.world import World
-from services.planner.kinematics.goals import Goals
-from services.planner.path.native_search import NATIVE
-from services.planner.path.path import PathNotFound
-from services.planner.path.search import Search
-from services.planner.path.validity import ValidityChecker
-from services.planner.request.deadline import NEVER, Deadline, Stopwatch, endless
+from gemelo.services.bench.scenes import SCENES, parol6, rm1
+from gemelo.services.planner.collision.checker import CollisionChecker
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.kinematics.goals import Goals
+from gemelo.services.planner.path.native_search import NATIVE
+from gemelo.services.planner.path.path import PathNotFound
+from gemelo.services.planner.path.search import Search
+from gemelo.services.planner.path.validity import ValidityChecker
+from gemelo.services.planner.request.deadline import NEVER, Deadline, Stopwatch, endless
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.joints import JointState
-from schemas.planning import FreeMotion, JointGoal, PlanRequest, PoseGoal
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import FreeMotion, JointGoal, PlanRequest, PoseGoal
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,9 @@ def problem_set(arm: str, scene: str) -> ProblemSet:
     for each in problem_sets():
         if (each.arm, each.scene) == (arm, scene):
             return each
-    raise LookupError(f"there are no problems of {arm} in {scene}: python -m services.bench.problems.problem_making")
+    raise LookupError(
+        f"there are no problems of {arm} in {scene}: python -m gemelo.services.bench.problems.problem_making"
+    )
 
 
 def text_of(sets: tuple[ProblemSet, ...]) -> str:

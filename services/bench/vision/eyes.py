@@ -17,22 +17,22 @@ import cv2
 import psutil
 from msgspec.structs import replace
 
-from schemas.camera import CameraImage
-from schemas.cell import VirtualSource
-from schemas.joints import JointState
-from schemas.system import SetParameter
-from schemas.topics import camera_detections, camera_image
-from services.arm.cell.camera_model import exact_info
-from services.arm.cell.cell_file import load_cell
-from services.bench.figures import Figure, NotMeasured, of_samples, quantile
-from services.bench.scenes import rm1
-from services.bench.stack import Stacks, cpu_seconds, families
-from services.camera.virtual.virtual_camera import VirtualCamera
-from services.camera.virtual.world import CameraWorld
-from services.runtime.deployment import load_deployment
-from services.runtime.endpoints import parameter_request
-from services.runtime.node import Node
-from services.stack.stack import Stack
+from gemelo.schemas.camera import CameraImage
+from gemelo.schemas.cell import VirtualSource
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.system import SetParameter
+from gemelo.schemas.topics import camera_detections, camera_image
+from gemelo.services.arm.cell.camera_model import exact_info
+from gemelo.services.arm.cell.cell_file import load_cell
+from gemelo.services.bench.figures import Figure, NotMeasured, of_samples, quantile
+from gemelo.services.bench.scenes import rm1
+from gemelo.services.bench.stack import Stacks, cpu_seconds, families
+from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
+from gemelo.services.camera.virtual.world import CameraWorld
+from gemelo.services.runtime.deployment import load_deployment
+from gemelo.services.runtime.endpoints import parameter_request
+from gemelo.services.runtime.node import Node
+from gemelo.services.stack.stack import Stack
 
 SET_RATE = parameter_request("detector")
 PROCESSES = ("router", "camera", "detector")

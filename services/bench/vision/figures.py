@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 from msgspec.structs import replace
 
-from services.bench.figures import Figure, NotMeasured, of_samples, quantile
-from services.bench.scenes import parol6, rm1
-from services.bench.vision.images import (
+from gemelo.services.bench.figures import Figure, NotMeasured, of_samples, quantile
+from gemelo.services.bench.scenes import parol6, rm1
+from gemelo.services.bench.vision.images import (
     Conditions,
     Image,
     box_surfaces,
@@ -21,17 +21,24 @@ from services.bench.vision.images import (
     render,
     tag_surface,
 )
-from services.bench.vision.mount_images import Setup, Sight, board_on_tool, camera_on_link, tag_on_level_tool, take
-from services.bench.vision.mounting import MountingTrial, closed_form, level_trial, six_joint_trial, tool_error
-from services.bench.vision.naive import APRILTAG_SHIFT, METHODS, opencv_corners, opencv_pose
-from services.vision.boards import TagBoard
-from services.vision.boxes import colour_strength, coloured_regions, fit_box, region_centre
-from services.vision.calibration.mount import fit_mount
-from services.vision.calibration.reprojection import Carrier
-from services.vision.camera_model import of_field_of_view
-from services.vision.rigid import Array, angle_between, rigid
-from services.vision.tag_pose import flat, plane_pose, tag_pose
-from services.vision.tags import find_tags
+from gemelo.services.bench.vision.mount_images import (
+    Setup,
+    Sight,
+    board_on_tool,
+    camera_on_link,
+    tag_on_level_tool,
+    take,
+)
+from gemelo.services.bench.vision.mounting import MountingTrial, closed_form, level_trial, six_joint_trial, tool_error
+from gemelo.services.bench.vision.naive import APRILTAG_SHIFT, METHODS, opencv_corners, opencv_pose
+from gemelo.services.vision.boards import TagBoard
+from gemelo.services.vision.boxes import colour_strength, coloured_regions, fit_box, region_centre
+from gemelo.services.vision.calibration.mount import fit_mount
+from gemelo.services.vision.calibration.reprojection import Carrier
+from gemelo.services.vision.camera_model import of_field_of_view
+from gemelo.services.vision.rigid import Array, angle_between, rigid
+from gemelo.services.vision.tag_pose import flat, plane_pose, tag_pose
+from gemelo.services.vision.tags import find_tags
 
 MODEL = of_field_of_view(np.radians(60.0), 640, 480)
 SIZE, DISTANCE = 0.03, 0.5  # [m]

@@ -12,23 +12,23 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from schemas.cell import CameraRecord, TagRecord, VirtualSource
-from schemas.joints import JointState
-from services.arm.cell.camera_model import exact_info
-from services.arm.cell.cell_file import Cell
-from services.arm.frames.transforms import from_rpy, to_message
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.camera.virtual.virtual_camera import VirtualCamera
-from services.camera.virtual.world import CameraWorld
-from services.vision.boards import Sighting, TagBoard
-from services.vision.calibration.link_pose import link_pose
-from services.vision.calibration.poses import Belief, Chosen, choose_poses
-from services.vision.calibration.reprojection import BoardView, Carrier
-from services.vision.calibration.shots import one_of, without_hidden
-from services.vision.camera_model import CameraModel, model_of
-from services.vision.rigid import Array, from_transform, step
-from services.vision.tags import GreyImage
+from gemelo.schemas.cell import CameraRecord, TagRecord, VirtualSource
+from gemelo.schemas.joints import JointState
+from gemelo.services.arm.cell.camera_model import exact_info
+from gemelo.services.arm.cell.cell_file import Cell
+from gemelo.services.arm.frames.transforms import from_rpy, to_message
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
+from gemelo.services.camera.virtual.world import CameraWorld
+from gemelo.services.vision.boards import Sighting, TagBoard
+from gemelo.services.vision.calibration.link_pose import link_pose
+from gemelo.services.vision.calibration.poses import Belief, Chosen, choose_poses
+from gemelo.services.vision.calibration.reprojection import BoardView, Carrier
+from gemelo.services.vision.calibration.shots import one_of, without_hidden
+from gemelo.services.vision.camera_model import CameraModel, model_of
+from gemelo.services.vision.rigid import Array, from_transform, step
+from gemelo.services.vision.tags import GreyImage
 
 FIRST = 200  # id of the board's first tag
 OFF = np.array([0.06, -0.05, 0.04, 0.015, -0.02, 0.01])  # [rad], [m] of what is believed of the camera at first

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.vision.boards import Sighting, TagBoard
-from services.vision.calibration.reprojection import BoardView, Carrier
-from services.vision.camera_model import CameraModel
-from services.vision.rigid import Array, apply, inverse, rigid, step, turn
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.vision.boards import Sighting, TagBoard
+from gemelo.services.vision.calibration.reprojection import BoardView, Carrier
+from gemelo.services.vision.camera_model import CameraModel
+from gemelo.services.vision.rigid import Array, apply, inverse, rigid, step, turn
 
 
 @dataclass(frozen=True)

@@ -14,14 +14,14 @@ from functools import cache, partial
 from pathlib import Path
 
 import gemelo
-from schemas.cell import PosePlace
-from schemas.detections import Detections
-from schemas.topics import camera_truth
-from services.arm.cell.cell_file import load_cell
-from services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
-from services.runtime.deployment import project_root
-from services.runtime.topics import Latest
-from services.stack.stack import Stack
+from gemelo.schemas.cell import PosePlace
+from gemelo.schemas.detections import Detections
+from gemelo.schemas.topics import camera_truth
+from gemelo.services.arm.cell.cell_file import load_cell
+from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.topics import Latest
+from gemelo.services.stack.stack import Stack
 
 PROCESSES = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner", "camera", "detector")
 CAMERA = "overhead"

@@ -10,24 +10,24 @@ import cv2
 import numpy as np
 from msgspec.structs import replace
 
-from schemas.cell import CameraRecord, TagRecord, VirtualSource
-from schemas.joints import JointState
-from services.arm.cell.camera_model import exact_info
-from services.arm.cell.cell_file import Cell
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.bench.figures import Figure, of_samples, quantile
-from services.bench.scenes import rm1
-from services.bench.vision.mounting import tool_error
-from services.camera.virtual.virtual_camera import VirtualCamera
-from services.camera.virtual.world import CameraWorld
-from services.cli.camera_mount import ENOUGH_TAGS, IMAGES, TOUCHES
-from services.vision.boards import Sighting, TagBoard
-from services.vision.calibration.reprojection import Carrier
-from services.vision.calibration.shots import one_of
-from services.vision.calibration.touches import TOUCH_SIGMA, fit_touches, spread_points
-from services.vision.camera_model import CameraModel, model_of
-from services.vision.rigid import Array, apply, from_transform, rigid
+from gemelo.schemas.cell import CameraRecord, TagRecord, VirtualSource
+from gemelo.schemas.joints import JointState
+from gemelo.services.arm.cell.camera_model import exact_info
+from gemelo.services.arm.cell.cell_file import Cell
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.bench.figures import Figure, of_samples, quantile
+from gemelo.services.bench.scenes import rm1
+from gemelo.services.bench.vision.mounting import tool_error
+from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
+from gemelo.services.camera.virtual.world import CameraWorld
+from gemelo.services.cli.camera_mount import ENOUGH_TAGS, IMAGES, TOUCHES
+from gemelo.services.vision.boards import Sighting, TagBoard
+from gemelo.services.vision.calibration.reprojection import Carrier
+from gemelo.services.vision.calibration.shots import one_of
+from gemelo.services.vision.calibration.touches import TOUCH_SIGMA, fit_touches, spread_points
+from gemelo.services.vision.camera_model import CameraModel, model_of
+from gemelo.services.vision.rigid import Array, apply, from_transform, rigid
 
 # Four samples a side: with two the edges of a board that lies along the rows of the image are drawn 0.3 px off.
 CAMERA = CameraRecord(

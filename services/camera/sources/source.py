@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.camera import CameraCondition
+from gemelo.schemas.camera import CameraCondition
 
 JPEG_QUALITY = 90
 

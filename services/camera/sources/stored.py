@@ -7,10 +7,10 @@ from typing import Any
 
 import cv2
 
-from schemas.camera import CameraCondition
-from schemas.cell import CameraRecord
-from services.camera.sources.source import CameraFault, EncodedImage, encoded
-from services.runtime.clock import SYSTEM, Clock
+from gemelo.schemas.camera import CameraCondition
+from gemelo.schemas.cell import CameraRecord
+from gemelo.services.camera.sources.source import CameraFault, EncodedImage, encoded
+from gemelo.services.runtime.clock import SYSTEM, Clock
 
 PICTURES = {".jpg", ".jpeg", ".png"}
 

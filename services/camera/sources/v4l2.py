@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.camera import CameraCondition
-from schemas.cell import CameraRecord, V4l2Source
-from services.camera.sources.source import CameraFault, EncodedImage, encoded
+from gemelo.schemas.camera import CameraCondition
+from gemelo.schemas.cell import CameraRecord, V4l2Source
+from gemelo.services.camera.sources.source import CameraFault, EncodedImage, encoded
 
 MANUAL_EXPOSURE = 1.0  # V4L2_EXPOSURE_MANUAL
 MJPG = cv2.VideoWriter.fourcc(*"MJPG")

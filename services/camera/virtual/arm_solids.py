@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, Shape, SphereShape
-from services.arm.errors import DescriptionError
-from services.arm.frames.transforms import IDENTITY, Rigid, from_rpy
-from services.arm.model.description import ArmDescription
-from services.arm.stl import BadStl, read_stl
-from services.camera.virtual.solids import Array, Colour, PosedSolid, box, cylinder, sphere, triangles
+from gemelo.schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, Shape, SphereShape
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, from_rpy
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.stl import BadStl, read_stl
+from gemelo.services.camera.virtual.solids import Array, Colour, PosedSolid, box, cylinder, sphere, triangles
 
 LINKS: tuple[Colour, ...] = ((196, 198, 202), (70, 72, 78), (150, 154, 160))  # one after the other
 MOST_TRIANGLES = 2000  # of a mesh; of a larger one its bounding box is drawn

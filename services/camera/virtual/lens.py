@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.camera import CameraInfo
+from gemelo.schemas.camera import CameraInfo
 
 Array = NDArray[np.float64]
 Samples = NDArray[np.float32]

@@ -15,10 +15,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.camera import CameraInfo
-from services.arm.frames.transforms import Rigid, compose, inverse
-from services.camera.virtual.lens import Array, Lens, Samples, lens_of
-from services.camera.virtual.solids import Colour, Face, PosedSolid
+from gemelo.schemas.camera import CameraInfo
+from gemelo.services.arm.frames.transforms import Rigid, compose, inverse
+from gemelo.services.camera.virtual.lens import Array, Lens, Samples, lens_of
+from gemelo.services.camera.virtual.solids import Colour, Face, PosedSolid
 
 Image = NDArray[np.uint8]
 

@@ -12,14 +12,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from schemas.cell import ColourThing, TagPlace, TagRecord, TagThing, Thing
-from schemas.gripper import GripperState
-from schemas.joints import JointState
-from schemas.scene import PlanningScene
-from services.arm.cell.camera_file import MOUNT_BOARD
-from services.arm.cell.cell_file import Cell, grasp_width, height_of_frame
-from services.arm.cell.colours import RGB
-from services.arm.frames.transforms import (
+from gemelo.schemas.cell import ColourThing, TagPlace, TagRecord, TagThing, Thing
+from gemelo.schemas.gripper import GripperState
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.arm.cell.camera_file import MOUNT_BOARD
+from gemelo.services.arm.cell.cell_file import Cell, grasp_width, height_of_frame
+from gemelo.services.arm.cell.colours import RGB
+from gemelo.services.arm.frames.transforms import (
     IDENTITY,
     Point,
     Rigid,
@@ -30,11 +30,11 @@ from services.arm.frames.transforms import (
     inverse,
     rotate,
 )
-from services.arm.kinematics.chain import link_transforms
-from services.arm.model.description import ArmDescription
-from services.arm.model.gripper import JAWS, jaw_edges, jaw_objects
-from services.camera.virtual.arm_solids import arm_solids, solid_of
-from services.camera.virtual.solids import Face, PosedSolid, box, tag
+from gemelo.services.arm.kinematics.chain import link_transforms
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.gripper import JAWS, jaw_edges, jaw_objects
+from gemelo.services.camera.virtual.arm_solids import arm_solids, solid_of
+from gemelo.services.camera.virtual.solids import Face, PosedSolid, box, tag
 
 TABLE, WOOD, CARDBOARD, OBSTACLE, JAW = (158, 150, 138), (120, 86, 52), (186, 160, 120), (128, 134, 142), (40, 42, 46)
 TABLE_HALF = 1.5  # [m]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import gemelo
-from schemas.device import DeviceMode, DeviceState
-from services.panel.model.readings import Readings
+from gemelo.schemas.device import DeviceMode, DeviceState
+from gemelo.services.panel.model.readings import Readings
 
 Reason = tuple[str, str] | None  # key of the words, value; None: it can be done
 

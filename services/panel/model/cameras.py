@@ -8,10 +8,10 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import gemelo
-from schemas.camera import CameraImage
-from schemas.detections import Detection, Detections
-from schemas.topics import camera_detections, camera_image
-from services.panel.model.pointing import NEAR, Pointed, pointed_at
+from gemelo.schemas.camera import CameraImage
+from gemelo.schemas.detections import Detection, Detections
+from gemelo.schemas.topics import camera_detections, camera_image
+from gemelo.services.panel.model.pointing import NEAR, Pointed, pointed_at
 
 PERIOD = 0.5  # [s] between two images on the page
 LARGEST = 600_000  # [bytes] of an image on the page: it goes to every browser again

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from math import acos, dist, pi
 
 import gemelo
-from services.panel.model.problems import Problem, problem_of
-from services.panel.model.tool_turns import tool_turns
+from gemelo.services.panel.model.problems import Problem, problem_of
+from gemelo.services.panel.model.tool_turns import tool_turns
 
 IDLE = 1.0  # [s] after which a solver without work looks whether it is to end
 FOUND = 1.0  # [s] in which a goal is mostly found; a plan waits no longer: somebody else may drag it all the time

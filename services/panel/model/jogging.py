@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import gemelo
-from schemas.planning import JogStatus
-from services.panel.model.problems import Problem, problem_of
+from gemelo.schemas.planning import JogStatus
+from gemelo.services.panel.model.problems import Problem, problem_of
 
 HELD = 0.2  # [s] chosen: two frames of a browser that draws 10 times a second
 PERIOD = 0.02  # [s] between two commands; the planner's own dead-man is 0.1 s

@@ -10,8 +10,8 @@ import time
 from collections.abc import Mapping
 
 import gemelo
-from services.panel.model.jogging import Jogging, JogWish
-from services.panel.model.readings import BusReadings
+from gemelo.services.panel.model.jogging import Jogging, JogWish
+from gemelo.services.panel.model.readings import BusReadings
 
 PERIOD = 0.02  # [s] between two speeds
 GAIN = 4.0  # [1/s] chosen: with the 0.1 s from a jog command to its motion it does not overshoot

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import gemelo
-from services.panel.model.problems import Problem, problem_of
+from gemelo.services.panel.model.problems import Problem, problem_of
 
 AFTER_STOP = 0.7  # [s] chosen: a press that the same finger makes with Stop starts nothing
 ALLOWED_TIME = 5.0  # [s] for planning

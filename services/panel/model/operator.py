@@ -8,17 +8,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import gemelo
-from services.arm.cell.cell_file import deployed_cell
-from services.panel.model.cameras import CameraPictures
-from services.panel.model.goal import GoalSolver
-from services.panel.model.jogging import Jogging
-from services.panel.model.live import LiveSliders
-from services.panel.model.motions import MotionChoice, Motions
-from services.panel.model.picks import Picks
-from services.panel.model.problems import Problem, problem_of
-from services.panel.model.readings import BusReadings
-from services.panel.model.stop_lane import StopLane
-from services.panel.model.teaching import Teaching
+from gemelo.services.arm.cell.cell_file import deployed_cell
+from gemelo.services.panel.model.cameras import CameraPictures
+from gemelo.services.panel.model.goal import GoalSolver
+from gemelo.services.panel.model.jogging import Jogging
+from gemelo.services.panel.model.live import LiveSliders
+from gemelo.services.panel.model.motions import MotionChoice, Motions
+from gemelo.services.panel.model.picks import Picks
+from gemelo.services.panel.model.problems import Problem, problem_of
+from gemelo.services.panel.model.readings import BusReadings
+from gemelo.services.panel.model.stop_lane import StopLane
+from gemelo.services.panel.model.teaching import Teaching
 
 PAGE = "the page"  # the holder's name, where the page has taken control
 KEPT = 30.0  # [s] that a problem stays on the page

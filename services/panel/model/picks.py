@@ -6,8 +6,8 @@ import threading
 from collections.abc import Callable
 
 import gemelo
-from services.arm.cell.cell_file import Cell
-from services.panel.model.problems import Problem
+from gemelo.services.arm.cell.cell_file import Cell
+from gemelo.services.panel.model.problems import Problem
 
 
 class Picks:

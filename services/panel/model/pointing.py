@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from math import dist, hypot, inf
 
-from schemas.detections import Detection
+from gemelo.schemas.detections import Detection
 
 Pixel = Sequence[float]  # (x, y)
 

@@ -8,7 +8,7 @@ from functools import wraps
 from typing import ParamSpec
 
 import gemelo
-from schemas.scene import Contact
+from gemelo.schemas.scene import Contact
 
 P = ParamSpec("P")
 NEAR = 1e-3  # of two values of the same thing, in the unit of the check, that are told as one

@@ -10,20 +10,20 @@ from typing import TypeVar
 
 import gemelo
 from gemelo.api.device import fault_of
-from schemas.control import ControlState
-from schemas.device import DeviceState, DeviceStatus
-from schemas.gripper import GripperState
-from schemas.joints import JointState
-from schemas.ledger import StepLedger, StoppingDistance
-from schemas.message import Message
-from schemas.planning import JogStatus, PlannedPath
-from schemas.scene import Contacts, PlanningScene, SceneObject
-from schemas.system import LogRecord
-from schemas.topics import Topic
-from services.arm.model.gripper import jaw_objects, jaws_apart
-from services.panel.model.pace import DrawPace
-from services.runtime.scene_meshes import SceneMeshes
-from services.runtime.topics import Latest
+from gemelo.schemas.control import ControlState
+from gemelo.schemas.device import DeviceState, DeviceStatus
+from gemelo.schemas.gripper import GripperState
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.ledger import StepLedger, StoppingDistance
+from gemelo.schemas.message import Message
+from gemelo.schemas.planning import JogStatus, PlannedPath
+from gemelo.schemas.scene import Contacts, PlanningScene, SceneObject
+from gemelo.schemas.system import LogRecord
+from gemelo.schemas.topics import Topic
+from gemelo.services.arm.model.gripper import jaw_objects, jaws_apart
+from gemelo.services.panel.model.pace import DrawPace
+from gemelo.services.runtime.scene_meshes import SceneMeshes
+from gemelo.services.runtime.topics import Latest
 
 M = TypeVar("M", bound=Message)
 

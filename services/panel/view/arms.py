@@ -13,11 +13,11 @@ import yourdfpy
 from numpy.typing import NDArray
 from viser.extras import ViserUrdf
 
-from services.arm.frames.transforms import Rigid
-from services.arm.kinematics.chain import complete, joint_transform, link_transforms, origin_of
-from services.arm.model.description import ArmDescription
-from services.arm.model.urdf import JointKind, UrdfJoint
-from services.panel.model.pace import UNSEEN
+from gemelo.services.arm.frames.transforms import Rigid
+from gemelo.services.arm.kinematics.chain import complete, joint_transform, link_transforms, origin_of
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.services.panel.model.pace import UNSEEN
 
 Array = NDArray[np.float64]
 Color = tuple[float, float, float, float]  # red, green, blue and opacity, each 0 to 1

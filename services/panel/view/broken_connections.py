@@ -13,7 +13,7 @@ import viser
 from websockets.asyncio.server import ServerConnection
 from websockets.frames import CloseCode
 
-from schemas.plain_text import escaped
+from gemelo.schemas.plain_text import escaped
 
 PERIOD = 60.0  # [s] from one line to the next
 LONGEST = 200  # letters of what is said of one

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import viser
 
-from schemas.detections import Detection
-from services.panel.model.cameras import NONE, Picture
-from services.panel.model.pointing import Pointed
-from services.panel.view.browser import CAMERA_MARK, Click
-from services.panel.view.kit import Kit, esc, note, set_if_new
-from services.panel.view.pick_box import PickBox
+from gemelo.schemas.detections import Detection
+from gemelo.services.panel.model.cameras import NONE, Picture
+from gemelo.services.panel.model.pointing import Pointed
+from gemelo.services.panel.view.browser import CAMERA_MARK, Click
+from gemelo.services.panel.view.kit import Kit, esc, note, set_if_new
+from gemelo.services.panel.view.pick_box import PickBox
 
 CHOSEN, OTHER = "#ff9f1a", "#ffffff"
 LABEL = 0.024  # of the image's width: height of a name in it

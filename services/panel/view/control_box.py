@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from services.panel.model.availability import other_holder
-from services.panel.model.operator import Operator
-from services.panel.model.readings import Readings
-from services.panel.view.kit import Kit, box, esc, note, set_if_new
+from gemelo.services.panel.model.availability import other_holder
+from gemelo.services.panel.model.operator import Operator
+from gemelo.services.panel.model.readings import Readings
+from gemelo.services.panel.view.kit import Kit, box, esc, note, set_if_new
 
 MINE, OTHER = "#1c7ed6", "#f08c00"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
-from schemas.robot import Gripper
-from services.panel.model.readings import Readings
-from services.panel.view.kit import Kit, note, set_if_new
+from gemelo.schemas.robot import Gripper
+from gemelo.services.panel.model.readings import Readings
+from gemelo.services.panel.view.kit import Kit, note, set_if_new
 
 MILLIMETRES = 1000.0
 

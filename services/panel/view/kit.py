@@ -8,10 +8,10 @@ from typing import Literal
 
 import viser
 
-from services.panel.model.availability import Reason
-from services.panel.model.operator import Operator
-from services.panel.model.problems import reporting
-from services.panel.words.words import Words
+from gemelo.services.panel.model.availability import Reason
+from gemelo.services.panel.model.operator import Operator
+from gemelo.services.panel.model.problems import reporting
+from gemelo.services.panel.words.words import Words
 
 OWN_CHANGE = 0.6  # [s] after its own change a browser's inputs are not written: the next one may be under way
 Color = Literal["red", "blue", "green", "gray", "orange", "yellow", "teal"]

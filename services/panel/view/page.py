@@ -10,25 +10,25 @@ from typing import Literal
 
 import viser
 
-from schemas.device import DeviceMode
-from schemas.device_link import reason_text
-from services.panel.model.availability import reasons
-from services.panel.model.operator import Operator
-from services.panel.model.readings import Readings
-from services.panel.view.arm_pages import ArmPage, arms_line
-from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, Stops, read_browser, script_html
-from services.panel.view.camera_box import CameraBox
-from services.panel.view.control_box import ControlBox
-from services.panel.view.kit import Kit, Mirror, Steady, at_once, box, esc, set_if_new, without_event
-from services.panel.view.tabs.device import DeviceTab
-from services.panel.view.tabs.jog import JogTab
-from services.panel.view.tabs.move import MoveTab
-from services.panel.view.tabs.programs import ProgramsTab
-from services.panel.view.tabs.scene import SceneTab, require_small
-from services.panel.view.tabs.state import StateTab
-from services.panel.view.tabs.teach import TeachTab
-from services.panel.view.world import DrawnWorld
-from services.panel.words.words import NAMES, Words, language_of
+from gemelo.schemas.device import DeviceMode
+from gemelo.schemas.device_link import reason_text
+from gemelo.services.panel.model.availability import reasons
+from gemelo.services.panel.model.operator import Operator
+from gemelo.services.panel.model.readings import Readings
+from gemelo.services.panel.view.arm_pages import ArmPage, arms_line
+from gemelo.services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, Stops, read_browser, script_html
+from gemelo.services.panel.view.camera_box import CameraBox
+from gemelo.services.panel.view.control_box import ControlBox
+from gemelo.services.panel.view.kit import Kit, Mirror, Steady, at_once, box, esc, set_if_new, without_event
+from gemelo.services.panel.view.tabs.device import DeviceTab
+from gemelo.services.panel.view.tabs.jog import JogTab
+from gemelo.services.panel.view.tabs.move import MoveTab
+from gemelo.services.panel.view.tabs.programs import ProgramsTab
+from gemelo.services.panel.view.tabs.scene import SceneTab, require_small
+from gemelo.services.panel.view.tabs.state import StateTab
+from gemelo.services.panel.view.tabs.teach import TeachTab
+from gemelo.services.panel.view.world import DrawnWorld
+from gemelo.services.panel.words.words import NAMES, Words, language_of
 
 MARK = 1.0  # [s] between two marks by which a browser's lag is measured
 LATE, LATE_AGAIN = 0.2, 5.0  # [s] chosen: a longer lag is measured again after so long

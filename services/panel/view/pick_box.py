@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services.panel.view.kit import Kit, esc, note, set_if_new
+from gemelo.services.panel.view.kit import Kit, esc, note, set_if_new
 
 
 class PickBox:

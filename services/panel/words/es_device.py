@@ -5,12 +5,12 @@ They are told inside other sentences: each table is for the place of a value tha
 
 from __future__ import annotations
 
-from schemas.motion import FollowErrorCode
+from gemelo.schemas.motion import FollowErrorCode
 
 _AGAIN = "`gemelo reset`, `gemelo home`"
 _AGAIN_ES = "pulse «Borrar el fallo» y «Buscar el origen»"
 
-_MEANINGS: dict[tuple[str, str], tuple[str, str]] = {  # meaning and remedy, as `schemas.device_faults` says them
+_MEANINGS: dict[tuple[str, str], tuple[str, str]] = {  # meaning and remedy, as `gemelo.schemas.device_faults` says them
     (
         "the step pulses waited more than 3 ms for the path",
         f"{_AGAIN}; if it comes again, lower [device] tick_hz in robot.toml",

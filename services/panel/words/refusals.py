@@ -6,9 +6,9 @@ import math
 import re
 from collections.abc import Callable, Mapping
 
-from services.arm.model.description import Joint
-from services.panel.model.problems import Problem
-from services.panel.model.units import text_of
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.panel.model.problems import Problem
+from gemelo.services.panel.model.units import text_of
 
 Joints = Mapping[str, Joint]  # by name
 Show = Callable[[Problem, Joints, float], str]

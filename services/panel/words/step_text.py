@@ -19,7 +19,7 @@ from gemelo.programs import (
     WaitFor,
     kind_of,
 )
-from services.panel.words.words import Words
+from gemelo.services.panel.words.words import Words
 
 
 def step_text(step: AnyStep, words: Words) -> str:

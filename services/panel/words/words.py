@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from schemas.actions import GoalStatusCode
-from services.panel.model.availability import Reason
-from services.panel.model.problems import Problem
-from services.panel.words.en import ENGLISH
-from services.panel.words.en_refusals import REFUSALS as ENGLISH_REFUSALS
-from services.panel.words.es import SPANISH
-from services.panel.words.es_device import FAULTS, GOAL_CODES, VALUES
-from services.panel.words.es_gateway import GATEWAY
-from services.panel.words.es_goals import GOALS
-from services.panel.words.es_programs import PROGRAMS
-from services.panel.words.es_refusals import REFUSALS
-from services.panel.words.es_work import WORK
-from services.panel.words.refusals import Joints, key_of, place_of, sentence_of
-from services.panel.words.sentences import Sentences
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.services.panel.model.availability import Reason
+from gemelo.services.panel.model.problems import Problem
+from gemelo.services.panel.words.en import ENGLISH
+from gemelo.services.panel.words.en_refusals import REFUSALS as ENGLISH_REFUSALS
+from gemelo.services.panel.words.es import SPANISH
+from gemelo.services.panel.words.es_device import FAULTS, GOAL_CODES, VALUES
+from gemelo.services.panel.words.es_gateway import GATEWAY
+from gemelo.services.panel.words.es_goals import GOALS
+from gemelo.services.panel.words.es_programs import PROGRAMS
+from gemelo.services.panel.words.es_refusals import REFUSALS
+from gemelo.services.panel.words.es_work import WORK
+from gemelo.services.panel.words.refusals import Joints, key_of, place_of, sentence_of
+from gemelo.services.panel.words.sentences import Sentences
 
 TABLES = {"en": ENGLISH, "es": SPANISH}
 REFUSED: dict[str, Mapping[str, str]] = {"en": ENGLISH_REFUSALS, "es": REFUSALS}

@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from schemas.planning import PlanCode, Refusal
-from services.arm.kinematics.kinematics import FramePose
-from services.planner.cartesian.tool_path import ArcPiece
-from services.planner.request.refusals import PlanRefused
+from gemelo.schemas.planning import PlanCode, Refusal
+from gemelo.services.arm.kinematics.kinematics import FramePose
+from gemelo.services.planner.cartesian.tool_path import ArcPiece
+from gemelo.services.planner.request.refusals import PlanRefused
 
 Array = NDArray[np.float64]
 

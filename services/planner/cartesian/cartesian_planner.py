@@ -10,20 +10,20 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from schemas.motion import JointTrajectory
-from schemas.planning import PlanCode, Refusal, Timing
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.cartesian.continuation import FINEST, Continuation, FollowedPath, StopReason, is_same
-from services.planner.cartesian.path_points import Run, between, states_of_runs
-from services.planner.cartesian.tool_limits import ToolLimits
-from services.planner.cartesian.tool_path import METRES_PER_RADIAN, ToolPath
-from services.planner.collision.clearance import PathChecker
-from services.planner.path.path import Start
-from services.planner.request.deadline import Deadline
-from services.planner.request.refusals import PlanRefused, not_verified
-from services.planner.timing.path_timing import law_along
-from services.planner.timing.profile import (
+from gemelo.schemas.motion import JointTrajectory
+from gemelo.schemas.planning import PlanCode, Refusal, Timing
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.cartesian.continuation import FINEST, Continuation, FollowedPath, StopReason, is_same
+from gemelo.services.planner.cartesian.path_points import Run, between, states_of_runs
+from gemelo.services.planner.cartesian.tool_limits import ToolLimits
+from gemelo.services.planner.cartesian.tool_path import METRES_PER_RADIAN, ToolPath
+from gemelo.services.planner.collision.clearance import PathChecker
+from gemelo.services.planner.path.path import Start
+from gemelo.services.planner.request.deadline import Deadline
+from gemelo.services.planner.request.refusals import PlanRefused, not_verified
+from gemelo.services.planner.timing.path_timing import law_along
+from gemelo.services.planner.timing.profile import (
     JointLimits,
     NoProfile,
     States,
@@ -31,7 +31,7 @@ from services.planner.timing.profile import (
     straight_line,
     trajectory_of,
 )
-from services.planner.timing.timing import at_limits, at_speed
+from gemelo.services.planner.timing.timing import at_limits, at_speed
 
 Array = NDArray[np.float64]
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import FramePose, Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.cartesian.tool_path import ToolPath
-from services.planner.cartesian.tool_solver import ToolSolver
-from services.planner.path.path_curve import CubicSpline
-from services.planner.request.deadline import Deadline
+from gemelo.services.arm.kinematics.kinematics import FramePose, Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.cartesian.tool_path import ToolPath
+from gemelo.services.planner.cartesian.tool_solver import ToolSolver
+from gemelo.services.planner.path.path_curve import CubicSpline
+from gemelo.services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 

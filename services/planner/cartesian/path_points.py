@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.path.path_curve import PathCurve
-from services.planner.request.deadline import Deadline
-from services.planner.timing.path_timing import Law
-from services.planner.timing.profile import MOST_POINTS, States
-from services.planner.verification.verify import Samples, sample_between
+from gemelo.services.planner.path.path_curve import PathCurve
+from gemelo.services.planner.request.deadline import Deadline
+from gemelo.services.planner.timing.path_timing import Law
+from gemelo.services.planner.timing.profile import MOST_POINTS, States
+from gemelo.services.planner.verification.verify import Samples, sample_between
 
 Array = NDArray[np.float64]
 Error = Callable[[float, Array], float]  # [m] that the configuration (n,) at a length is off the path

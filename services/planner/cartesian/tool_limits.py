@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from schemas.planning import PlanCode, Refusal
-from services.planner.request.refusals import PlanRefused
+from gemelo.schemas.planning import PlanCode, Refusal
+from gemelo.services.planner.request.refusals import PlanRefused
 
 
 @dataclass(frozen=True)

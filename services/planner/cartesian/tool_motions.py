@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from schemas.message import Vector
-from schemas.planning import (
+from gemelo.schemas.message import Vector
+from gemelo.schemas.planning import (
     CircularMotion,
     Goal,
     LinearMotion,
@@ -17,22 +17,22 @@ from schemas.planning import (
     Refusal,
     WaypointGoal,
 )
-from services.arm.frames.transforms import IDENTITY, compose
-from services.arm.kinematics.kinematics import FramePose, Kinematics
-from services.arm.model.description import ArmDescription, Joint
-from services.planner.cartesian.arcs import arc_about, arc_through
-from services.planner.cartesian.cartesian_planner import CartesianPath, CartesianPlanner, CartesianTerms
-from services.planner.cartesian.tool_limits import ToolLimits, require_tool_limits
-from services.planner.cartesian.tool_path import ToolPath, polyline
-from services.planner.collision.clearance import PathChecker
-from services.planner.kinematics.goals import Goals
-from services.planner.kinematics.pose_goals import target_of
-from services.planner.kinematics.targets import ROTATION_TOLERANCE, ToolTarget, turn_between
-from services.planner.kinematics.task_space import TaskSpace
-from services.planner.path.path import Start
-from services.planner.request.deadline import NEVER, Deadline
-from services.planner.request.refusals import PlanRefused, malformed
-from services.planner.timing.profile import JointLimits
+from gemelo.services.arm.frames.transforms import IDENTITY, compose
+from gemelo.services.arm.kinematics.kinematics import FramePose, Kinematics
+from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.services.planner.cartesian.arcs import arc_about, arc_through
+from gemelo.services.planner.cartesian.cartesian_planner import CartesianPath, CartesianPlanner, CartesianTerms
+from gemelo.services.planner.cartesian.tool_limits import ToolLimits, require_tool_limits
+from gemelo.services.planner.cartesian.tool_path import ToolPath, polyline
+from gemelo.services.planner.collision.clearance import PathChecker
+from gemelo.services.planner.kinematics.goals import Goals
+from gemelo.services.planner.kinematics.pose_goals import target_of
+from gemelo.services.planner.kinematics.targets import ROTATION_TOLERANCE, ToolTarget, turn_between
+from gemelo.services.planner.kinematics.task_space import TaskSpace
+from gemelo.services.planner.path.path import Start
+from gemelo.services.planner.request.deadline import NEVER, Deadline
+from gemelo.services.planner.request.refusals import PlanRefused, malformed
+from gemelo.services.planner.timing.profile import JointLimits
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import FramePose
-from services.planner.path.path_curve import NO_LENGTH, blending, cut
+from gemelo.services.arm.kinematics.kinematics import FramePose
+from gemelo.services.planner.path.path_curve import NO_LENGTH, blending, cut
 
 Array = NDArray[np.float64]
 

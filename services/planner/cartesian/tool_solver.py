@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import FramePose, Kinematics
-from services.planner.cartesian.tool_path import METRES_PER_RADIAN
+from gemelo.services.arm.kinematics.kinematics import FramePose, Kinematics
+from gemelo.services.planner.cartesian.tool_path import METRES_PER_RADIAN
 
 Array = NDArray[np.float64]
 

@@ -12,13 +12,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from schemas.scene import PlanningScene, SceneObject
-from services.arm.kinematics.kinematics import Kinematics, frame_of_link
-from services.arm.kinematics.self_collisions import driver_of, load_collision_geometry, shape_reach
-from services.arm.model.description import ArmDescription
-from services.planner.collision.scene_shapes import SceneError, is_read_from_a_file, shape_of
-from services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
+from gemelo.schemas.scene import PlanningScene, SceneObject
+from gemelo.services.arm.kinematics.kinematics import Kinematics, frame_of_link
+from gemelo.services.arm.kinematics.self_collisions import driver_of, load_collision_geometry, shape_reach
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.scene_shapes import SceneError, is_read_from_a_file, shape_of
+from gemelo.services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.scene import Contact
-from services.arm.kinematics.self_collisions import LinkPair
-from services.planner.collision.sphere_check import sphere_check
-from services.planner.collision.world import Positions, World
-from services.planner.request.deadline import NEVER
+from gemelo.schemas.scene import Contact
+from gemelo.services.arm.kinematics.self_collisions import LinkPair
+from gemelo.services.planner.collision.sphere_check import sphere_check
+from gemelo.services.planner.collision.world import Positions, World
+from gemelo.services.planner.request.deadline import NEVER
 
 if TYPE_CHECKING:
-    from services.planner.native.native_planner import NativePlanner
+    from gemelo.services.planner.native.native_planner import NativePlanner
 
 Array = NDArray[np.float64]
 

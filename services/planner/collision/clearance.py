@@ -9,8 +9,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.robot import CLEARANCE, LEAST_CLEARANCE
-from services.planner.request.deadline import NEVER, Deadline
+from gemelo.schemas.robot import CLEARANCE, LEAST_CLEARANCE
+from gemelo.services.planner.request.deadline import NEVER, Deadline
 
 __all__ = ["CLEARANCE"]  # the default of what robots and requests may say
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.request.deadline import NEVER, Deadline
+from gemelo.services.planner.request.deadline import NEVER, Deadline
 
 Array = NDArray[np.float64]
 Look = Callable[[Array, Sequence[int]], Array]

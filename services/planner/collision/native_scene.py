@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from schemas.scene import PlanningScene, SceneObject
-from services.arm.model.description import ArmDescription
-from services.planner.collision.scene_shapes import allows, shape_of
-from services.planner.collision_geometry.shapes import Attachment, CollisionShape
+from gemelo.schemas.scene import PlanningScene, SceneObject
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.scene_shapes import allows, shape_of
+from gemelo.services.planner.collision_geometry.shapes import Attachment, CollisionShape
 
 
 def native_scene(

@@ -10,8 +10,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from services.planner.collision.world_geometry import WorldGeometry
-from services.planner.request.deadline import NEVER
+from gemelo.services.planner.collision.world_geometry import WorldGeometry
+from gemelo.services.planner.request.deadline import NEVER
 
 
 class PairDistances:

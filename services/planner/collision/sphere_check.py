@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.self_collisions import LinkPair
-from services.arm.model.description import ArmDescription
-from services.planner.collision.native_scene import native_scene
-from services.planner.collision.world import Positions, World
-from services.planner.native import compiled
-from services.planner.native.compiled import where_built
-from services.planner.request.deadline import CancelFlag, CountedTime
+from gemelo.services.arm.kinematics.self_collisions import LinkPair
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.native_scene import native_scene
+from gemelo.services.planner.collision.world import Positions, World
+from gemelo.services.planner.native import compiled
+from gemelo.services.planner.native.compiled import where_built
+from gemelo.services.planner.request.deadline import CancelFlag, CountedTime
 
 if TYPE_CHECKING:
-    from services.planner.native.native_planner import NativePlanner
+    from gemelo.services.planner.native.native_planner import NativePlanner
 
 Array = NDArray[np.float64]
 

@@ -16,15 +16,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from schemas.scene import Contact, PlanningScene
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.kinematics.self_collisions import LinkPair
-from services.arm.model.description import ArmDescription
-from services.planner.collision.continuous import ContinuousCheck
-from services.planner.collision.pair_distances import PairDistances
-from services.planner.collision.world_geometry import LowerBounds, WorldGeometry
-from services.planner.collision_geometry.coal_shapes import is_inside
-from services.planner.request.deadline import Deadline
+from gemelo.schemas.scene import Contact, PlanningScene
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.kinematics.self_collisions import LinkPair
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.continuous import ContinuousCheck
+from gemelo.services.planner.collision.pair_distances import PairDistances
+from gemelo.services.planner.collision.world_geometry import LowerBounds, WorldGeometry
+from gemelo.services.planner.collision_geometry.coal_shapes import is_inside
+from gemelo.services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.

@@ -10,12 +10,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from schemas.scene import AllowedPair, PlanningScene
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.kinematics.self_collisions import LinkPair
-from services.arm.model.description import ArmDescription
-from services.planner.collision.arm_geometry import Mask, arm_geometry
-from services.planner.collision.scene_shapes import ANY, SceneError
+from gemelo.schemas.scene import AllowedPair, PlanningScene
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.kinematics.self_collisions import LinkPair
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.arm_geometry import Mask, arm_geometry
+from gemelo.services.planner.collision.scene_shapes import ANY, SceneError
 
 Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.

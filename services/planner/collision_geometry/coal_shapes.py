@@ -9,8 +9,8 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.convex_meshes import convex_hull
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
+from gemelo.services.arm.kinematics.convex_meshes import convex_hull
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.

@@ -9,13 +9,20 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.errors import DescriptionError
-from services.arm.kinematics.convex_meshes import corners_of, hull_of, triangles_of
-from services.arm.kinematics.self_collisions import load_collision_geometry
-from services.arm.model.description import ArmDescription
-from services.planner.collision_geometry.coal_shapes import mesh_of
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
-from services.planner.collision_geometry.solids import Box, Capsule, ConvexSolid, Cylinder, Polytope, polytope_around
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.kinematics.convex_meshes import corners_of, hull_of, triangles_of
+from gemelo.services.arm.kinematics.self_collisions import load_collision_geometry
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision_geometry.coal_shapes import mesh_of
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
+from gemelo.services.planner.collision_geometry.solids import (
+    Box,
+    Capsule,
+    ConvexSolid,
+    Cylinder,
+    Polytope,
+    polytope_around,
+)
 
 Array = NDArray[np.float64]
 Form = tuple[ShapeKind, tuple[float, ...], TriangleMesh | None]

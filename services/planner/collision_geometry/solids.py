@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.collision_geometry.shapes import TriangleMesh
+from gemelo.services.planner.collision_geometry.shapes import TriangleMesh
 
 Array = NDArray[np.float64]
 

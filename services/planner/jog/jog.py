@@ -13,15 +13,15 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from schemas.joints import JointState, JointTargets
-from schemas.planning import JogCommand, JogLimit, JogStatus
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.collision.world import World
-from services.planner.jog.braking import Braking
-from services.planner.jog.jog_command import BadJog, JogInterpreter, JogRefused, Wanted, standing_position
-from services.planner.jog.jog_limits import no_command, singularity
-from services.planner.jog.velocity_limiter import VelocityLimiter
+from gemelo.schemas.joints import JointState, JointTargets
+from gemelo.schemas.planning import JogCommand, JogLimit, JogStatus
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.jog.braking import Braking
+from gemelo.services.planner.jog.jog_command import BadJog, JogInterpreter, JogRefused, Wanted, standing_position
+from gemelo.services.planner.jog.jog_limits import no_command, singularity
+from gemelo.services.planner.jog.velocity_limiter import VelocityLimiter
 
 Array = NDArray[np.float64]
 

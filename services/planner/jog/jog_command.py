@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.joints import JointState
-from schemas.planning import JogCommand, JogLimit
-from services.arm.errors import suggestion
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.jog.jog_limits import no_command, singularity, speed_limit
-from services.planner.jog.twist import TwistSolver
-from services.planner.request.refusals import PlanRefused
-from services.planner.request.start_state import resolve_start
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import JogCommand, JogLimit
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.jog.jog_limits import no_command, singularity, speed_limit
+from gemelo.services.planner.jog.twist import TwistSolver
+from gemelo.services.planner.request.refusals import PlanRefused
+from gemelo.services.planner.request.start_state import resolve_start
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import msgspec
 
-from schemas.joints import JointState, JointTargets
-from schemas.message import encode
-from schemas.planning import JogCommand, JogInputs, JogStatus, JogTaken, JogTick, SceneVersion
+from gemelo.schemas.joints import JointState, JointTargets
+from gemelo.schemas.message import encode
+from gemelo.schemas.planning import JogCommand, JogInputs, JogStatus, JogTaken, JogTick, SceneVersion
 
 MOST = 25  # inputs of one message; chosen: half a second of periods
 LARGE = 256 * 1024  # [bytes] of one message; chosen: a command may be as large as any message (bus/wire.py)

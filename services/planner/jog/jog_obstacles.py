@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.planning import JogLimit
-from services.planner.collision.world import World
-from services.planner.jog.braking import Braking
-from services.planner.jog.jog_limits import collision
-from services.planner.jog.nearness import Nearness, Pairs
+from gemelo.schemas.planning import JogLimit
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.jog.braking import Braking
+from gemelo.services.planner.jog.jog_limits import collision
+from gemelo.services.planner.jog.nearness import Nearness, Pairs
 
 Array = NDArray[np.float64]
 

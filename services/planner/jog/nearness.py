@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.self_collisions import LinkPair
-from services.planner.collision.world import World
+from gemelo.services.arm.kinematics.self_collisions import LinkPair
+from gemelo.services.planner.collision.world import World
 
 Array = NDArray[np.float64]
 Pairs = NDArray[np.int_]

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.planning import JogLimit
-from services.arm.model.description import ArmDescription
-from services.planner.collision.world import World
-from services.planner.jog.braking import Braking
-from services.planner.jog.jog_limits import joint_limit
-from services.planner.jog.jog_obstacles import JogObstacles
+from gemelo.schemas.planning import JogLimit
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.jog.braking import Braking
+from gemelo.services.planner.jog.jog_limits import joint_limit
+from gemelo.services.planner.jog.jog_obstacles import JogObstacles
 
 Array = NDArray[np.float64]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.kinematics.descent import Descent
-from services.planner.kinematics.targets import ToolTarget
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.kinematics.descent import Descent
+from gemelo.services.planner.kinematics.targets import ToolTarget
 
 Array = NDArray[np.float64]
 

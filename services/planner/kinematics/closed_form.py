@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.kinematics.joint_ranges import FullTurns
-from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, ToolTarget, any_normal
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.kinematics.joint_ranges import FullTurns
+from gemelo.services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, ToolTarget, any_normal
 
 if TYPE_CHECKING:
     from eaik.pybindings.EAIK import Robot

@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, ToolTarget
-from services.planner.native import compiled
-from services.planner.native.compiled import where_built
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, ToolTarget
+from gemelo.services.planner.native import compiled
+from gemelo.services.planner.native.compiled import where_built
 
 Array = NDArray[np.float64]
 Residual = Callable[[Array], tuple[Array, Array]]  # what is missing at a configuration, and how the joints change that

@@ -7,20 +7,20 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.message import Vector
-from schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
-from services.arm.frames.transforms import IDENTITY, Rigid, from_message
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.collision.clearance import DistanceChecker
-from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.joint_ranges import FullTurns
-from services.planner.kinematics.pose_goals import target_of
-from services.planner.kinematics.task_space import task_space
-from services.planner.kinematics.unreachable import UnreachableRefusals
-from services.planner.request.deadline import Deadline
-from services.planner.request.refusals import beyond_limit, malformed, timed_out, unknown_name
-from services.planner.request.start_state import are_usable, require_parallel, require_unwound
+from gemelo.schemas.message import Vector
+from gemelo.schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
+from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, from_message
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.clearance import DistanceChecker
+from gemelo.services.planner.kinematics.ik import InverseKinematics
+from gemelo.services.planner.kinematics.joint_ranges import FullTurns
+from gemelo.services.planner.kinematics.pose_goals import target_of
+from gemelo.services.planner.kinematics.task_space import task_space
+from gemelo.services.planner.kinematics.unreachable import UnreachableRefusals
+from gemelo.services.planner.request.deadline import Deadline
+from gemelo.services.planner.request.refusals import beyond_limit, malformed, timed_out, unknown_name
+from gemelo.services.planner.request.start_state import are_usable, require_parallel, require_unwound
 
 Array = NDArray[np.float64]
 Start = tuple[float, ...]

@@ -9,15 +9,15 @@ from itertools import chain, islice, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.kinematics.centring import Centring
-from services.planner.kinematics.closed_form import ClosedForm, chain_order, closed_form, completed, turns_about
-from services.planner.kinematics.descent import Attempt, Descent
-from services.planner.kinematics.joint_ranges import nearest_first, one_turn, spread
-from services.planner.kinematics.parallel_axes import ParallelAxes, parallel_axes
-from services.planner.kinematics.targets import ToolTarget
-from services.planner.request.deadline import Deadline
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.kinematics.centring import Centring
+from gemelo.services.planner.kinematics.closed_form import ClosedForm, chain_order, closed_form, completed, turns_about
+from gemelo.services.planner.kinematics.descent import Attempt, Descent
+from gemelo.services.planner.kinematics.joint_ranges import nearest_first, one_turn, spread
+from gemelo.services.planner.kinematics.parallel_axes import ParallelAxes, parallel_axes
+from gemelo.services.planner.kinematics.targets import ToolTarget
+from gemelo.services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import ArmDescription, Joint
-from services.planner.native.compiled import motion, where_built
+from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.services.planner.native.compiled import motion, where_built
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from itertools import islice
 import msgspec
 import numpy as np
 
-from schemas.joints import JointState
-from schemas.planning import (
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import (
     FkRequest,
     FkResponse,
     IkRequest,
@@ -19,16 +19,16 @@ from schemas.planning import (
     ValidityRequest,
     ValidityResponse,
 )
-from schemas.scene import Contact
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.collision.clearance import DistanceChecker, last_free
-from services.planner.collision.world import World
-from services.planner.kinematics.goals import INVALID, Goals, Start
-from services.planner.kinematics.pose_goals import FARTHEST
-from services.planner.request.deadline import NEVER, Deadline
-from services.planner.request.refusals import PlanRefused, beyond_limit, in_collision, malformed, unknown_name
-from services.planner.request.start_state import require_parallel, resolve_start
+from gemelo.schemas.scene import Contact
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.clearance import DistanceChecker, last_free
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.kinematics.goals import INVALID, Goals, Start
+from gemelo.services.planner.kinematics.pose_goals import FARTHEST
+from gemelo.services.planner.request.deadline import NEVER, Deadline
+from gemelo.services.planner.request.refusals import PlanRefused, beyond_limit, in_collision, malformed, unknown_name
+from gemelo.services.planner.request.start_state import require_parallel, resolve_start
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 MOST_SOLUTIONS = 64  # chosen: more than any arm has that is not redundant, and small as a message

@@ -11,11 +11,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.kinematics.kinematics import FramePose, Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.kinematics.closed_form import chain_order
-from services.planner.kinematics.joint_ranges import FullTurns, one_turn
-from services.planner.kinematics.targets import any_normal
+from gemelo.services.arm.kinematics.kinematics import FramePose, Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.kinematics.closed_form import chain_order
+from gemelo.services.planner.kinematics.joint_ranges import FullTurns, one_turn
+from gemelo.services.planner.kinematics.targets import any_normal
 
 Array = NDArray[np.float64]
 

@@ -8,12 +8,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from schemas.message import Vector
-from schemas.planning import PlanCode, PoseGoal
-from services.arm.frames.transforms import IDENTITY, Point, Quaternion, Rigid, compose, inverse, rotate
-from services.arm.kinematics.kinematics import FramePose
-from services.planner.kinematics.targets import AxisPointing, ToolTarget, turn_between
-from services.planner.request.refusals import malformed
+from gemelo.schemas.message import Vector
+from gemelo.schemas.planning import PlanCode, PoseGoal
+from gemelo.services.arm.frames.transforms import IDENTITY, Point, Quaternion, Rigid, compose, inverse, rotate
+from gemelo.services.arm.kinematics.kinematics import FramePose
+from gemelo.services.planner.kinematics.targets import AxisPointing, ToolTarget, turn_between
+from gemelo.services.planner.request.refusals import malformed
 
 Array = NDArray[np.float64]
 

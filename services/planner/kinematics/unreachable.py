@@ -8,18 +8,18 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.message import Vector
-from schemas.planning import PlanCode, PoseGoal, Refusal
-from services.arm.frames.transforms import IDENTITY, Rigid, compose, inverse
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.planner.collision.clearance import DistanceChecker, last_free
-from services.planner.kinematics.ik import InverseKinematics
-from services.planner.kinematics.pose_goals import as_goal
-from services.planner.kinematics.targets import POSITION_TOLERANCE, ToolTarget
-from services.planner.kinematics.task_space import TaskSpace
-from services.planner.request.deadline import Deadline
-from services.planner.request.refusals import PlanRefused, out_of_reach
+from gemelo.schemas.message import Vector
+from gemelo.schemas.planning import PlanCode, PoseGoal, Refusal
+from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose, inverse
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.clearance import DistanceChecker, last_free
+from gemelo.services.planner.kinematics.ik import InverseKinematics
+from gemelo.services.planner.kinematics.pose_goals import as_goal
+from gemelo.services.planner.kinematics.targets import POSITION_TOLERANCE, ToolTarget
+from gemelo.services.planner.kinematics.task_space import TaskSpace
+from gemelo.services.planner.request.deadline import Deadline
+from gemelo.services.planner.request.refusals import PlanRefused, out_of_reach
 
 Array = NDArray[np.float64]
 

@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import ArmDescription
-from services.planner.collision_geometry.link_shapes import link_shapes
-from services.planner.collision_geometry.shapes import Attachment, CollisionShape, ShapeKind, TriangleMesh
-from services.planner.native.binding import motion
-from services.planner.native.chain import frames_of, transform_row
-from services.planner.native.sphere_cover import BULGE, SphereCover, cover_shapes, link_cover, longest_side
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
+from gemelo.services.planner.collision_geometry.shapes import Attachment, CollisionShape, ShapeKind, TriangleMesh
+from gemelo.services.planner.native.binding import motion
+from gemelo.services.planner.native.chain import frames_of, transform_row
+from gemelo.services.planner.native.sphere_cover import BULGE, SphereCover, cover_shapes, link_cover, longest_side
 
 Array = NDArray[np.float64]
 

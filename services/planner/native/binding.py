@@ -8,7 +8,7 @@ class NativeMissing(ImportError):
 
 
 try:
-    from services.planner.native import _motion as motion
+    from gemelo.services.planner.native import _motion as motion
 except ImportError as error:
     raise NativeMissing(
         f"the native planner cannot be loaded ({error}): run `make setup`; where it says that Python.h is missing, "

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.errors import DescriptionError
-from services.arm.kinematics.chain import origin_of
-from services.arm.model.description import ArmDescription
-from services.arm.model.urdf import JointKind, UrdfJoint
-from services.planner.collision_geometry.shapes import matrix_of
+from gemelo.services.arm.errors import DescriptionError
+from gemelo.services.arm.kinematics.chain import origin_of
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.services.planner.collision_geometry.shapes import matrix_of
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from typing import TypeVar, cast
 
 try:
-    from services.planner.native.binding import CancelFlag, motion
-    from services.planner.native.native_planner import NativePlanner
-    from services.planner.native.tool_descent import NativeDescent
+    from gemelo.services.planner.native.binding import CancelFlag, motion
+    from gemelo.services.planner.native.native_planner import NativePlanner
+    from gemelo.services.planner.native.tool_descent import NativeDescent
 except ImportError:  # not built for this interpreter, or hidden
     motion = None  # type: ignore[assignment]
 

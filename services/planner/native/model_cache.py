@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.native.binding import motion
+from gemelo.services.planner.native.binding import motion
 
 try:
     import fcntl

@@ -9,15 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from services.arm.model.description import ArmDescription
-from services.planner.collision_geometry.link_shapes import link_shapes
-from services.planner.collision_geometry.shapes import Attachment, CollisionShape
-from services.planner.native.assembly import Assembly, wide_spheres
-from services.planner.native.binding import CancelFlag as NativeCancelFlag
-from services.planner.native.binding import motion
-from services.planner.native.paths import Effort, FailureReason, FreePath, NoPath
-from services.planner.native.sphere_cover import BULGE, SphereCover
-from services.planner.request.deadline import CancelFlag
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
+from gemelo.services.planner.collision_geometry.shapes import Attachment, CollisionShape
+from gemelo.services.planner.native.assembly import Assembly, wide_spheres
+from gemelo.services.planner.native.binding import CancelFlag as NativeCancelFlag
+from gemelo.services.planner.native.binding import motion
+from gemelo.services.planner.native.paths import Effort, FailureReason, FreePath, NoPath
+from gemelo.services.planner.native.sphere_cover import BULGE, SphereCover
+from gemelo.services.planner.request.deadline import CancelFlag
 
 Array = NDArray[np.float64]
 

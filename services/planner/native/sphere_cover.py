@@ -14,11 +14,11 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.collision_geometry.link_shapes import solid_of
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
-from services.planner.collision_geometry.solids import PROJECTIONS, Capsule, ConvexSolid, Polytope
-from services.planner.native.binding import motion
-from services.planner.native.model_cache import cached_rows
+from gemelo.services.planner.collision_geometry.link_shapes import solid_of
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
+from gemelo.services.planner.collision_geometry.solids import PROJECTIONS, Capsule, ConvexSolid, Polytope
+from gemelo.services.planner.native.binding import motion
+from gemelo.services.planner.native.model_cache import cached_rows
 
 Array = NDArray[np.float64]
 

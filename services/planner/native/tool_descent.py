@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import ArmDescription
-from services.planner.native.binding import motion
-from services.planner.native.chain import frames_of, transform_row
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.native.binding import motion
+from gemelo.services.planner.native.chain import frames_of, transform_row
 
 Array = NDArray[np.float64]
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.native.paths import FreePath, NoPath
-from services.planner.path.path import PathNotFound
-from services.planner.request.deadline import Deadline
-from services.planner.request.refusals import SearchFailure
+from gemelo.services.planner.native.paths import FreePath, NoPath
+from gemelo.services.planner.path.path import PathNotFound
+from gemelo.services.planner.request.deadline import Deadline
+from gemelo.services.planner.request.refusals import SearchFailure
 
 if TYPE_CHECKING:
-    from services.planner.native.native_planner import NativePlanner
+    from gemelo.services.planner.native.native_planner import NativePlanner
 
 Array = NDArray[np.float64]
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import ArmDescription
-from services.planner.path.validity import ValidityChecker
-from services.planner.request.deadline import Deadline
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.path.validity import ValidityChecker
+from gemelo.services.planner.request.deadline import Deadline
 
 if TYPE_CHECKING:
-    from services.planner.native.native_planner import NativePlanner
+    from gemelo.services.planner.native.native_planner import NativePlanner
 
 Array = NDArray[np.float64]
 

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import ArmDescription
-from services.planner.path.path import PathNotFound
-from services.planner.path.roadmap import shortest_path
-from services.planner.path.validity import ValidityChecker
-from services.planner.request.deadline import Deadline, endless
-from services.planner.request.refusals import SearchFailure
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.path.path import PathNotFound
+from gemelo.services.planner.path.roadmap import shortest_path
+from gemelo.services.planner.path.validity import ValidityChecker
+from gemelo.services.planner.request.deadline import Deadline, endless
+from gemelo.services.planner.request.refusals import SearchFailure
 
 Array = NDArray[np.float64]
 

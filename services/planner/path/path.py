@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.request.refusals import SearchFailure
+from gemelo.services.planner.request.refusals import SearchFailure
 
 Array = NDArray[np.float64]
 Start = tuple[float, ...]

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.path.curve import Derivatives
+from gemelo.services.planner.path.curve import Derivatives
 
 Array = NDArray[np.float64]
 

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.planning import PlanCode, Refusal
-from services.arm.model.description import ArmDescription
-from services.planner.collision.checker import CollisionChecker
-from services.planner.path.native_search import NATIVE, native_path
-from services.planner.path.nearby_free import nearby_free
-from services.planner.path.ompl_search import PLANNERS, load_ompl, ompl_corners
-from services.planner.path.path import Path, PathNotFound
-from services.planner.path.smoothing import Rounded, shorten, smooth, smooth_unknown
-from services.planner.path.validity import ValidityChecker
-from services.planner.request.deadline import Deadline, Stopwatch
-from services.planner.request.refusals import PlanRefused, SearchFailure, unknown_name
+from gemelo.schemas.planning import PlanCode, Refusal
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.checker import CollisionChecker
+from gemelo.services.planner.path.native_search import NATIVE, native_path
+from gemelo.services.planner.path.nearby_free import nearby_free
+from gemelo.services.planner.path.ompl_search import PLANNERS, load_ompl, ompl_corners
+from gemelo.services.planner.path.path import Path, PathNotFound
+from gemelo.services.planner.path.smoothing import Rounded, shorten, smooth, smooth_unknown
+from gemelo.services.planner.path.validity import ValidityChecker
+from gemelo.services.planner.request.deadline import Deadline, Stopwatch
+from gemelo.services.planner.request.refusals import PlanRefused, SearchFailure, unknown_name
 
 if TYPE_CHECKING:
-    from services.planner.native.native_planner import NativePlanner
-    from services.planner.native.paths import FreePath
+    from gemelo.services.planner.native.native_planner import NativePlanner
+    from gemelo.services.planner.native.paths import FreePath
 
 Array = NDArray[np.float64]
 

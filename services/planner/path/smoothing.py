@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.path.validity import ValidityChecker
-from services.planner.request.deadline import Deadline
+from gemelo.services.planner.path.validity import ValidityChecker
+from gemelo.services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 

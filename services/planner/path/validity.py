@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.path.curve import spline_rows
+from gemelo.services.planner.path.curve import spline_rows
 
 Array = NDArray[np.float64]
 

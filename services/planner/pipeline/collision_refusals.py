@@ -9,16 +9,16 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.message import Vector
-from schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
-from services.arm.model.description import ArmDescription
-from services.planner.collision.checker import CollisionChecker
-from services.planner.collision.clearance import ROUNDING, first_collision, last_free, usable_clearance
-from services.planner.kinematics.goals import Goals
-from services.planner.path.path import Start
-from services.planner.pipeline.nearest_free import jog_words, nearest_free
-from services.planner.request.deadline import Deadline
-from services.planner.request.refusals import PlanRefused, in_collision
+from gemelo.schemas.message import Vector
+from gemelo.schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.checker import CollisionChecker
+from gemelo.services.planner.collision.clearance import ROUNDING, first_collision, last_free, usable_clearance
+from gemelo.services.planner.kinematics.goals import Goals
+from gemelo.services.planner.path.path import Start
+from gemelo.services.planner.pipeline.nearest_free import jog_words, nearest_free
+from gemelo.services.planner.request.deadline import Deadline
+from gemelo.services.planner.request.refusals import PlanRefused, in_collision
 
 Array = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.model.description import ArmDescription, Joint
-from services.planner.collision.checker import CollisionChecker
-from services.planner.jog.jog_obstacles import CONTACT_SPEED, comes_away
-from services.planner.path.path import Start
-from services.planner.request.deadline import Deadline
+from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.services.planner.collision.checker import CollisionChecker
+from gemelo.services.planner.jog.jog_obstacles import CONTACT_SPEED, comes_away
+from gemelo.services.planner.path.path import Start
+from gemelo.services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from schemas.planning import PlanRequest
-from services.planner.path.path import Start
-from services.planner.pipeline.trajectory_builder import TrajectoryBuilder
-from services.planner.request.deadline import Deadline, Stopwatch
-from services.planner.timing.profile import JointLimits
+from gemelo.schemas.planning import PlanRequest
+from gemelo.services.planner.path.path import Start
+from gemelo.services.planner.pipeline.trajectory_builder import TrajectoryBuilder
+from gemelo.services.planner.request.deadline import Deadline, Stopwatch
+from gemelo.services.planner.timing.profile import JointLimits
 
 
 class PlanningContext(NamedTuple):

@@ -8,20 +8,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from schemas.motion import JointTrajectory
-from schemas.planning import PlanRequest, StepMargin, StepPolicy, Timing
-from services.arm.model.description import ArmDescription
-from services.planner.collision.clearance import PathChecker
-from services.planner.path.curve import TurnsOnTheSpot
-from services.planner.path.path import Array, Path, Start
-from services.planner.path.smoothing import stopping
-from services.planner.request.deadline import NEVER, Deadline, Stopwatch
-from services.planner.request.refusals import PlanRefused, not_verified
-from services.planner.timing.profile import JointLimits, NoProfile, States, stop_and_go, trajectory_of
-from services.planner.timing.time_optimal import time_optimal_path
-from services.planner.timing.timing import timed_path
-from services.planner.verification.feasibility import feasible_scale, require_feasible, slowed
-from services.planner.verification.verify import (
+from gemelo.schemas.motion import JointTrajectory
+from gemelo.schemas.planning import PlanRequest, StepMargin, StepPolicy, Timing
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.clearance import PathChecker
+from gemelo.services.planner.path.curve import TurnsOnTheSpot
+from gemelo.services.planner.path.path import Array, Path, Start
+from gemelo.services.planner.path.smoothing import stopping
+from gemelo.services.planner.request.deadline import NEVER, Deadline, Stopwatch
+from gemelo.services.planner.request.refusals import PlanRefused, not_verified
+from gemelo.services.planner.timing.profile import JointLimits, NoProfile, States, stop_and_go, trajectory_of
+from gemelo.services.planner.timing.time_optimal import time_optimal_path
+from gemelo.services.planner.timing.timing import timed_path
+from gemelo.services.planner.verification.feasibility import feasible_scale, require_feasible, slowed
+from gemelo.services.planner.verification.verify import (
     BadTrajectory,
     aside,
     look,

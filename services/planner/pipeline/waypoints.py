@@ -8,24 +8,24 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.motion import JointTrajectory
-from schemas.planning import FreeMotion, Timing, WaypointGoal
-from services.arm.model.description import ArmDescription
-from services.planner.cartesian.path_points import Run, states_of_runs
-from services.planner.cartesian.tool_motions import points_of
-from services.planner.collision.checker import CollisionChecker
-from services.planner.kinematics.goals import Goals
-from services.planner.path.path import STRAIGHT, PathNotFound, Start
-from services.planner.path.path_curve import RoundedLines, rounded_runs
-from services.planner.path.search import Search
-from services.planner.pipeline.collision_refusals import CollisionRefusals
-from services.planner.pipeline.planning_context import PlanningContext
-from services.planner.pipeline.trajectory_builder import TrajectoryTouches, VerifiedTrajectory
-from services.planner.request.deadline import Deadline
-from services.planner.request.refusals import PlanRefused, no_path_around, not_verified, timed_out
-from services.planner.timing.path_timing import law_along
-from services.planner.timing.profile import NoProfile, stop_and_go, straight_line, trajectory_of
-from services.planner.timing.timing import at_limits
+from gemelo.schemas.motion import JointTrajectory
+from gemelo.schemas.planning import FreeMotion, Timing, WaypointGoal
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.cartesian.path_points import Run, states_of_runs
+from gemelo.services.planner.cartesian.tool_motions import points_of
+from gemelo.services.planner.collision.checker import CollisionChecker
+from gemelo.services.planner.kinematics.goals import Goals
+from gemelo.services.planner.path.path import STRAIGHT, PathNotFound, Start
+from gemelo.services.planner.path.path_curve import RoundedLines, rounded_runs
+from gemelo.services.planner.path.search import Search
+from gemelo.services.planner.pipeline.collision_refusals import CollisionRefusals
+from gemelo.services.planner.pipeline.planning_context import PlanningContext
+from gemelo.services.planner.pipeline.trajectory_builder import TrajectoryTouches, VerifiedTrajectory
+from gemelo.services.planner.request.deadline import Deadline
+from gemelo.services.planner.request.refusals import PlanRefused, no_path_around, not_verified, timed_out
+from gemelo.services.planner.timing.path_timing import law_along
+from gemelo.services.planner.timing.profile import NoProfile, stop_and_go, straight_line, trajectory_of
+from gemelo.services.planner.timing.timing import at_limits
 
 Array = NDArray[np.float64]
 

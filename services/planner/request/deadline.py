@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from schemas.planning import PlanningTimes
-from services.planner.request.refusals import PlanRefused, timed_out
+from gemelo.schemas.planning import PlanningTimes
+from gemelo.services.planner.request.refusals import PlanRefused, timed_out
 
 
 def endless() -> float:

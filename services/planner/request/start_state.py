@@ -5,11 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from schemas.joints import JointState
-from schemas.planning import PlanCode
-from services.arm.model.description import ROUNDING, ArmDescription, Joint
-from services.planner.request.per_arm import once_per_arm
-from services.planner.request.refusals import malformed, moving_start, stale_state, start_beyond_limit, unknown_name
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import PlanCode
+from gemelo.services.arm.model.description import ROUNDING, ArmDescription, Joint
+from gemelo.services.planner.request.per_arm import once_per_arm
+from gemelo.services.planner.request.refusals import (
+    malformed,
+    moving_start,
+    stale_state,
+    start_beyond_limit,
+    unknown_name,
+)
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 STALE_AFTER = 0.5  # [s] without a joint state; standard: as long as the device waits for a heartbeat

@@ -9,14 +9,14 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.frames import Transform
-from schemas.scene import PlaneShape, PlanningScene, SceneObject
-from services.arm.frames.transforms import Rigid, compose, from_message, inverse, rotate
-from services.arm.model.description import ArmDescription
-from services.arm.model.gripper import jaw_edges
-from services.planner.collision.scene_shapes import Folders, SceneError, pose_of, shape_of
-from services.planner.collision_geometry.coal_shapes import geometry_of
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import PlaneShape, PlanningScene, SceneObject
+from gemelo.services.arm.frames.transforms import Rigid, compose, from_message, inverse, rotate
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.gripper import jaw_edges
+from gemelo.services.planner.collision.scene_shapes import Folders, SceneError, pose_of, shape_of
+from gemelo.services.planner.collision_geometry.coal_shapes import geometry_of
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.

@@ -6,12 +6,12 @@ from collections.abc import Iterable
 
 import msgspec
 
-from schemas.scene import AllowedPair, PlaneShape, PlanningScene, SceneObject
-from schemas.scene_meshes import meshes_in
-from services.arm.errors import suggestion
-from services.arm.model.description import ArmDescription
-from services.arm.model.gripper import JAWS
-from services.planner.collision.scene_shapes import ANY, Folders, SceneError, shape_of
+from gemelo.schemas.scene import AllowedPair, PlaneShape, PlanningScene, SceneObject
+from gemelo.schemas.scene_meshes import meshes_in
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.gripper import JAWS
+from gemelo.services.planner.collision.scene_shapes import ANY, Folders, SceneError, shape_of
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 LONGEST_NAME = 64  # chosen: fits into a line of a table and of a refusal

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 
 import msgspec
 
-from schemas.frames import Transform
-from schemas.scene import (
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import (
     AllowedPair,
     PlanningScene,
     SceneAdd,
@@ -25,12 +25,12 @@ from schemas.scene import (
     SceneReplace,
     SceneResize,
 )
-from services.arm.errors import suggestion
-from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
-from services.arm.model.description import ArmDescription
-from services.planner.collision.scene_shapes import SceneError, pose_of
-from services.planner.scene.grasp import Grasp
-from services.planner.scene.scene_check import require_link
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.scene_shapes import SceneError, pose_of
+from gemelo.services.planner.scene.grasp import Grasp
+from gemelo.services.planner.scene.scene_check import require_link
 
 LinkPoses = Callable[
     [], Mapping[str, Transform] | None

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import msgspec
 
-from schemas.scene import PlanningScene
-from schemas.scene_meshes import by_digest, digests_in, mesh_digest, meshes_in, with_meshes
+from gemelo.schemas.scene import PlanningScene
+from gemelo.schemas.scene_meshes import by_digest, digests_in, mesh_digest, meshes_in, with_meshes
 
 FILE = "scene.json"
 MESHES, STL = "scene_meshes", ".stl"  # the folder beside it, and its files, by their digests

@@ -9,28 +9,36 @@ from pathlib import Path
 
 import msgspec
 
-from schemas.gripper import GripperState
-from schemas.joints import JointState
-from schemas.message import Vector
-from schemas.planning import PlanCode, PlanResponse
-from schemas.scene import Contacts, PlanningScene, SceneGrip, SceneMesh, SceneRelease, SceneRequest, SceneResponse
-from schemas.scene_meshes import by_digest, meshes_in
-from schemas.topics import CONTACTS, GRIPPER_STATE, SCENE, SCENE_EDIT, scene_mesh
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.arm.model.gripper import jaw_objects, jaws_apart
-from services.planner.collision.clearance import ROUNDING
-from services.planner.collision.world import World
-from services.planner.scene.answer_log import AnswerLog
-from services.planner.scene.scene_check import usable_part
-from services.planner.scene.scene_file import FILE, DamagedScene, load_scene, put_aside, save_scene
-from services.planner.scene.scene_store import SceneStore, changed, drawn_epoch
-from services.planner.scene.standing import link_poses, standing, version_of
-from services.runtime.bus.wire import Encoded, encoded
-from services.runtime.deployment import project_root
-from services.runtime.node import Node
-from services.runtime.process.unwritten import RETRY
-from services.runtime.topics import Latest
+from gemelo.schemas.gripper import GripperState
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import Vector
+from gemelo.schemas.planning import PlanCode, PlanResponse
+from gemelo.schemas.scene import (
+    Contacts,
+    PlanningScene,
+    SceneGrip,
+    SceneMesh,
+    SceneRelease,
+    SceneRequest,
+    SceneResponse,
+)
+from gemelo.schemas.scene_meshes import by_digest, meshes_in
+from gemelo.schemas.topics import CONTACTS, GRIPPER_STATE, SCENE, SCENE_EDIT, scene_mesh
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.gripper import jaw_objects, jaws_apart
+from gemelo.services.planner.collision.clearance import ROUNDING
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.scene.answer_log import AnswerLog
+from gemelo.services.planner.scene.scene_check import usable_part
+from gemelo.services.planner.scene.scene_file import FILE, DamagedScene, load_scene, put_aside, save_scene
+from gemelo.services.planner.scene.scene_store import SceneStore, changed, drawn_epoch
+from gemelo.services.planner.scene.standing import link_poses, standing, version_of
+from gemelo.services.runtime.bus.wire import Encoded, encoded
+from gemelo.services.runtime.deployment import project_root
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.process.unwritten import RETRY
+from gemelo.services.runtime.topics import Latest
 
 SETTLING = 0.003  # [m] chosen: by less the jaws settle, and plans stay those of the present scene
 PUBLISH_AGAIN = 0.5  # [s] between two answers to the scenes of others; chosen: two planners do not flood each other

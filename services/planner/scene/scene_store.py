@@ -10,15 +10,15 @@ from typing import TypeVar
 
 import msgspec
 
-from schemas.scene import PlanningScene, SceneGrip, SceneRelease, SceneRequest, SceneResponse
-from schemas.scene_meshes import by_digest, edit_with_meshes, meshes_in
-from services.arm.model.description import ArmDescription
-from services.planner.collision.scene_shapes import Folders, SceneError
-from services.planner.scene.grasp import find_grasp
-from services.planner.scene.scene_check import require_scene
-from services.planner.scene.scene_edit import LinkPoses, edited
-from services.runtime.bus.wire import TooLarge, encoded
-from services.runtime.clock import SYSTEM, Clock
+from gemelo.schemas.scene import PlanningScene, SceneGrip, SceneRelease, SceneRequest, SceneResponse
+from gemelo.schemas.scene_meshes import by_digest, edit_with_meshes, meshes_in
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.scene_shapes import Folders, SceneError
+from gemelo.services.planner.scene.grasp import find_grasp
+from gemelo.services.planner.scene.scene_check import require_scene
+from gemelo.services.planner.scene.scene_edit import LinkPoses, edited
+from gemelo.services.runtime.bus.wire import TooLarge, encoded
+from gemelo.services.runtime.clock import SYSTEM, Clock
 
 W = TypeVar("W")
 

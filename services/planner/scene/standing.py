@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from schemas.frames import Transform
-from schemas.joints import JointState
-from schemas.message import Vector
-from schemas.planning import SceneVersion
-from schemas.scene import PlanningScene
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription
-from services.arm.model.gripper import JAWS
-from services.planner.request.start_state import STALE_AFTER
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.message import Vector
+from gemelo.schemas.planning import SceneVersion
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.gripper import JAWS
+from gemelo.services.planner.request.start_state import STALE_AFTER
 
 
 def standing(arm: ArmDescription, state: JointState | None, age: float) -> Vector | None:

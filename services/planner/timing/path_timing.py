@@ -15,10 +15,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.planning import Timing
-from services.planner.path.path_curve import PathCurve
-from services.planner.request.deadline import Deadline
-from services.planner.timing.bounds import (
+from gemelo.schemas.planning import Timing
+from gemelo.services.planner.path.path_curve import PathCurve
+from gemelo.services.planner.request.deadline import Deadline
+from gemelo.services.planner.timing.bounds import (
     PathDerivatives,
     QuantityLimits,
     acceleration_bound,
@@ -26,11 +26,11 @@ from services.planner.timing.bounds import (
     jerk_bound,
     speed_bound,
 )
-from services.planner.timing.profile import JointLimits, NoProfile, require_short
-from services.planner.timing.sections import Section
-from services.planner.timing.time_law import TimeLaw
-from services.planner.timing.time_optimal import time_optimal_law
-from services.planner.timing.timing import stretches_through
+from gemelo.services.planner.timing.profile import JointLimits, NoProfile, require_short
+from gemelo.services.planner.timing.sections import Section
+from gemelo.services.planner.timing.time_law import TimeLaw
+from gemelo.services.planner.timing.time_optimal import time_optimal_law
+from gemelo.services.planner.timing.timing import stretches_through
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.timing.profile import JointLimits
+from gemelo.services.planner.timing.profile import JointLimits
 
 Array = NDArray[np.float64]
 

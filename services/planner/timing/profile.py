@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
-from schemas.motion import JointTrajectory, TrajectoryPoint
-from services.arm.model.description import ArmDescription
-from services.planner.native.compiled import motion, where_built
-from services.planner.request.per_arm import once_per_arm
+from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.planner.native.compiled import motion, where_built
+from gemelo.services.planner.request.per_arm import once_per_arm
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.path.curve import Curve
-from services.planner.timing.bounds import (
+from gemelo.services.planner.path.curve import Curve
+from gemelo.services.planner.timing.bounds import (
     PathDerivatives,
     QuantityLimits,
     acceleration_bound,
@@ -22,7 +22,7 @@ from services.planner.timing.bounds import (
     jerk_bound,
     speed_bound,
 )
-from services.planner.timing.profile import JointLimits
+from gemelo.services.planner.timing.profile import JointLimits
 
 Array = NDArray[np.float64]
 

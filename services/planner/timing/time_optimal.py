@@ -8,11 +8,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.path.curve import Curve
-from services.planner.path.path_curve import PathCurve
-from services.planner.timing.profile import JointLimits, States
-from services.planner.timing.timing import along_runs, states_along
-from services.planner.timing.toppra_speeds import optimal_speeds
+from gemelo.services.planner.path.curve import Curve
+from gemelo.services.planner.path.path_curve import PathCurve
+from gemelo.services.planner.timing.profile import JointLimits, States
+from gemelo.services.planner.timing.timing import along_runs, states_along
+from gemelo.services.planner.timing.toppra_speeds import optimal_speeds
 
 Array = NDArray[np.float64]
 

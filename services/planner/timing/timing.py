@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from ruckig import InputParameter, Trajectory
 
-from services.planner.native.compiled import motion, where_built
-from services.planner.path.curve import Curve, TurnsOnTheSpot, smooth_runs
-from services.planner.timing.peaks import peak_shares
-from services.planner.timing.profile import (
+from gemelo.services.planner.native.compiled import motion, where_built
+from gemelo.services.planner.path.curve import Curve, TurnsOnTheSpot, smooth_runs
+from gemelo.services.planner.timing.peaks import peak_shares
+from gemelo.services.planner.timing.profile import (
     MARGIN,
     MOST_POINTS,
     SPACING,
@@ -28,8 +28,8 @@ from services.planner.timing.profile import (
     solved,
     stop_and_go,
 )
-from services.planner.timing.sections import Section, boundary_speeds, sections_of
-from services.planner.timing.time_law import Stretch, TimeLaw
+from gemelo.services.planner.timing.sections import Section, boundary_speeds, sections_of
+from gemelo.services.planner.timing.time_law import Stretch, TimeLaw
 
 Array = NDArray[np.float64]
 

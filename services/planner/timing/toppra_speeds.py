@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.timing.profile import JointLimits, NoProfile, require_short
+from gemelo.services.planner.timing.profile import JointLimits, NoProfile, require_short
 
 Array = NDArray[np.float64]
 

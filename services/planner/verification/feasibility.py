@@ -15,15 +15,15 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from schemas.motion import JointTrajectory, TrajectoryPoint
-from schemas.planning import PlanCode, Refusal, StepMargin
-from services.arm.model.description import ArmDescription, Joint
-from services.planner.native.compiled import motion, where_built
-from services.planner.request.deadline import NEVER, Deadline
-from services.planner.request.per_arm import once_per_arm
-from services.planner.request.refusals import PlanRefused
-from services.planner.timing.profile import LONGEST, States
-from services.planner.verification.verify import states_at, states_of
+from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
+from gemelo.schemas.planning import PlanCode, Refusal, StepMargin
+from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.services.planner.native.compiled import motion, where_built
+from gemelo.services.planner.request.deadline import NEVER, Deadline
+from gemelo.services.planner.request.per_arm import once_per_arm
+from gemelo.services.planner.request.refusals import PlanRefused
+from gemelo.services.planner.timing.profile import LONGEST, States
+from gemelo.services.planner.verification.verify import states_at, states_of
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

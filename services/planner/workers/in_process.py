@@ -9,17 +9,17 @@ import itertools
 from contextlib import suppress
 from functools import partial
 
-from schemas.planning import PlanCancelResult, PlanCode, PlanProgress, PlanRequest, PlanResponse, Timing
-from services.planner.collision.sphere_check import counted_time
-from services.planner.collision.world import World
-from services.planner.core import Planner
-from services.planner.request.deadline import Stopwatch, endless
-from services.planner.timing.profile import NoProfile
-from services.planner.timing.toppra_speeds import load_toppra
-from services.planner.workers.jobs import Job
-from services.planner.workers.pending_plan import Answer, OnInputs, PendingPlan
-from services.planner.workers.process import nothing
-from services.planner.workers.workers import (
+from gemelo.schemas.planning import PlanCancelResult, PlanCode, PlanProgress, PlanRequest, PlanResponse, Timing
+from gemelo.services.planner.collision.sphere_check import counted_time
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.request.deadline import Stopwatch, endless
+from gemelo.services.planner.timing.profile import NoProfile
+from gemelo.services.planner.timing.toppra_speeds import load_toppra
+from gemelo.services.planner.workers.jobs import Job
+from gemelo.services.planner.workers.pending_plan import Answer, OnInputs, PendingPlan
+from gemelo.services.planner.workers.process import nothing
+from gemelo.services.planner.workers.workers import (
     AGAIN,
     CHANGING,
     CHANGING_REMEDY,
@@ -33,7 +33,7 @@ from services.planner.workers.workers import (
     objection_to,
     progress_of,
 )
-from services.runtime.clock import Clock
+from gemelo.services.runtime.clock import Clock
 
 # Measured: the time of a long native search between two questions whether its time is over, and how many times as long
 # it is in Python, where a question stands before whole checks.

@@ -7,9 +7,9 @@ from typing import IO, TypeVar
 
 import msgspec
 
-from schemas.joints import JointState
-from schemas.planning import PlanPhase, PlanRequest, PlanResponse
-from schemas.scene import PlanningScene
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import PlanPhase, PlanRequest, PlanResponse
+from gemelo.schemas.scene import PlanningScene
 
 T = TypeVar("T")
 LENGTH = struct.Struct("<I")

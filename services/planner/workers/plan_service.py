@@ -7,15 +7,23 @@ from typing import Protocol
 
 from msgspec.structs import replace
 
-from schemas.planning import PlanCancel, PlanCancelResult, PlanCode, PlanInputs, PlanProgress, PlanRequest, PlanResponse
-from schemas.topics import PLAN, PLAN_CANCEL, PLAN_INPUTS, PLAN_PROGRESS, PLANNED_PATH
-from services.planner.core import Planner
-from services.planner.request.refusals import too_large
-from services.planner.scene.scene_keeper import SceneKeeper
-from services.planner.workers.pending_plan import Answer, OnInputs
-from services.runtime.bus.wire import TooLarge, encoded
-from services.runtime.node import Node
-from services.runtime.requests.server import Pending
+from gemelo.schemas.planning import (
+    PlanCancel,
+    PlanCancelResult,
+    PlanCode,
+    PlanInputs,
+    PlanProgress,
+    PlanRequest,
+    PlanResponse,
+)
+from gemelo.schemas.topics import PLAN, PLAN_CANCEL, PLAN_INPUTS, PLAN_PROGRESS, PLANNED_PATH
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.request.refusals import too_large
+from gemelo.services.planner.scene.scene_keeper import SceneKeeper
+from gemelo.services.planner.workers.pending_plan import Answer, OnInputs
+from gemelo.services.runtime.bus.wire import TooLarge, encoded
+from gemelo.services.runtime.node import Node
+from gemelo.services.runtime.requests.server import Pending
 
 
 class PlanMaker(Protocol):

@@ -12,9 +12,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TypeVar
 
-from schemas.planning import PlanPhase, PlanResponse, Timing
-from schemas.scene import PlanningScene
-from services.planner.workers.jobs import (
+from gemelo.schemas.planning import PlanPhase, PlanResponse, Timing
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.planner.workers.jobs import (
     REPORTS,
     Ask,
     At,
@@ -28,12 +28,12 @@ from services.planner.workers.jobs import (
     receive,
     send,
 )
-from services.planner.workers.pending_plan import Cancelled, PendingPlan
+from gemelo.services.planner.workers.pending_plan import Cancelled, PendingPlan
 
 START = 60.0  # [s] in which a worker must start, have a scene, or import toppra; chosen: cold small computers are slow
 STOPS_WITHIN = 0.2  # [s] from a cancel to the answer of a process that lives on; chosen: else it is ended
 TICK = 0.05  # [s] between two looks whether the plan is still wanted; chosen: short beside STOPS_WITHIN
-CHILD = "services.planner.workers.worker"
+CHILD = "gemelo.services.planner.workers.worker"
 
 R = TypeVar("R", Ready, Shown, Planned)
 

@@ -15,15 +15,15 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import IO
 
-from schemas.planning import PlanPhase, PlanResponse, Refusal, Timing
-from services.arm.model.description import load_arm
-from services.planner.collision.sphere_check import cancel_flag
-from services.planner.collision.world import World
-from services.planner.core import Planner
-from services.planner.request.deadline import Stopwatch
-from services.planner.timing.profile import NoProfile
-from services.planner.timing.toppra_speeds import load_toppra
-from services.planner.workers.jobs import (
+from gemelo.schemas.planning import PlanPhase, PlanResponse, Refusal, Timing
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.collision.sphere_check import cancel_flag
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.request.deadline import Stopwatch
+from gemelo.services.planner.timing.profile import NoProfile
+from gemelo.services.planner.timing.toppra_speeds import load_toppra
+from gemelo.services.planner.workers.jobs import (
     ORDERS,
     Ask,
     At,
@@ -37,7 +37,7 @@ from services.planner.workers.jobs import (
     receive,
     send,
 )
-from services.runtime.process.priority import step_behind
+from gemelo.services.runtime.process.priority import step_behind
 
 
 class AtHand:
@@ -66,7 +66,7 @@ class Answers:
 
 
 def main() -> None:
-    """`python -m services.planner.workers.worker ROBOT_FOLDER PROJECT_FOLDER`."""
+    """`python -m gemelo.services.planner.workers.worker ROBOT_FOLDER PROJECT_FOLDER`."""
     step_behind()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the planner, which closes this one's input
     answers = Answers(os.fdopen(os.dup(1), "wb"))

@@ -12,8 +12,8 @@ from queue import Empty, SimpleQueue
 
 from msgspec.structs import replace
 
-from schemas.joints import JointState
-from schemas.planning import (
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import (
     PlanCancelResult,
     PlanCode,
     PlanInputs,
@@ -22,12 +22,12 @@ from schemas.planning import (
     PlanResponse,
     Refusal,
 )
-from schemas.scene import PlanningScene
-from services.arm.model.gripper import JAWS
-from services.planner.core import LONGEST
-from services.planner.workers.jobs import Job
-from services.planner.workers.pending_plan import Answer, Cancelled, OnInputs, PendingPlan
-from services.planner.workers.process import Late, PlannerProcess, WorkerDied, nothing
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.arm.model.gripper import JAWS
+from gemelo.services.planner.core import LONGEST
+from gemelo.services.planner.workers.jobs import Job
+from gemelo.services.planner.workers.pending_plan import Answer, Cancelled, OnInputs, PendingPlan
+from gemelo.services.planner.workers.process import Late, PlannerProcess, WorkerDied, nothing
 
 MOST = 2  # processes; chosen: as many as small computers have cores for it
 LATEST = 0.08  # of the allowed time, beyond it, when the plan is answered whatever its process does; chosen: little

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import services
-from services.arm.errors import DescriptionError
+from gemelo.services.arm.errors import DescriptionError
 
 LONGEST = 30.0  # [s] of one expansion, chosen: the largest published robots take 2
 LARGEST_FILE = 20_000_000  # [bytes] chosen
@@ -31,7 +31,7 @@ MOST_NOTES = 20  # chosen
 PACKAGE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 MARKS_OF_A_PACKAGE = ("package.xml", "urdf", "xacro", "meshes")
 SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/opt", "/etc/ld.so.cache", "/etc/ld.so.conf")
-MODULE = "services.robot_import.xacro_sandbox.process"
+MODULE = "gemelo.services.robot_import.xacro_sandbox.process"
 Find = Callable[[str], Path]
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from services.runtime.actions.client import ActionClient
-from services.runtime.actions.goal_handle import ActionOutcome, GoalHandle
-from services.runtime.actions.server import ActionServer, GoalDecision, accept, refuse
+from gemelo.services.runtime.actions.client import ActionClient
+from gemelo.services.runtime.actions.goal_handle import ActionOutcome, GoalHandle
+from gemelo.services.runtime.actions.server import ActionServer, GoalDecision, accept, refuse
 
 __all__ = ["ActionClient", "ActionOutcome", "ActionServer", "GoalDecision", "GoalHandle", "accept", "refuse"]

@@ -7,16 +7,16 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from schemas.actions import CancelRequest, GoalFeedback, GoalRequest, GoalStatuses, ResultRequest
-from schemas.message import BadMessage, Message, decode, encode
-from schemas.topics import Action, Request, Topic
-from services.runtime.actions import keys as keys
-from services.runtime.actions.goal_handle import GoalHandle
-from services.runtime.bus.interface import Bus
-from services.runtime.clock import token
-from services.runtime.errors import GoalRefused, NoAnswer
-from services.runtime.loop.loop import Loop
-from services.runtime.requests import client as requests
+from gemelo.schemas.actions import CancelRequest, GoalFeedback, GoalRequest, GoalStatuses, ResultRequest
+from gemelo.schemas.message import BadMessage, Message, decode, encode
+from gemelo.schemas.topics import Action, Request, Topic
+from gemelo.services.runtime.actions import keys as keys
+from gemelo.services.runtime.actions.goal_handle import GoalHandle
+from gemelo.services.runtime.bus.interface import Bus
+from gemelo.services.runtime.clock import token
+from gemelo.services.runtime.errors import GoalRefused, NoAnswer
+from gemelo.services.runtime.loop.loop import Loop
+from gemelo.services.runtime.requests import client as requests
 
 G = TypeVar("G", bound=Message)
 F = TypeVar("F", bound=Message)

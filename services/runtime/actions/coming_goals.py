@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from typing import NamedTuple
 
-from schemas.actions import GoalRequest, GoalResponse
-from services.runtime.errors import RequestRefused
-from services.runtime.loop.task_queue import Task
-from services.runtime.requests.server import Pending
+from gemelo.schemas.actions import GoalRequest, GoalResponse
+from gemelo.services.runtime.errors import RequestRefused
+from gemelo.services.runtime.loop.task_queue import Task
+from gemelo.services.runtime.requests.server import Pending
 
 MOST_BYTES = 64 * 1024 * 1024  # of all that wait; chosen: two of the largest goals (bus/wire.py)
 

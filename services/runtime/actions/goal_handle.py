@@ -7,15 +7,22 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from schemas.actions import CancelRequest, CancelResponse, GoalStatusCode, GoalStatuses, ResultRequest, ResultResponse
-from schemas.message import BadMessage, Message, decode, encode
-from schemas.topics import Action, Request
-from services.runtime.actions import keys as keys
-from services.runtime.bus.interface import Bus, BusReply
-from services.runtime.bus.wire import schema_of
-from services.runtime.errors import NoAnswer, ServerLost
-from services.runtime.loop.loop import Loop
-from services.runtime.loop.task_queue import Task
+from gemelo.schemas.actions import (
+    CancelRequest,
+    CancelResponse,
+    GoalStatusCode,
+    GoalStatuses,
+    ResultRequest,
+    ResultResponse,
+)
+from gemelo.schemas.message import BadMessage, Message, decode, encode
+from gemelo.schemas.topics import Action, Request
+from gemelo.services.runtime.actions import keys as keys
+from gemelo.services.runtime.bus.interface import Bus, BusReply
+from gemelo.services.runtime.bus.wire import schema_of
+from gemelo.services.runtime.errors import NoAnswer, ServerLost
+from gemelo.services.runtime.loop.loop import Loop
+from gemelo.services.runtime.loop.task_queue import Task
 
 F = TypeVar("F", bound=Message)
 R = TypeVar("R", bound=Message)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from schemas.actions import (
+from gemelo.schemas.actions import (
     NIL,
     GoalResponse,
     GoalStatus,
@@ -19,8 +19,8 @@ from schemas.actions import (
     ResultRequest,
     ResultResponse,
 )
-from services.runtime.clock import SYSTEM, Clock
-from services.runtime.requests.server import Pending
+from gemelo.services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.requests.server import Pending
 
 KEPT = 120.0  # [s] that a result can be asked for after the end
 MAX_KEPT = 256  # goals

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.actions import (
+from gemelo.schemas.actions import (
     CancelRequest,
     CancelResponse,
     GoalEnd,
@@ -13,8 +13,8 @@ from schemas.actions import (
     ResultRequest,
     ResultResponse,
 )
-from schemas.message import Message
-from schemas.topics import Action, Delivery, Request, Topic
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import Action, Delivery, Request, Topic
 
 AnyAction = Action[Message, Message, Message]
 

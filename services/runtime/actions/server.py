@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from schemas.actions import (
+from gemelo.schemas.actions import (
     CancelRequest,
     CancelResponse,
     GoalEnd,
@@ -18,18 +18,18 @@ from schemas.actions import (
     GoalStatusCode,
     GoalStatuses,
 )
-from schemas.message import BadMessage, Message, decode, encode
-from schemas.topics import Action
-from services.runtime.actions import keys as keys
-from services.runtime.actions.coming_goals import ComingGoals
-from services.runtime.actions.goal_registry import GoalRecord, GoalRegistry
-from services.runtime.bus.identity import is_token
-from services.runtime.client_watch import ClientWatch
-from services.runtime.clock import SYSTEM, Clock
-from services.runtime.errors import RequestRefused
-from services.runtime.loop.task_queue import Task
-from services.runtime.requests.server import Pending, RequestServer, shortened
-from services.runtime.topics import Publisher, Warn
+from gemelo.schemas.message import BadMessage, Message, decode, encode
+from gemelo.schemas.topics import Action
+from gemelo.services.runtime.actions import keys as keys
+from gemelo.services.runtime.actions.coming_goals import ComingGoals
+from gemelo.services.runtime.actions.goal_registry import GoalRecord, GoalRegistry
+from gemelo.services.runtime.bus.identity import is_token
+from gemelo.services.runtime.client_watch import ClientWatch
+from gemelo.services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.errors import RequestRefused
+from gemelo.services.runtime.loop.task_queue import Task
+from gemelo.services.runtime.requests.server import Pending, RequestServer, shortened
+from gemelo.services.runtime.topics import Publisher, Warn
 
 G = TypeVar("G", bound=Message)
 F = TypeVar("F", bound=Message)

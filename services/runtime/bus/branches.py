@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 
-from schemas.roles import BY_EVERY_NODE, BY_HAND, ROLE_OF_NODE, ROLES
+from gemelo.schemas.roles import BY_EVERY_NODE, BY_HAND, ROLE_OF_NODE, ROLES
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")  # of a node
 PRINCIPAL = re.compile(r"[a-z0-9][a-z0-9_-]*(?:\.[a-z0-9][a-z0-9_-]*)?")

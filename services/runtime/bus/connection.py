@@ -8,13 +8,13 @@ import socket
 import ssl
 import time
 
-from schemas.deployment import RouterSection
-from services.credentials.private_files import require_private
-from services.runtime.bus.interface import Bus
-from services.runtime.deployment import when_silent
-from services.runtime.errors import BusError
-from services.runtime.process.readiness import tell_alive
-from services.runtime.process.shutdown import ShutdownRequest
+from gemelo.schemas.deployment import RouterSection
+from gemelo.services.credentials.private_files import require_private
+from gemelo.services.runtime.bus.interface import Bus
+from gemelo.services.runtime.deployment import when_silent
+from gemelo.services.runtime.errors import BusError
+from gemelo.services.runtime.process.readiness import tell_alive
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
 
 RETRY_PERIOD = 0.1  # [s]
 HANDSHAKE = 1.0  # [s] for the router to say why it refuses a certificate
@@ -23,7 +23,7 @@ SILENT_WAIT = 3.0  # [s] of waiting that are not worth a word: all processes sta
 
 def connect(router: RouterSection, robot: str, log: logging.Logger, stop: ShutdownRequest) -> Bus:
     """A session of the router; ends the process cleanly where it is asked to stop while waiting."""
-    from services.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus, router_answers  # slow to load: zenoh
+    from gemelo.services.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus, router_answers  # slow to load: zenoh
 
     require_certificate(router)
     is_said = False
@@ -51,7 +51,7 @@ def connect(router: RouterSection, robot: str, log: logging.Logger, stop: Shutdo
 
 def await_router(router: RouterSection, log: logging.Logger, stop: ShutdownRequest) -> None:
     """Returns when something listens at the router's address; ends the process where it is asked to stop meanwhile."""
-    from services.runtime.bus.zenoh_bus import router_answers  # slow to load: zenoh
+    from gemelo.services.runtime.bus.zenoh_bus import router_answers  # slow to load: zenoh
 
     started, is_said = time.monotonic(), False
     while not router_answers(router.host, router.port):

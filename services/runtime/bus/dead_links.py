@@ -19,8 +19,8 @@ from contextlib import suppress
 
 import zenoh
 
-from services.runtime.bus.zenoh_config import LEASE_MS
-from services.runtime.deployment import is_loopback
+from gemelo.services.runtime.bus.zenoh_config import LEASE_MS
+from gemelo.services.runtime.deployment import is_loopback
 
 # Shorter than the lease, which a peer may count from its last sign of life, a quarter of it before the link died.
 UNACKNOWLEDGED_MS = LEASE_MS * 3 // 4

@@ -10,10 +10,10 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from services.runtime.bus.branches import LOCAL, NAME, PRINCIPAL, address_of, principal_of
-from services.runtime.bus.interface import Bus
-from services.runtime.clock import SYSTEM, Clock
-from services.runtime.errors import NodeNameTaken
+from gemelo.services.runtime.bus.branches import LOCAL, NAME, PRINCIPAL, address_of, principal_of
+from gemelo.services.runtime.bus.interface import Bus
+from gemelo.services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.errors import NodeNameTaken
 
 STALE_AFTER = 1.5  # [s] within which the token of a frozen process vanishes (the lease is 1 s)
 ALIVE, IDENTITY = "@alive", "@id"

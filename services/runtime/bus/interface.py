@@ -11,8 +11,8 @@ from typing import Protocol
 
 import msgspec
 
-from schemas.topics import Delivery
-from services.runtime.clock import Clock
+from gemelo.schemas.topics import Delivery
+from gemelo.services.runtime.clock import Clock
 
 ENCODING = "application/msgpack"  # the schema's name follows after a semicolon
 

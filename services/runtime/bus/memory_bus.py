@@ -5,9 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 
-from schemas.topics import Delivery
-from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Declaration, IsFirst, Query, never
-from services.runtime.bus.memory_network import (
+from gemelo.schemas.topics import Delivery
+from gemelo.services.runtime.bus.interface import UNREAD, Arrival, BusReply, Declaration, IsFirst, Query, never
+from gemelo.services.runtime.bus.memory_network import (
     MemoryNetwork,
     MemoryPublication,
     MemoryQuery,
@@ -17,8 +17,8 @@ from services.runtime.bus.memory_network import (
     MemoryWatch,
     matches,
 )
-from services.runtime.bus.pace import Pace
-from services.runtime.clock import Clock
+from gemelo.services.runtime.bus.pace import Pace
+from gemelo.services.runtime.clock import Clock
 
 __all__ = ["MemoryBus", "MemoryNetwork"]
 

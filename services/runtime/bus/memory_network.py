@@ -13,10 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from schemas.topics import Delivery
-from services.runtime.bus.branches import LOCAL
-from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Query
-from services.runtime.clock import SYSTEM, Clock
+from gemelo.schemas.topics import Delivery
+from gemelo.services.runtime.bus.branches import LOCAL
+from gemelo.services.runtime.bus.interface import UNREAD, Arrival, BusReply, Query
+from gemelo.services.runtime.clock import SYSTEM, Clock
 
 KEPT = 1024  # messages that wait for the network to come back, as in Zenoh's publishers' cache
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from services.runtime.bus.identity import Identity, instance_of, is_token
+from gemelo.services.runtime.bus.identity import Identity, instance_of, is_token
 
 # A second node that starts declares its token for a moment before it sees the first one.
 STAYS = 1.0  # [s] that a newer token must live; chosen: five times the longest such moment

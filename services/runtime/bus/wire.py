@@ -10,15 +10,15 @@ from typing import Generic, TypeVar
 
 import msgspec
 
-from schemas.actions import GoalRequest
-from schemas.camera import CameraImage
-from schemas.device import GatewayInputs
-from schemas.frames import RobotDescription
-from schemas.message import BadMessage, Message, decode, encode
-from schemas.planning import PlanRequest, PlanResponse
-from schemas.scene import PlanningScene, SceneMesh, SceneRequest
-from schemas.system import Exchange
-from services.runtime.bus.interface import Arrival
+from gemelo.schemas.actions import GoalRequest
+from gemelo.schemas.camera import CameraImage
+from gemelo.schemas.device import GatewayInputs
+from gemelo.schemas.frames import RobotDescription
+from gemelo.schemas.message import BadMessage, Message, decode, encode
+from gemelo.schemas.planning import PlanRequest, PlanResponse
+from gemelo.schemas.scene import PlanningScene, SceneMesh, SceneRequest
+from gemelo.schemas.system import Exchange
+from gemelo.services.runtime.bus.interface import Arrival
 
 M = TypeVar("M", bound=Message)
 

@@ -19,14 +19,14 @@ import zenoh
 import zenoh.ext as zx
 from zenoh.handlers import Callback
 
-from schemas.actions import GoalEnd
-from schemas.deployment import RouterSection
-from schemas.device import DeviceEvent, GatewayInputs
-from schemas.planning import AnswerInputs, PlanInputs
-from schemas.system import Exchange, LogRecord, NodeStatistics
-from schemas.topics import Delivery
-from services.credentials.common_name import common_name
-from services.runtime.bus.branches import (
+from gemelo.schemas.actions import GoalEnd
+from gemelo.schemas.deployment import RouterSection
+from gemelo.schemas.device import DeviceEvent, GatewayInputs
+from gemelo.schemas.planning import AnswerInputs, PlanInputs
+from gemelo.schemas.system import Exchange, LogRecord, NodeStatistics
+from gemelo.schemas.topics import Delivery
+from gemelo.services.credentials.common_name import common_name
+from gemelo.services.runtime.bus.branches import (
     LOCAL,
     asked_under,
     is_of_many,
@@ -35,12 +35,12 @@ from services.runtime.bus.branches import (
     writer_at,
     written_under,
 )
-from services.runtime.bus.dead_links import end_dead_links
-from services.runtime.bus.interface import UNREAD, Arrival, BusReply, IsFirst, Query, never
-from services.runtime.bus.pace import Pace
-from services.runtime.bus.recognition import Recognition
-from services.runtime.bus.zenoh_config import client_config
-from services.runtime.bus.zenoh_declarations import (
+from gemelo.services.runtime.bus.dead_links import end_dead_links
+from gemelo.services.runtime.bus.interface import UNREAD, Arrival, BusReply, IsFirst, Query, never
+from gemelo.services.runtime.bus.pace import Pace
+from gemelo.services.runtime.bus.recognition import Recognition
+from gemelo.services.runtime.bus.zenoh_config import client_config
+from gemelo.services.runtime.bus.zenoh_declarations import (
     MAX_SECRET,
     ServerMonitor,
     ZenohDeclaration,
@@ -54,8 +54,8 @@ from services.runtime.bus.zenoh_declarations import (
     schema_in,
     signature_in,
 )
-from services.runtime.clock import SYSTEM
-from services.runtime.errors import BusError
+from gemelo.services.runtime.clock import SYSTEM
+from gemelo.services.runtime.errors import BusError
 
 # Messages of an EVERY key that survive while the router is away: chosen, a minute of what is said most often (commands
 # and their acknowledgements, 22 a second). What is said less often fills as many only within the hour, and a process

@@ -6,8 +6,8 @@ import json
 
 import zenoh
 
-from schemas.deployment import RouterSection
-from services.runtime.bus.wire import LARGEST
+from gemelo.schemas.deployment import RouterSection
+from gemelo.services.runtime.bus.wire import LARGEST
 
 LEASE_MS = 1000  # a frozen or unplugged peer is seen after this
 OPEN_TIMEOUT_MS = 1000  # a router that takes a connection but does not answer (frozen) is tried anew after this

@@ -14,8 +14,8 @@ from typing import Any, Protocol
 import zenoh
 from zenoh.handlers import FifoChannel, Handler, RingChannel
 
-from services.runtime.bus.branches import LOCAL, asker_at, served_under
-from services.runtime.bus.interface import ENCODING, Arrival, IsFirst, never
+from gemelo.services.runtime.bus.branches import LOCAL, asker_at, served_under
+from gemelo.services.runtime.bus.interface import ENCODING, Arrival, IsFirst, never
 
 MAX_SECRET = 32  # [bytes] of what a session says of itself
 CLIENT_BYTES = 16  # of a client's name; chosen: as unguessable as the secret

@@ -6,8 +6,8 @@ import logging
 import traceback
 from collections import Counter
 
-from schemas.errors import ConfigurationError
-from services.runtime.errors import BusError
+from gemelo.schemas.errors import ConfigurationError
+from gemelo.services.runtime.errors import BusError
 
 ENDS = (BusError, ConfigurationError, BrokenPipeError)  # what says that the process itself cannot go on
 MOST_PLACES = 64  # in the code that are counted apart; chosen: more than a broken service has

@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from services.runtime.clock import SYSTEM, Clock
-from services.runtime.loop.task_queue import Task, TaskQueue
-from services.runtime.process.shutdown import ShutdownRequest
+from gemelo.services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.loop.task_queue import Task, TaskQueue
+from gemelo.services.runtime.process.shutdown import ShutdownRequest
 
 
 @dataclass

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Protocol
 
-from services.runtime.bus.interface import Arrival
-from services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.bus.interface import Arrival
+from gemelo.services.runtime.clock import SYSTEM, Clock
 
 EVERY_CAPACITY = 4096  # messages
 EVERY_BYTES = 96 * 1024 * 1024  # chosen: two of the largest messages (bus/wire.py) fit

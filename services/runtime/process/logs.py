@@ -7,9 +7,9 @@ import sys
 import time
 from collections.abc import Callable
 
-from schemas.plain_text import escaped
-from schemas.system import LogLevel, LogRecord
-from services.runtime.clock import SYSTEM, Clock
+from gemelo.schemas.plain_text import escaped
+from gemelo.schemas.system import LogLevel, LogRecord
+from gemelo.services.runtime.clock import SYSTEM, Clock
 
 LEVELS = ("debug", "info", "warning", "error")
 MAX_TEXT = 8_000  # characters of one record on the bus

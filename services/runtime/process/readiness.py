@@ -18,8 +18,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from services.runtime.process.beat_socket import BeatSocket, newest_beat
-from services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.services.runtime.process.beat_socket import BeatSocket, newest_beat
+from gemelo.services.runtime.process.unwritten import UnwrittenFiles
 
 GOES_ON = 5  # [s] that the word for being alive counts
 ALIVE = f"WATCHDOG=1\nEXTEND_TIMEOUT_USEC={GOES_ON}000000"

@@ -5,14 +5,14 @@ from __future__ import annotations
 from queue import Empty, SimpleQueue
 from typing import Generic, TypeVar
 
-from schemas.message import BadMessage, Message
-from schemas.system import Failure
-from schemas.topics import Request
-from services.runtime.bus.interface import UNREAD, Arrival, Bus, BusReply
-from services.runtime.bus.wire import TooLarge, from_arrival, schema_of, to_payload
-from services.runtime.errors import TOO_LARGE, NoAnswer, RequestRefused
-from services.runtime.loop.task_queue import Task
-from services.runtime.requests.limits import DEBT, OF_A_CLIENT
+from gemelo.schemas.message import BadMessage, Message
+from gemelo.schemas.system import Failure
+from gemelo.schemas.topics import Request
+from gemelo.services.runtime.bus.interface import UNREAD, Arrival, Bus, BusReply
+from gemelo.services.runtime.bus.wire import TooLarge, from_arrival, schema_of, to_payload
+from gemelo.services.runtime.errors import TOO_LARGE, NoAnswer, RequestRefused
+from gemelo.services.runtime.loop.task_queue import Task
+from gemelo.services.runtime.requests.limits import DEBT, OF_A_CLIENT
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.system import Exchange
-from schemas.topics import Delivery, Request, Topic
+from gemelo.schemas.system import Exchange
+from gemelo.schemas.topics import Delivery, Request, Topic
 
 PREFIX = "@request/"
 

@@ -12,8 +12,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from services.runtime.bus.pace import Rate, TokenBucket
-from services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.bus.pace import Rate, TokenBucket
+from gemelo.services.runtime.clock import SYSTEM, Clock
 
 # Chosen. A panel and its programs ask some ten times a second; a script that only asks goes by its pace (bus/pace.py),
 # which stays below. A request that is dropped costs its server some 20 us, one that is answered 300.

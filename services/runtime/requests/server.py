@@ -11,18 +11,18 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import msgspec
 
-from schemas.actions import NIL
-from schemas.message import BadMessage, Message, decode, encode
-from schemas.system import Exchange, Failure, TopicStatistics
-from schemas.topics import Request
-from services.runtime.bus.interface import Arrival, Bus, Query, never
-from services.runtime.bus.wire import Encoded, TooLarge, encoded, from_arrival, schema_of, to_payload
-from services.runtime.clock import SYSTEM, Clock
-from services.runtime.errors import TOO_LARGE, RequestRefused
-from services.runtime.loop.task_queue import Task, TaskQueue
-from services.runtime.requests.limits import OF_A_CLIENT, RequestRates, WaitingRequests
-from services.runtime.requests.overtaken import OvertakenRequests
-from services.runtime.topics import Warn
+from gemelo.schemas.actions import NIL
+from gemelo.schemas.message import BadMessage, Message, decode, encode
+from gemelo.schemas.system import Exchange, Failure, TopicStatistics
+from gemelo.schemas.topics import Request
+from gemelo.services.runtime.bus.interface import Arrival, Bus, Query, never
+from gemelo.services.runtime.bus.wire import Encoded, TooLarge, encoded, from_arrival, schema_of, to_payload
+from gemelo.services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.errors import TOO_LARGE, RequestRefused
+from gemelo.services.runtime.loop.task_queue import Task, TaskQueue
+from gemelo.services.runtime.requests.limits import OF_A_CLIENT, RequestRates, WaitingRequests
+from gemelo.services.runtime.requests.overtaken import OvertakenRequests
+from gemelo.services.runtime.topics import Warn
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)

@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from schemas.roles import ROLE_OF_NODE
-from services.stepper_gateway.goals.rejections import invalid
+from gemelo.schemas.roles import ROLE_OF_NODE
+from gemelo.services.stepper_gateway.goals.rejections import invalid
 
 LOCAL = "local"  # the principal of a node without a certificate
 

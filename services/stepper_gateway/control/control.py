@@ -11,11 +11,11 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from schemas.control import ControlGive, ControlJoin, ControlState, ControlTake
-from schemas.system import LogLevel
-from services.stepper_gateway.control.clients import ControlClient, MotionCaller, client_of
-from services.stepper_gateway.goals.rejections import invalid
-from services.stepper_gateway.moment import Moment
+from gemelo.schemas.control import ControlGive, ControlJoin, ControlState, ControlTake
+from gemelo.schemas.system import LogLevel
+from gemelo.services.stepper_gateway.control.clients import ControlClient, MotionCaller, client_of
+from gemelo.services.stepper_gateway.goals.rejections import invalid
+from gemelo.services.stepper_gateway.moment import Moment
 
 MOST_NAME = 40  # characters of a holder's name; chosen: fits beside a button of the page
 SECRET = (32, 128)  # characters of a secret, at least and at most; chosen: 128 bits in hexadecimal digits, and room

@@ -7,21 +7,21 @@ from typing import Protocol
 
 from msgspec.structs import replace
 
-from schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlState, ControlTake
-from schemas.device import DeviceCommandKind, DeviceCommandResponse, DeviceMode
-from schemas.motion import FollowErrorCode
-from schemas.topics import CONTROL
-from services.stepper_gateway.control.clients import MotionCaller
-from services.stepper_gateway.control.control import ControlHolder
-from services.stepper_gateway.device.command_handler import CommandHandler
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.goals.goal_executor import GoalExecutor, GoalVerdict
-from services.stepper_gateway.goals.rejections import GoalRejected
-from services.stepper_gateway.gripper.gripper_executor import GripperExecutor
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.motion_controller import MotionController
-from services.stepper_gateway.motion.target_follower import TargetFollower
-from services.stepper_gateway.outputs import Answer
+from gemelo.schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlState, ControlTake
+from gemelo.schemas.device import DeviceCommandKind, DeviceCommandResponse, DeviceMode
+from gemelo.schemas.motion import FollowErrorCode
+from gemelo.schemas.topics import CONTROL
+from gemelo.services.stepper_gateway.control.clients import MotionCaller
+from gemelo.services.stepper_gateway.control.control import ControlHolder
+from gemelo.services.stepper_gateway.device.command_handler import CommandHandler
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.goals.goal_executor import GoalExecutor, GoalVerdict
+from gemelo.services.stepper_gateway.goals.rejections import GoalRejected
+from gemelo.services.stepper_gateway.gripper.gripper_executor import GripperExecutor
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.motion_controller import MotionController
+from gemelo.services.stepper_gateway.motion.target_follower import TargetFollower
+from gemelo.services.stepper_gateway.outputs import Answer
 
 STOP_AGAIN = 0.5  # [s] between two stops for an arm that does not come to rest; chosen: as the motion controller's
 COMPLAINT = 1.0  # [s] between two words on streamed targets that are refused; chosen: the log stays readable

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.device import (
+from gemelo.schemas.device import (
     ArmCommand,
     DeviceCommand,
     DeviceCommandKind,
@@ -15,12 +15,12 @@ from schemas.device import (
     SpeedCommand,
     StopKind,
 )
-from services.arm.errors import suggestion
-from services.arm.model.description import ArmDescription, Joint
-from services.stepper_gateway.device.pending_commands import NO_ARGUMENTS, Arguments
-from services.stepper_gateway.goals.limit_checks import SLACK, beyond
-from services.stepper_gateway.goals.rejections import invalid
-from services.stepper_gateway.goals.trajectory_checks import require_known
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.services.stepper_gateway.device.pending_commands import NO_ARGUMENTS, Arguments
+from gemelo.services.stepper_gateway.goals.limit_checks import SLACK, beyond
+from gemelo.services.stepper_gateway.goals.rejections import invalid
+from gemelo.services.stepper_gateway.goals.trajectory_checks import require_known
 
 KINDS: dict[type[DeviceCommand], DeviceCommandKind] = {
     ResumeCommand: DeviceCommandKind.RESUME,

@@ -6,16 +6,16 @@ import itertools
 import math
 from collections.abc import Callable
 
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse, DeviceMode
-from services.stepper_gateway.device.command_arguments import arguments_of, kind_of
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.device.pending_commands import STOPPING, Arguments, PendingCommand
-from services.stepper_gateway.goals.rejections import GoalRejected, invalid
-from services.stepper_gateway.links.frames import Code, CommandReply, code_name, encode
-from services.stepper_gateway.links.link import Kind
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.motion_controller import MotionController
-from services.stepper_gateway.outputs import Answer
+from gemelo.schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse, DeviceMode
+from gemelo.services.stepper_gateway.device.command_arguments import arguments_of, kind_of
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.device.pending_commands import STOPPING, Arguments, PendingCommand
+from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
+from gemelo.services.stepper_gateway.links.frames import Code, CommandReply, code_name, encode
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.motion_controller import MotionController
+from gemelo.services.stepper_gateway.outputs import Answer
 
 REMEDIES: dict[int, str] = {
     Code.NOT_READY: "it does not do that in this mode",

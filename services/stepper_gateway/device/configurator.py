@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from schemas.device import ConfigureResponse, DeviceConfiguration, DeviceMode
-from schemas.device_config import config_crc, config_text
-from schemas.system import LogLevel
-from schemas.topics import DEVICE_CONFIGURATION
-from services.arm.device.device_config import device_config
-from services.arm.model.description import ArmDescription
-from services.stepper_gateway.device.session import DeviceSession
-from services.stepper_gateway.links.link import Kind
-from services.stepper_gateway.links.reports import ConfigAckReport
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import Answer, Outbox
+from gemelo.schemas.device import ConfigureResponse, DeviceConfiguration, DeviceMode
+from gemelo.schemas.device_config import config_crc, config_text
+from gemelo.schemas.system import LogLevel
+from gemelo.schemas.topics import DEVICE_CONFIGURATION
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.stepper_gateway.device.session import DeviceSession
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.stepper_gateway.links.reports import ConfigAckReport
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.outputs import Answer, Outbox
 
 AGAIN = 1.0  # [s] until a configuration that was not answered is sent once more; chosen: a slow network answers by then
 REFUSED_AGAIN = 10.0  # [s] the same for one that it has refused; chosen: somebody else may have said so

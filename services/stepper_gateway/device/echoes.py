@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from schemas.device import EchoResponse
-from schemas.robot import Dialect
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.links.frames import SyncReply, encode
-from services.stepper_gateway.links.link import Kind
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import Answer
+from gemelo.schemas.device import EchoResponse
+from gemelo.schemas.robot import Dialect
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.links.frames import SyncReply, encode
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.outputs import Answer
 
 TIMEOUT = 1.0  # [s] after which an answer counts as lost; chosen: twice the silence that stops the arm
 MOST = 32  # that may wait; chosen: it is one more than any bench has under way

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from schemas.device import DeviceMode
-from schemas.system import LogLevel
-from schemas.topics import DEVICE_SHAFT, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS
-from services.stepper_gateway.components import Components
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.links.frames import Ack, BadFrame, CommandReply, StateFrame, SyncReply, decode
-from services.stepper_gateway.links.link import Kind, Received
-from services.stepper_gateway.links.reports import (
+from gemelo.schemas.device import DeviceMode
+from gemelo.schemas.system import LogLevel
+from gemelo.schemas.topics import DEVICE_SHAFT, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS
+from gemelo.services.stepper_gateway.components import Components
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.links.frames import Ack, BadFrame, CommandReply, StateFrame, SyncReply, decode
+from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.links.reports import (
     ConfigAckReport,
     EventReport,
     ShaftReport,
@@ -17,8 +17,8 @@ from services.stepper_gateway.links.reports import (
     decode_report,
     decode_sensors,
 )
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.commanded_path import PathPoint
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
 
 STOPPED = ("hold", "homing_stopped")
 BY_LOST_HEARTBEAT = "heartbeat"  # the detail of these

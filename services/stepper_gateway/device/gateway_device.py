@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from schemas.device import DeviceEvent, DeviceStatus
-from schemas.system import LogLevel
-from schemas.topics import DEVICE_EVENTS
-from services.arm.model.description import ArmDescription
-from services.stepper_gateway.device.configurator import Configuration
-from services.stepper_gateway.device.pending_commands import PendingCommands
-from services.stepper_gateway.device.readiness import not_ready_reason
-from services.stepper_gateway.device.reporting import Reporter
-from services.stepper_gateway.device.session import DeviceSession
-from services.stepper_gateway.links.frames import StateFrame
-from services.stepper_gateway.links.reports import StatusReport
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import Outbox
-from services.stepper_gateway.parameters import GatewayParameters
+from gemelo.schemas.device import DeviceEvent, DeviceStatus
+from gemelo.schemas.system import LogLevel
+from gemelo.schemas.topics import DEVICE_EVENTS
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.stepper_gateway.device.configurator import Configuration
+from gemelo.services.stepper_gateway.device.pending_commands import PendingCommands
+from gemelo.services.stepper_gateway.device.readiness import not_ready_reason
+from gemelo.services.stepper_gateway.device.reporting import Reporter
+from gemelo.services.stepper_gateway.device.session import DeviceSession
+from gemelo.services.stepper_gateway.links.frames import StateFrame
+from gemelo.services.stepper_gateway.links.reports import StatusReport
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.outputs import Outbox
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
 SETTLING = 2.5  # messages; chosen: the one under way, the last one, and the word after it
 

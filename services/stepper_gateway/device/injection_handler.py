@@ -8,15 +8,15 @@ from typing import NamedTuple
 import msgspec
 from msgspec.structs import replace
 
-from schemas.device import InjectKind, InjectRequest, InjectResponse
-from services.arm.errors import suggestion
-from services.arm.model.description import ArmDescription
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.goals.rejections import GoalRejected, invalid
-from services.stepper_gateway.links.link import Kind
-from services.stepper_gateway.links.reports import EventReport
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import Answer
+from gemelo.schemas.device import InjectKind, InjectRequest, InjectResponse
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.stepper_gateway.links.reports import EventReport
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.outputs import Answer
 
 DONE, REFUSED = "injected", "inject_refused"
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from services.stepper_gateway.links.frames import StateFrame
-from services.stepper_gateway.links.reports import StatusReport
+from gemelo.services.stepper_gateway.links.frames import StateFrame
+from gemelo.services.stepper_gateway.links.reports import StatusReport
 
 ENOUGH = 8  # states of another boot, each after one of the present one; chosen: 0.15 s, a forger sends single ones
 SAME_PACE = 0.1  # [s] by which the device's clock and ours may part within a row; chosen: a network's jitter

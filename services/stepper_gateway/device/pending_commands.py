@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from schemas.device import DeviceCommandKind
-from services.stepper_gateway.device.clock import ClockSync
-from services.stepper_gateway.links.frames import ANY_BOOT, NEVER_EXPIRES, CommandFrame, CommandReply, StateFrame
-from services.stepper_gateway.moment import Moment
+from gemelo.schemas.device import DeviceCommandKind
+from gemelo.services.stepper_gateway.device.clock import ClockSync
+from gemelo.services.stepper_gateway.links.frames import ANY_BOOT, NEVER_EXPIRES, CommandFrame, CommandReply, StateFrame
+from gemelo.services.stepper_gateway.moment import Moment
 
 RETRY = 0.1  # [s] chosen: five states, as an answer may just be late
 REPEAT = (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
-from services.stepper_gateway.links.frames import Sync, SyncReply
-from services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.links.frames import Sync, SyncReply
+from gemelo.services.stepper_gateway.moment import Moment
 
 # While answers are missing they are frequent: so a wire that loses most frames is told from a device that gets none.
 LATE_ANSWER = 0.25  # [s] after which an answer is missing; chosen: longer than a slow network's round trip

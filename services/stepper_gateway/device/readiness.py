@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from schemas.device import DeviceMode
-from schemas.device_config import InputRole
-from schemas.device_faults import fault_text
-from services.arm.model.description import ArmDescription
-from services.stepper_gateway.links.frames import StateFlag, StateFrame
+from gemelo.schemas.device import DeviceMode
+from gemelo.schemas.device_config import InputRole
+from gemelo.schemas.device_faults import fault_text
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.stepper_gateway.links.frames import StateFlag, StateFrame
 
 
 def not_ready_reason(arm: ArmDescription, state: StateFrame | None) -> str:

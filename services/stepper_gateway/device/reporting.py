@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState, ShaftPositions
-from schemas.joints import JointState, StepErrors
-from schemas.message import Vector
-from services.arm.model.description import ArmDescription, Joint
-from services.stepper_gateway.device.clock import ClockSync
-from services.stepper_gateway.device.readiness import input_names, joint_name
-from services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, StateFlag, StateFrame, code_name
-from services.stepper_gateway.links.reports import ShaftReport
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.commanded_path import PathPoint
-from services.stepper_gateway.motion.stream import SentChunk
+from gemelo.schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState, ShaftPositions
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.message import Vector
+from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.services.stepper_gateway.device.clock import ClockSync
+from gemelo.services.stepper_gateway.device.readiness import input_names, joint_name
+from gemelo.services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, StateFlag, StateFrame, code_name
+from gemelo.services.stepper_gateway.links.reports import ShaftReport
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
+from gemelo.services.stepper_gateway.motion.stream import SentChunk
 
 HALF_STEP = 0.5 + 1.0 / 256.0  # [steps] of whole steps beside the path: their rounding, and the path's own to 1/256
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from schemas.device import SensorReadings
-from schemas.system import LogLevel
-from schemas.topics import SENSORS
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.links.reports import SensorReport
-from services.stepper_gateway.moment import Moment, next_beat
+from gemelo.schemas.device import SensorReadings
+from gemelo.schemas.system import LogLevel
+from gemelo.schemas.topics import SENSORS
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.links.reports import SensorReport
+from gemelo.services.stepper_gateway.moment import Moment, next_beat
 
 SILENCE = 2.0  # [s] without readings until nothing is republished; chosen: twenty readings
 PERIOD = 0.1  # [s] between two messages; chosen: smooth for a person's eye, and a sonar is hardly faster

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from schemas.device import DeviceCommandKind, DeviceMode
-from services.stepper_gateway.device.clock import ClockSync
-from services.stepper_gateway.device.other_writers import OtherBoots, boot_text
-from services.stepper_gateway.device.questions import Questions
-from services.stepper_gateway.device.state_checks import StateChecks
-from services.stepper_gateway.links.frames import (
+from gemelo.schemas.device import DeviceCommandKind, DeviceMode
+from gemelo.services.stepper_gateway.device.clock import ClockSync
+from gemelo.services.stepper_gateway.device.other_writers import OtherBoots, boot_text
+from gemelo.services.stepper_gateway.device.questions import Questions
+from gemelo.services.stepper_gateway.device.state_checks import StateChecks
+from gemelo.services.stepper_gateway.links.frames import (
     NEVER_EXPIRES,
     BadFrame,
     Code,
@@ -22,8 +22,8 @@ from services.stepper_gateway.links.frames import (
     Sync,
     SyncReply,
 )
-from services.stepper_gateway.links.reports import StatusReport
-from services.stepper_gateway.moment import Moment, next_beat
+from gemelo.services.stepper_gateway.links.reports import StatusReport
+from gemelo.services.stepper_gateway.moment import Moment, next_beat
 
 HEARTBEAT = 0.1  # [s] chosen: a cut of 0.4 s does not stop the arm yet
 SYNC = 0.5  # [s] chosen: a crystal's drift in that time is 50 us at most

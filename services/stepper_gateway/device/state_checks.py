@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.device import DeviceMode
-from services.stepper_gateway.links.frames import BadFrame, StateFrame
+from gemelo.schemas.device import DeviceMode
+from gemelo.services.stepper_gateway.links.frames import BadFrame, StateFrame
 
 MOST_HASTE = 2000  # [us] by which more of the path may be played than time has passed; chosen: a slot, and again
 STRANGERS = 3  # states in a row of another boot while the present one is not silent; chosen: no single frame does it

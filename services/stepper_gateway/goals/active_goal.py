@@ -7,20 +7,20 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from schemas.actions import GoalStatusCode
-from schemas.message import Vector
-from schemas.motion import (
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import (
     FollowErrorCode,
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryResult,
     TrajectoryPoint,
 )
-from services.arm.model.description import Joint
-from services.stepper_gateway.goals.goal_validator import MotionStart, ValidatedGoal
-from services.stepper_gateway.links.frames import StateFrame
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.commanded_path import PathPoint
-from services.stepper_gateway.motion.stream import Stream
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.stepper_gateway.goals.goal_validator import MotionStart, ValidatedGoal
+from gemelo.services.stepper_gateway.links.frames import StateFrame
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
+from gemelo.services.stepper_gateway.motion.stream import Stream
 
 
 class GoalEnding(NamedTuple):

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from services.arm.interpolation import TrajectorySampler
-from services.arm.model.description import Joint
-from services.stepper_gateway.goals.limit_checks import Samples, path_within, points_within
-from services.stepper_gateway.goals.pieces import PIECE, Part, Pieces
-from services.stepper_gateway.goals.trajectory_checks import ordered_trajectory
-from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.paths import RoundedPath, SampledPath, StraightLines, TimedPath
-from services.stepper_gateway.parameters import GatewayParameters
+from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.services.arm.interpolation import TrajectorySampler
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.stepper_gateway.goals.limit_checks import Samples, path_within, points_within
+from gemelo.services.stepper_gateway.goals.pieces import PIECE, Part, Pieces
+from gemelo.services.stepper_gateway.goals.trajectory_checks import ordered_trajectory
+from gemelo.services.stepper_gateway.motion.knots import Knot
+from gemelo.services.stepper_gateway.motion.paths import RoundedPath, SampledPath, StraightLines, TimedPath
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
 
 class GoalChecks:

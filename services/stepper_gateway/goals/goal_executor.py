@@ -7,22 +7,22 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from schemas.actions import GoalStatusCode
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
-from schemas.system import LogLevel
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.goals.active_goal import ActiveGoal, GoalEnding
-from services.stepper_gateway.goals.goal_validator import GoalValidator, ValidatedGoal
-from services.stepper_gateway.goals.next_goal import CANCELED, NextGoal
-from services.stepper_gateway.goals.rejections import GoalRejected, invalid
-from services.stepper_gateway.goals.scene_versions import PlannedIn, SceneVersions
-from services.stepper_gateway.links.frames import StateFrame
-from services.stepper_gateway.moment import Moment, next_beat
-from services.stepper_gateway.motion.commanded_path import PathPoint
-from services.stepper_gateway.motion.knot_sources import PathKnots
-from services.stepper_gateway.motion.motion_controller import MotionController
-from services.stepper_gateway.motion.paths import TimedPath
-from services.stepper_gateway.outputs import GoalExecuting, GoalFinished, GoalProgress
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
+from gemelo.schemas.system import LogLevel
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.goals.active_goal import ActiveGoal, GoalEnding
+from gemelo.services.stepper_gateway.goals.goal_validator import GoalValidator, ValidatedGoal
+from gemelo.services.stepper_gateway.goals.next_goal import CANCELED, NextGoal
+from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
+from gemelo.services.stepper_gateway.goals.scene_versions import PlannedIn, SceneVersions
+from gemelo.services.stepper_gateway.links.frames import StateFrame
+from gemelo.services.stepper_gateway.moment import Moment, next_beat
+from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
+from gemelo.services.stepper_gateway.motion.knot_sources import PathKnots
+from gemelo.services.stepper_gateway.motion.motion_controller import MotionController
+from gemelo.services.stepper_gateway.motion.paths import TimedPath
+from gemelo.services.stepper_gateway.outputs import GoalExecuting, GoalFinished, GoalProgress
 
 HELD = {  # by the detail of the device's event
     "heartbeat": "the device holds because it lost the gateway's heartbeat",

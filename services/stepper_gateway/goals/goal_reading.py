@@ -5,9 +5,9 @@ from __future__ import annotations
 import msgspec
 from msgspec.structs import replace
 
-from schemas.message import decode
-from schemas.motion import FollowJointTrajectoryGoal, TrajectoryPoint
-from services.stepper_gateway.goals.pieces import PIECE, Pieces
+from gemelo.schemas.message import decode
+from gemelo.schemas.motion import FollowJointTrajectoryGoal, TrajectoryPoint
+from gemelo.services.stepper_gateway.goals.pieces import PIECE, Pieces
 
 LONG = 64 * 1024  # [bytes] chosen: some 500 points, which take a millisecond
 

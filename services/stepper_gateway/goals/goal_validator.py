@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from schemas.message import Vector
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from services.arm.model.description import Joint
-from services.stepper_gateway.goals.goal_checks import GoalChecks
-from services.stepper_gateway.goals.limit_checks import within
-from services.stepper_gateway.goals.rejections import GoalRejected, invalid
-from services.stepper_gateway.goals.scene_versions import PlannedIn
-from services.stepper_gateway.goals.trajectory_checks import Tolerances, time_tolerance, tolerances
-from services.stepper_gateway.motion.knots import Knot, Limits, whole_steps
-from services.stepper_gateway.motion.paths import TimedPath, join_path, profile
-from services.stepper_gateway.parameters import GatewayParameters
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.stepper_gateway.goals.goal_checks import GoalChecks
+from gemelo.services.stepper_gateway.goals.limit_checks import within
+from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
+from gemelo.services.stepper_gateway.goals.scene_versions import PlannedIn
+from gemelo.services.stepper_gateway.goals.trajectory_checks import Tolerances, time_tolerance, tolerances
+from gemelo.services.stepper_gateway.motion.knots import Knot, Limits, whole_steps
+from gemelo.services.stepper_gateway.motion.paths import TimedPath, join_path, profile
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
 SAME_VELOCITY = 1e-9  # [rad/s] or [m/s] chosen: rounding of a velocity that was computed
 MAX_DELAY = 60.0  # [s] that a trajectory's stamp may lie in the future; chosen: more is a wrong clock

@@ -6,14 +6,14 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from schemas.motion import JointTrajectory
-from services.arm.model.description import Joint
-from services.stepper_gateway.goals.pieces import PIECE, Pieces
-from services.stepper_gateway.goals.rejections import invalid
-from services.stepper_gateway.motion.knot_sources import KNOT_TIME
-from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.paths import TimedPath
-from services.stepper_gateway.parameters import GatewayParameters
+from gemelo.schemas.motion import JointTrajectory
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.stepper_gateway.goals.pieces import PIECE, Pieces
+from gemelo.services.stepper_gateway.goals.rejections import invalid
+from gemelo.services.stepper_gateway.motion.knot_sources import KNOT_TIME
+from gemelo.services.stepper_gateway.motion.knots import Knot
+from gemelo.services.stepper_gateway.motion.paths import TimedPath
+from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
 SLACK = 1e-9  # [rad] or [m]: rounding of a limit that was computed
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from schemas.actions import GoalStatusCode
-from schemas.motion import FollowErrorCode
-from services.stepper_gateway.goals.active_goal import ActiveGoal, GoalEnding
-from services.stepper_gateway.goals.goal_validator import MotionStart, ValidatedGoal
-from services.stepper_gateway.goals.rejections import invalid
-from services.stepper_gateway.links.frames import StateFrame
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.knot_sources import PathKnots
-from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.motion_controller import MotionController
-from services.stepper_gateway.motion.paths import TimedPath
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.motion import FollowErrorCode
+from gemelo.services.stepper_gateway.goals.active_goal import ActiveGoal, GoalEnding
+from gemelo.services.stepper_gateway.goals.goal_validator import MotionStart, ValidatedGoal
+from gemelo.services.stepper_gateway.goals.rejections import invalid
+from gemelo.services.stepper_gateway.links.frames import StateFrame
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.knot_sources import PathKnots
+from gemelo.services.stepper_gateway.motion.knots import Knot
+from gemelo.services.stepper_gateway.motion.motion_controller import MotionController
+from gemelo.services.stepper_gateway.motion.paths import TimedPath
 
 CANCELED = GoalEnding(GoalStatusCode.CANCELED, FollowErrorCode.CANCELED, "the arm decelerated on its path")
 

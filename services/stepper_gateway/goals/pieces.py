@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from typing import Generic, TypeVar
 
-from services.stepper_gateway.goals.rejections import GoalRejected
+from gemelo.services.stepper_gateway.goals.rejections import GoalRejected
 
 T = TypeVar("T")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.motion import FollowErrorCode
+from gemelo.schemas.motion import FollowErrorCode
 
 
 class GoalRejected(Exception):

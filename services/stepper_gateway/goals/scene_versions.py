@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from schemas.scene import PlanningScene
-from services.stepper_gateway.goals.rejections import GoalRejected
+from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from gemelo.schemas.scene import PlanningScene
+from gemelo.services.stepper_gateway.goals.rejections import GoalRejected
 
 MOST_UNHEARD = 10_000  # chosen: edits of one scene that may be missed in a row; more is no planner's version
 MOST_PLANNERS = 8  # whose scenes are kept; chosen: more than are started within a reader's delay

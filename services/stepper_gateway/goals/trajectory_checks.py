@@ -6,12 +6,18 @@ from collections import Counter
 from itertools import pairwise
 from typing import NamedTuple
 
-from schemas.message import Vector
-from schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
-from services.arm.errors import suggestion
-from services.arm.model.description import Joint
-from services.stepper_gateway.goals.pieces import PIECE, Pieces
-from services.stepper_gateway.goals.rejections import invalid, invalid_joints
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import (
+    MOST_POINTS,
+    FollowJointTrajectoryGoal,
+    JointTolerance,
+    JointTrajectory,
+    TrajectoryPoint,
+)
+from gemelo.services.arm.errors import suggestion
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.stepper_gateway.goals.pieces import PIECE, Pieces
+from gemelo.services.stepper_gateway.goals.rejections import invalid, invalid_joints
 
 REST = 1e-6  # [rad/s] or [m/s] that a final velocity may be off zero; chosen: far below a step a second
 MAX_DURATION = 3600.0  # [s] chosen: an hour; longer work is several goals

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandResponse, DeviceMode
-from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
-from schemas.motion import FollowErrorCode
-from schemas.system import LogLevel
-from schemas.topics import GRIPPER_STATE
-from services.arm.model.gripper import METRES, gripper_unit
-from services.stepper_gateway.device.command_handler import CommandHandler, OnAnswer
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.goals.goal_executor import GoalVerdict
-from services.stepper_gateway.goals.rejections import GoalRejected, invalid
-from services.stepper_gateway.gripper.jaws import Jaws, jaws_of
-from services.stepper_gateway.links.frames import StateFrame
-from services.stepper_gateway.links.reports import SensorReport
-from services.stepper_gateway.moment import Moment, next_beat
-from services.stepper_gateway.outputs import GripperExecuting, GripperFinished, GripperProgress
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device import DeviceCommandResponse, DeviceMode
+from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
+from gemelo.schemas.motion import FollowErrorCode
+from gemelo.schemas.system import LogLevel
+from gemelo.schemas.topics import GRIPPER_STATE
+from gemelo.services.arm.model.gripper import METRES, gripper_unit
+from gemelo.services.stepper_gateway.device.command_handler import CommandHandler, OnAnswer
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
+from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
+from gemelo.services.stepper_gateway.gripper.jaws import Jaws, jaws_of
+from gemelo.services.stepper_gateway.links.frames import StateFrame
+from gemelo.services.stepper_gateway.links.reports import SensorReport
+from gemelo.services.stepper_gateway.moment import Moment, next_beat
+from gemelo.services.stepper_gateway.outputs import GripperExecuting, GripperFinished, GripperProgress
 
 PERIOD = 0.1  # [s] between two states, and between two feedbacks; chosen: smooth for a person's eye
 FRESH = 1.0  # [s] that a reading of the jaws counts; chosen: ten of them

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from schemas.device import DeviceCommandKind
-from schemas.robot import OutputGripper, ServoGripper
-from services.arm.model.description import ArmDescription
-from services.arm.model.gripper import opening_of, pulse_of
-from services.stepper_gateway.device.pending_commands import Arguments
-from services.stepper_gateway.goals.rejections import invalid
-from services.stepper_gateway.links.frames import StateFrame
+from gemelo.schemas.device import DeviceCommandKind
+from gemelo.schemas.robot import OutputGripper, ServoGripper
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.model.gripper import opening_of, pulse_of
+from gemelo.services.stepper_gateway.device.pending_commands import Arguments
+from gemelo.services.stepper_gateway.goals.rejections import invalid
+from gemelo.services.stepper_gateway.links.frames import StateFrame
 
 SLACK = 1e-6  # [m] by which an end may be missed; chosen: rounding of a conversion
 

@@ -21,7 +21,7 @@ import math
 
 from msgspec import Struct
 
-from schemas.ledger import VerifiedBy
+from gemelo.schemas.ledger import VerifiedBy
 
 HALF = 0.35  # load at which half of all motors would lose steps; chosen: below the stated torque, as rotors swing
 STEEPNESS = 3.0  # chosen: one motor in 6 fails at 0.2 of its stated torque, one in 44 at 0.1

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from services.arm.model.description import Joint
-from services.arm.motors.torque import NO_CURVE, torque_share
-from services.stepper_gateway.ledger.confidence import Evidence
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.arm.motors.torque import NO_CURVE, torque_share
+from gemelo.services.stepper_gateway.ledger.confidence import Evidence
 
 WATCHED = 0.1  # [s] between two states, beyond which the hardest motion is assumed; chosen: five states
 USUAL_FULL_STEPS = 200  # [steps/rev] of a motor without a pull-out curve; standard: motors of 1.8 deg

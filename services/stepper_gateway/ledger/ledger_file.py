@@ -11,10 +11,10 @@ from pathlib import Path
 
 import msgspec
 
-from services.runtime.clock import SYSTEM, Clock
-from services.runtime.process.own_files import own_file
-from services.runtime.process.unwritten import RETRY, UnwrittenFiles
-from services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.runtime.clock import SYSTEM, Clock
+from gemelo.services.runtime.process.own_files import own_file
+from gemelo.services.runtime.process.unwritten import RETRY, UnwrittenFiles
+from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
 
 LAST_WRITE = 2.0  # [s] that the end of the process waits for the disk; chosen: process-compose waits longer
 UNKEPT = "the step ledger, without which no joint counts as verified after a restart,"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.ledger import VerifiedBy
-from services.arm.model.description import Joint
-from services.stepper_gateway.ledger.confidence import AGE, TURNS, Evidence, strong_enough
+from gemelo.schemas.ledger import VerifiedBy
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.stepper_gateway.ledger.confidence import AGE, TURNS, Evidence, strong_enough
 
 
 def open_loop_reason() -> str:

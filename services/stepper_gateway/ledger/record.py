@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from services.stepper_gateway.ledger.confidence import Evidence
+from gemelo.services.stepper_gateway.ledger.confidence import Evidence
 
 
 class LedgerRecord(Struct, frozen=True, kw_only=True):

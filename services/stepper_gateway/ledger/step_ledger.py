@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from schemas.device import DeviceMode
-from schemas.ledger import StepLedger, VerifiedBy
-from schemas.topics import STEP_LEDGER
-from services.arm.kinematics.tool_jacobian import ToolJacobian
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.ledger.confidence import (
+from gemelo.schemas.device import DeviceMode
+from gemelo.schemas.ledger import StepLedger, VerifiedBy
+from gemelo.schemas.topics import STEP_LEDGER
+from gemelo.services.arm.kinematics.tool_jacobian import ToolJacobian
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.ledger.confidence import (
     LATE,
     REBOOT,
     REST_FAULT,
@@ -21,16 +21,16 @@ from services.stepper_gateway.ledger.confidence import (
     after_verification,
     confidence,
 )
-from services.stepper_gateway.ledger.joint_watch import JointSample, JointWatch
-from services.stepper_gateway.ledger.reasons import doubt, open_loop_reason
-from services.stepper_gateway.ledger.record import LedgerRecord
-from services.stepper_gateway.ledger.tool_error import bounds, known_shift, tool_shift
-from services.stepper_gateway.links.frames import StateFrame
-from services.stepper_gateway.links.reports import EventReport
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.commanded_path import PathPoint
-from services.stepper_gateway.motion.knots import whole_steps
-from services.stepper_gateway.outputs import KeepLedger
+from gemelo.services.stepper_gateway.ledger.joint_watch import JointSample, JointWatch
+from gemelo.services.stepper_gateway.ledger.reasons import doubt, open_loop_reason
+from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.stepper_gateway.ledger.tool_error import bounds, known_shift, tool_shift
+from gemelo.services.stepper_gateway.links.frames import StateFrame
+from gemelo.services.stepper_gateway.links.reports import EventReport
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
+from gemelo.services.stepper_gateway.motion.knots import whole_steps
+from gemelo.services.stepper_gateway.outputs import KeepLedger
 
 LEVEL = 0.95  # of the bounds that are told; chosen: the usual one of statistics
 PERIOD = 1.0 / (STEP_LEDGER.rate or 5.0)  # [s]

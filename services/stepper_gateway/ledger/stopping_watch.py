@@ -5,20 +5,20 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from schemas.device import DeviceMode
-from schemas.ledger import StoppingDistance
-from schemas.message import Vector
-from schemas.topics import STOPPING_DISTANCE
-from services.arm.device.device_config import device_config
-from services.arm.frames.transforms import Point
-from services.arm.kinematics.tool_jacobian import ToolJacobian
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.links.frames import StateFrame
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.motion_controller import MotionController
-from services.stepper_gateway.motion.stopping import MARGIN, Segment, StoppingPath, segment, stop_on
-from services.stepper_gateway.motion.stream import Stream
+from gemelo.schemas.device import DeviceMode
+from gemelo.schemas.ledger import StoppingDistance
+from gemelo.schemas.message import Vector
+from gemelo.schemas.topics import STOPPING_DISTANCE
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.arm.frames.transforms import Point
+from gemelo.services.arm.kinematics.tool_jacobian import ToolJacobian
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.links.frames import StateFrame
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.knots import Knot
+from gemelo.services.stepper_gateway.motion.motion_controller import MotionController
+from gemelo.services.stepper_gateway.motion.stopping import MARGIN, Segment, StoppingPath, segment, stop_on
+from gemelo.services.stepper_gateway.motion.stream import Stream
 
 PERIOD = 1.0 / (STOPPING_DISTANCE.rate or 10.0)  # [s]
 SLOTS = 0.004  # [s] that the device prepares ahead, and a slot for each decision: standard, firmware/core

@@ -7,7 +7,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
-from services.stepper_gateway.links.link import Received
+from gemelo.services.stepper_gateway.links.link import Received
 
 CAPACITY = 4096  # [messages] 80 s of state; chosen: beyond any pause of the loop that the arm would bear
 BACK_OFF = (0.1, 0.2, 0.5, 1.0)  # [s] between attempts; chosen: quick after a short cut, no flood after a long one

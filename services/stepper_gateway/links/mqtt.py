@@ -14,12 +14,12 @@ from collections.abc import Callable, Iterable
 
 from paho.mqtt import client as paho
 
-from schemas.device_topics import topic
-from services.mqtt.access import BrokerAccess
-from services.mqtt.client import NO_ANSWER, OLD_BROKER, MqttClient, code_of, is_failure
-from services.mqtt.failures import denial, failure, needs_a_person, refusal, silence
-from services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
-from services.stepper_gateway.links.link import FROM_DEVICE, Kind, Received
+from gemelo.schemas.device_topics import topic
+from gemelo.services.mqtt.access import BrokerAccess
+from gemelo.services.mqtt.client import NO_ANSWER, OLD_BROKER, MqttClient, code_of, is_failure
+from gemelo.services.mqtt.failures import denial, failure, needs_a_person, refusal, silence
+from gemelo.services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
+from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, Kind, Received
 
 UNACKNOWLEDGED = (Kind.HB, Kind.SYNC, Kind.SYNC_R, Kind.TRAJ_ACK, Kind.STATE, Kind.SENSORS, Kind.SHAFT)  # QoS 0
 DISPENSABLE = (Kind.INJECT, Kind.CONFIG)  # whoever asks for these hears that the device did not answer

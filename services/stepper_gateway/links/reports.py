@@ -7,7 +7,7 @@ from typing import Annotated, TypeVar
 import msgspec
 from msgspec import Meta
 
-from services.stepper_gateway.links.frames import NoFrame
+from gemelo.services.stepper_gateway.links.frames import NoFrame
 
 Word = Annotated[int, Meta(ge=0, lt=2**32)]
 Micros = Annotated[int, Meta(ge=0, le=2**63 - 1)]  # [us] of the device's clock

@@ -11,11 +11,11 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
-from services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
-from services.stepper_gateway.links.frames import FrameType
-from services.stepper_gateway.links.link import Kind, Received
-from services.stepper_gateway.links.serial_port import OpenPort, complaint, open_port
+from gemelo.services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
+from gemelo.services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
+from gemelo.services.stepper_gateway.links.frames import FrameType
+from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.links.serial_port import OpenPort, complaint, open_port
 
 TYPES = {
     FrameType.ACK: Kind.TRAJ_ACK,

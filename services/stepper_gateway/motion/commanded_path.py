@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from typing import NamedTuple
 
-from services.stepper_gateway.motion.knots import Knot, StepKnot
+from gemelo.services.stepper_gateway.motion.knots import Knot, StepKnot
 
 KEPT = 256  # knots behind the played one that are kept; chosen: 5 s, longer than a state is under way
 PRUNED_AT = 1024  # how many may gather before pruning; chosen: so pruning costs little for each knot

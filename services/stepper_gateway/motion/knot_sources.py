@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
-from schemas.message import Vector
-from services.stepper_gateway.motion.knots import Knot
-from services.stepper_gateway.motion.paths import TimedPath
-from services.stepper_gateway.motion.target_tracker import TargetTracker
+from gemelo.schemas.message import Vector
+from gemelo.services.stepper_gateway.motion.knots import Knot
+from gemelo.services.stepper_gateway.motion.paths import TimedPath
+from gemelo.services.stepper_gateway.motion.target_tracker import TargetTracker
 
 KNOT_TIME = 0.02  # [s] between knots; chosen: one for each state of the device
 

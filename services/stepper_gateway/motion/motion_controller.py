@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections import deque
 
-from schemas.device import DeviceCommandKind, DeviceMode
-from schemas.message import Vector
-from schemas.topics import COMMAND_ACKS, COMMANDS
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.goals.goal_validator import MotionStart
-from services.stepper_gateway.links.frames import Ack, Chunk, StateFrame, encode
-from services.stepper_gateway.links.link import Kind
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.commanded_path import PathPoint
-from services.stepper_gateway.motion.knot_sources import KnotSource
-from services.stepper_gateway.motion.knots import Knot, whole_steps
-from services.stepper_gateway.motion.stream import SentChunk, Stream
-from services.stepper_gateway.motion.transmission import MotionTransmission
+from gemelo.schemas.device import DeviceCommandKind, DeviceMode
+from gemelo.schemas.message import Vector
+from gemelo.schemas.topics import COMMAND_ACKS, COMMANDS
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.goals.goal_validator import MotionStart
+from gemelo.services.stepper_gateway.links.frames import Ack, Chunk, StateFrame, encode
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
+from gemelo.services.stepper_gateway.motion.knot_sources import KnotSource
+from gemelo.services.stepper_gateway.motion.knots import Knot, whole_steps
+from gemelo.services.stepper_gateway.motion.stream import SentChunk, Stream
+from gemelo.services.stepper_gateway.motion.transmission import MotionTransmission
 
 HISTORY = 1.0  # [s] of measured positions: a trajectory may have been planned from any of them
 EXPIRED = 1.5  # [s] after which the device takes nothing that was sent before; chosen: its time to live, and half

@@ -11,10 +11,10 @@ from typing import Protocol
 
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 
-from schemas.message import Vector
-from schemas.motion import JointTrajectory
-from services.arm.interpolation import TrajectorySampler
-from services.stepper_gateway.motion.knots import Knot, Limits
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import JointTrajectory
+from gemelo.services.arm.interpolation import TrajectorySampler
+from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
 
 
 class TimedPath(Protocol):

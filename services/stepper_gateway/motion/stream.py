@@ -5,13 +5,22 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
-from schemas.device import DeviceMode
-from services.arm.model.description import Joint
-from services.stepper_gateway.device.clock import ClockSync
-from services.stepper_gateway.links.frames import NO_JOINT, Ack, BadFrame, Chunk, ChunkFlag, Code, StateFrame, code_name
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.commanded_path import CommandedPath, PathPoint
-from services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot, braking_time
+from gemelo.schemas.device import DeviceMode
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.stepper_gateway.device.clock import ClockSync
+from gemelo.services.stepper_gateway.links.frames import (
+    NO_JOINT,
+    Ack,
+    BadFrame,
+    Chunk,
+    ChunkFlag,
+    Code,
+    StateFrame,
+    code_name,
+)
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.commanded_path import CommandedPath, PathPoint
+from gemelo.services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot, braking_time
 
 TIME_TO_LIVE = 1_000_000  # [us] after which the device is to refuse a chunk; chosen: beyond any lead
 RETRY_MIN, RETRY_MAX = 0.06, 0.3  # [s] until a chunk is sent again; chosen: three knots, and about the lead

@@ -5,12 +5,12 @@ Whoever streams must go on sending (0.5 s by default), also to keep a far target
 
 from __future__ import annotations
 
-from schemas.joints import JointTargets
-from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.goals.rejections import GoalRejected, invalid
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.motion_controller import MotionController
-from services.stepper_gateway.motion.target_stream import TargetStream
+from gemelo.schemas.joints import JointTargets
+from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.motion_controller import MotionController
+from gemelo.services.stepper_gateway.motion.target_stream import TargetStream
 
 COMPLAINT = 1.0  # [s] between two of them; chosen: the log stays readable
 

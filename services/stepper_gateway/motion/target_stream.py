@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from schemas.joints import JointTargets
-from schemas.message import Vector
-from services.arm.model.description import Joint
-from services.stepper_gateway.goals.limit_checks import SLACK, beyond
-from services.stepper_gateway.goals.rejections import invalid, invalid_joints
-from services.stepper_gateway.goals.trajectory_checks import require_known
-from services.stepper_gateway.motion.knot_sources import KNOT_TIME, TargetKnots
-from services.stepper_gateway.motion.knots import Knot, Limits
-from services.stepper_gateway.motion.target_tracker import TargetTracker
+from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.message import Vector
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.stepper_gateway.goals.limit_checks import SLACK, beyond
+from gemelo.services.stepper_gateway.goals.rejections import invalid, invalid_joints
+from gemelo.services.stepper_gateway.goals.trajectory_checks import require_known
+from gemelo.services.stepper_gateway.motion.knot_sources import KNOT_TIME, TargetKnots
+from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
+from gemelo.services.stepper_gateway.motion.target_tracker import TargetTracker
 
 NEVER = -1.0e9  # [s] chosen: before every monotonic clock's beginning
 

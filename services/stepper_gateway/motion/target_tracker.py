@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ruckig import ControlInterface, InputParameter, OutputParameter, Result, Ruckig, Synchronization
 
-from schemas.message import Vector
-from services.stepper_gateway.motion.knots import Knot, Limits
+from gemelo.schemas.message import Vector
+from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
 
 AT_REST = 1e-9  # [rad/s] or [m/s] below which ruckig's own rounding is rest
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from services.arm.model.description import Joint
-from services.stepper_gateway.device.clock import ClockSync
-from services.stepper_gateway.links.frames import Chunk
-from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.knot_sources import KnotSource
-from services.stepper_gateway.motion.knots import Knot, StepEncoder
-from services.stepper_gateway.motion.stream import SentChunk, Stream
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.stepper_gateway.device.clock import ClockSync
+from gemelo.services.stepper_gateway.links.frames import Chunk
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.knot_sources import KnotSource
+from gemelo.services.stepper_gateway.motion.knots import Knot, StepEncoder
+from gemelo.services.stepper_gateway.motion.stream import SentChunk, Stream
 
 LARGEST_CHUNK = 20  # [knots] chosen: 0.4 s of path, in one frame also with eight joints
 SMALLEST_CHUNK = 2  # [knots] 25 chunks a second at 20 ms; chosen: half as many frames as knots

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from services.vision.calibration.reprojection import (
+from gemelo.services.vision.calibration.reprojection import (
     ARM_SIGMA,
     CalibrationState,
     Reprojection,
@@ -16,7 +16,7 @@ from services.vision.calibration.reprojection import (
     solve,
     view_slopes,
 )
-from services.vision.rigid import Array
+from gemelo.services.vision.rigid import Array
 
 ROUNDS = 3
 LEAST_OFF = 0.01  # a share that a board may be larger or smaller than said

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.visualizer.content.updates import Poses, Times, Update
-from services.visualizer.model.rotations import Array
-from services.visualizer.model.visual_model import VisualModel
+from gemelo.services.visualizer.content.updates import Poses, Times, Update
+from gemelo.services.visualizer.model.rotations import Array
+from gemelo.services.visualizer.model.visual_model import VisualModel
 
 
 def arm_poses(model: VisualModel, root: str, times: Times, rows: Array) -> list[Update]:

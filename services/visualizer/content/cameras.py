@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from schemas.camera import CameraImage, CameraInfo
-from schemas.detections import Detection, Detections
-from services.visualizer.content import entities
-from services.visualizer.content.event_log import clamp_stamp
-from services.visualizer.content.updates import Frustum, Labels, Outlines, PictureUpdate, Update
-from services.visualizer.model.visual_model import VisualModel
+from gemelo.schemas.camera import CameraImage, CameraInfo
+from gemelo.schemas.detections import Detection, Detections
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.content.event_log import clamp_stamp
+from gemelo.services.visualizer.content.updates import Frustum, Labels, Outlines, PictureUpdate, Update
+from gemelo.services.visualizer.model.visual_model import VisualModel
 
 PICTURE_PERIOD = 200_000_000  # [ns] between two images of a camera in the view
 FARTHEST = 1e6  # [m] or [px]: no thing is there, and beyond float32 the view's arithmetic overflows

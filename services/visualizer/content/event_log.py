@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from schemas.device import DeviceEvent
-from schemas.system import LogRecord
-from services.visualizer.content import entities
-from services.visualizer.content.thinning import LAST_STAMP
-from services.visualizer.content.updates import LogLines, Update
+from gemelo.schemas.device import DeviceEvent
+from gemelo.schemas.system import LogRecord
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.content.thinning import LAST_STAMP
+from gemelo.services.visualizer.content.updates import LogLines, Update
 
 AGAIN = 60_000_000_000  # [ns] after which the newest line is said again: a viewer that comes late has only some minutes
 EVENT_LEVELS = {"fault": "ERROR", "estop": "ERROR", "homing_stopped": "WARNING", "inject_refused": "WARNING"}

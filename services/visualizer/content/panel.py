@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from schemas.control import ControlState
-from schemas.device import DeviceMode, DeviceState, DeviceStatus, SensorReadings, ShaftPositions
-from schemas.device_faults import explain
-from schemas.device_link import offline_word, reason_text, round_trip_text
-from schemas.joints import JointState, StepErrors
-from schemas.ledger import StepLedger, StoppingDistance
+from gemelo.schemas.control import ControlState
+from gemelo.schemas.device import DeviceMode, DeviceState, DeviceStatus, SensorReadings, ShaftPositions
+from gemelo.schemas.device_faults import explain
+from gemelo.schemas.device_link import offline_word, reason_text, round_trip_text
+from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.ledger import StepLedger, StoppingDistance
 
 STALE = 1_000_000_000  # [ns] after which a state is no longer called present
 LOST = 1  # [steps] between counter and shaft that a motor under load may be off

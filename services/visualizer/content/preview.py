@@ -6,14 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from schemas.joints import JointState
-from schemas.planning import PlannedPath
-from services.visualizer.content import entities, palette
-from services.visualizer.content.arm_poses import arm_pose_at
-from services.visualizer.content.event_log import clamp_stamp
-from services.visualizer.content.updates import ClearEntity, TranslucentArm, Update
-from services.visualizer.model.rotations import Array
-from services.visualizer.model.visual_model import VisualModel
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import PlannedPath
+from gemelo.services.visualizer.content import entities, palette
+from gemelo.services.visualizer.content.arm_poses import arm_pose_at
+from gemelo.services.visualizer.content.event_log import clamp_stamp
+from gemelo.services.visualizer.content.updates import ClearEntity, TranslucentArm, Update
+from gemelo.services.visualizer.model.rotations import Array
+from gemelo.services.visualizer.model.visual_model import VisualModel
 
 TIMES = 3  # that a motion is played
 REST = 0.7  # [s] at its end

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from schemas.message import Vector
-from schemas.scene import (
+from gemelo.schemas.message import Vector
+from gemelo.schemas.scene import (
     BoxShape,
     Contacts,
     CylinderShape,
@@ -18,12 +18,12 @@ from schemas.scene import (
     SceneObject,
     SphereShape,
 )
-from services.visualizer.content import entities, palette
-from services.visualizer.content.arm_poses import arm_pose_at
-from services.visualizer.content.event_log import clamp_stamp
-from services.visualizer.content.updates import ClearEntity, Labels, SolidMesh, TranslucentArm, Update
-from services.visualizer.model.triangle_meshes import ShadedMesh, primitive_mesh
-from services.visualizer.model.visual_model import VisualModel, VisualShape
+from gemelo.services.visualizer.content import entities, palette
+from gemelo.services.visualizer.content.arm_poses import arm_pose_at
+from gemelo.services.visualizer.content.event_log import clamp_stamp
+from gemelo.services.visualizer.content.updates import ClearEntity, Labels, SolidMesh, TranslucentArm, Update
+from gemelo.services.visualizer.model.triangle_meshes import ShadedMesh, primitive_mesh
+from gemelo.services.visualizer.model.visual_model import VisualModel, VisualShape
 
 PLANE = VisualShape("box", (2.0, 2.0, 0.004))  # [m] as much of a plane as is drawn
 MeshLoader = Callable[[MeshShape], ShadedMesh | None]

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from services.visualizer.content.updates import Times
-from services.visualizer.model.rotations import Array
+from gemelo.services.visualizer.content.updates import Times
+from gemelo.services.visualizer.model.rotations import Array
 
 LAST_STAMP = 2**63 - 1  # [ns] of a 64-bit time column
 CLOCK_CHANGED = 1_000_000_000  # [ns] a stamp that goes back by more is a new clock, not an old sample

@@ -8,10 +8,10 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from schemas.message import Vector
-from services.visualizer.content.palette import Rgba
-from services.visualizer.model.rotations import Array
-from services.visualizer.model.triangle_meshes import ShadedMesh
+from gemelo.schemas.message import Vector
+from gemelo.services.visualizer.content.palette import Rgba
+from gemelo.services.visualizer.model.rotations import Array
+from gemelo.services.visualizer.model.triangle_meshes import ShadedMesh
 
 Times = npt.NDArray[np.int64]
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from schemas.scene import MeshShape
-from services.arm.stl import BadStl, read_stl
-from services.visualizer.model.triangle_meshes import ShadedMesh
-from services.visualizer.model.visual_model import VisualModel
+from gemelo.schemas.scene import MeshShape
+from gemelo.services.arm.stl import BadStl, read_stl
+from gemelo.services.visualizer.model.triangle_meshes import ShadedMesh
+from gemelo.services.visualizer.model.visual_model import VisualModel
 
 
 def mesh_path(folder: Path, name: str) -> Path:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from services.visualizer.model.rotations import Array
-from services.visualizer.model.visual_model import VisualShape
+from gemelo.services.visualizer.model.rotations import Array
+from gemelo.services.visualizer.model.visual_model import VisualShape
 
 SEGMENTS = 40  # of a circle
 

@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from services.visualizer.model.rotations import Array, quaternion
-from services.visualizer.model.visual_model import Visual, VisualJoint, VisualModel, VisualShape
+from gemelo.services.visualizer.model.rotations import Array, quaternion
+from gemelo.services.visualizer.model.visual_model import Visual, VisualJoint, VisualModel, VisualShape
 
 
 def parse_urdf(text: str) -> VisualModel:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from services.visualizer.model.rotations import Array, multiply, rotate
+from gemelo.services.visualizer.model.rotations import Array, multiply, rotate
 
 
 @dataclass(frozen=True)

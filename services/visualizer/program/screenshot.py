@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from rerun.experimental import ViewerClient
 
-from services.visualizer.content import entities
-from services.visualizer.program.rerun_program import environment, rerun_binary
+from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.program.rerun_program import environment, rerun_binary
 
 SETTLE = 6.0  # [s] until the viewer's own notices have gone and every chunk is drawn
 DRAWN = 1.5  # [s] until another time is drawn

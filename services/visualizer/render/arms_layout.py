@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import rerun as rr
 import rerun.blueprint as rrb
 
-from services.visualizer.content import entities, palette
-from services.visualizer.render.layout import SCENE, ArmLayout, last, on_one_screen, past, time_panel
+from gemelo.services.visualizer.content import entities, palette
+from gemelo.services.visualizer.render.layout import SCENE, ArmLayout, last, on_one_screen, past, time_panel
 
 IN_A_ROW = 3  # arms, beside one another, whose plots stay readable
 

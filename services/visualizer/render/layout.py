@@ -8,9 +8,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TimelineColumn
 
-from services.visualizer.content import entities, palette
-from services.visualizer.core import unit
-from services.visualizer.model.visual_model import VisualJoint, VisualModel
+from gemelo.services.visualizer.content import entities, palette
+from gemelo.services.visualizer.core import unit
+from gemelo.services.visualizer.model.visual_model import VisualJoint, VisualModel
 
 TIMELINE = entities.TIMELINE
 JOINTS_PER_PAGE = 3  # rows of plots that stay readable

@@ -10,14 +10,14 @@ import msgspec
 import rerun as rr
 from msgspec import Meta
 
-from schemas.deployment import ViewerMode, ViewerSection
-from services.recordings.view_layout import SECONDS
-from services.visualizer.core import Visualizer
-from services.visualizer.program.viewer_connection import ViewerConnection
-from services.visualizer.render.arms_layout import SharedView, arms_blueprint
-from services.visualizer.render.layout import ArmLayout, blueprint
-from services.visualizer.render.recording_file import RecordingFile
-from services.visualizer.render.sink import APPLICATION, Sink
+from gemelo.schemas.deployment import ViewerMode, ViewerSection
+from gemelo.services.recordings.view_layout import SECONDS
+from gemelo.services.visualizer.core import Visualizer
+from gemelo.services.visualizer.program.viewer_connection import ViewerConnection
+from gemelo.services.visualizer.render.arms_layout import SharedView, arms_blueprint
+from gemelo.services.visualizer.render.layout import ArmLayout, blueprint
+from gemelo.services.visualizer.render.recording_file import RecordingFile
+from gemelo.services.visualizer.render.sink import APPLICATION, Sink
 
 SHARED_RECORDING = "arms-live"  # the same of every arm, or the viewer would show them one at a time
 

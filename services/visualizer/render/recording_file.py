@@ -14,9 +14,9 @@ from pathlib import Path
 
 import rerun as rr
 
-from services.runtime.process.own_files import make_own
-from services.runtime.process.unwritten import RETRY
-from services.visualizer.render.sink import APPLICATION, Sink
+from gemelo.services.runtime.process.own_files import make_own
+from gemelo.services.runtime.process.unwritten import RETRY
+from gemelo.services.visualizer.render.sink import APPLICATION, Sink
 
 TO_FLUSH = 1.0  # [s] for the disk to take what waits; chosen: one that is slower has failed
 ROOM = 1_000_000  # [bytes] that a disk must take before a file is begun; chosen: more than the first second

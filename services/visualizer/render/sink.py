@@ -9,8 +9,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from services.visualizer.content import entities, palette
-from services.visualizer.content.updates import (
+from gemelo.services.visualizer.content import entities, palette
+from gemelo.services.visualizer.content.updates import (
     ClearEntity,
     Frustum,
     Labels,
@@ -28,10 +28,10 @@ from services.visualizer.content.updates import (
     TranslucentArm,
     Update,
 )
-from services.visualizer.model.mesh_files import mesh_path
-from services.visualizer.model.triangle_meshes import ShadedMesh, primitive_mesh
-from services.visualizer.model.visual_model import Visual, VisualJoint, VisualModel
-from services.visualizer.render.layout import TIMELINE
+from gemelo.services.visualizer.model.mesh_files import mesh_path
+from gemelo.services.visualizer.model.triangle_meshes import ShadedMesh, primitive_mesh
+from gemelo.services.visualizer.model.visual_model import Visual, VisualJoint, VisualModel
+from gemelo.services.visualizer.render.layout import TIMELINE
 
 APPLICATION = "gemelo"
 FRUSTUM_LENGTH = 0.12  # [m] from the camera to the picture that is drawn in the scene

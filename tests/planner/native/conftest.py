@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.arm.model.description import ArmDescription, load_arm
-from services.planner.native.native_planner import NativePlanner
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.planner.native.native_planner import NativePlanner
 
 ARMS = ("rm1", "parol6")
 

@@ -7,9 +7,9 @@ import struct
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.frames.transforms import Rigid
-from services.planner.collision_geometry.link_shapes import hull_mesh
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
+from gemelo.services.arm.frames.transforms import Rigid
+from gemelo.services.planner.collision_geometry.link_shapes import hull_mesh
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 Array = NDArray[np.float64]
 REACH = 0.5  # [m] of both arms, about

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from services.planner.collision_geometry.shapes import ShapeKind
-from services.planner.native.paths import FreePath
-from services.planner.path.curve import spline_rows
-from services.planner.path.smoothing import Rounded, smooth, smooth_unknown
-from services.planner.request.deadline import NEVER
+from gemelo.services.planner.collision_geometry.shapes import ShapeKind
+from gemelo.services.planner.native.paths import FreePath
+from gemelo.services.planner.path.curve import spline_rows
+from gemelo.services.planner.path.smoothing import Rounded, smooth, smooth_unknown
+from gemelo.services.planner.request.deadline import NEVER
 from tests.planner.native.scenes import random_shape
 from tests.profiles import examples
 

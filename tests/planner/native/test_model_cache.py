@@ -12,18 +12,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.arm.kinematics import self_collisions
-from services.arm.model.description import ArmDescription, load_arm
-from services.arm.stl import read_stl
-from services.planner.collision_geometry.link_shapes import link_shapes, solid_of
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
-from services.planner.core import Planner
-from services.planner.native import model_cache, sphere_cover
-from services.planner.native.assembly import wide_spheres
-from services.planner.native.model_cache import FOLDER, cache_folder, cached_rows
-from services.planner.native.native_planner import NativePlanner
-from services.planner.native.sphere_cover import SphereCover, kept_cover
-from services.planner.trial import trial
+from gemelo.services.arm.kinematics import self_collisions
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.arm.stl import read_stl
+from gemelo.services.planner.collision_geometry.link_shapes import link_shapes, solid_of
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
+from gemelo.services.planner.core import Planner
+from gemelo.services.planner.native import model_cache, sphere_cover
+from gemelo.services.planner.native.assembly import wide_spheres
+from gemelo.services.planner.native.model_cache import FOLDER, cache_folder, cached_rows
+from gemelo.services.planner.native.native_planner import NativePlanner
+from gemelo.services.planner.native.sphere_cover import SphereCover, kept_cover
+from gemelo.services.planner.trial import trial
 from tests.arm.plates import add_plate
 from tests.disks import refusing_disk
 from tests.planner.test_world import stl_box
@@ -181,8 +181,8 @@ def meshed(rm1_folder: Path, tmp_path: Path) -> ArmDescription:
 
 def test_another_process_finds_what_the_first_has_made(meshed: ArmDescription, made: list[int], folder: Path):
     program = (
-        "import sys; from pathlib import Path; from services.arm.model.description import load_arm; "
-        "from services.planner.native.native_planner import NativePlanner; "
+        "import sys; from pathlib import Path; from gemelo.services.arm.model.description import load_arm; "
+        "from gemelo.services.planner.native.native_planner import NativePlanner; "
         "NativePlanner(load_arm(Path(sys.argv[1])))"
     )
     subprocess.run([sys.executable, "-c", program, str(meshed.folder)], check=True)
@@ -197,7 +197,7 @@ def test_another_process_finds_what_the_first_has_made(meshed: ArmDescription, m
 def test_the_log_says_how_far_it_is_and_which_model_is_too_large(
     meshed: ArmDescription, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ):
-    monkeypatch.setattr("services.planner.native.sphere_cover.MOST_SPHERES", 1)
+    monkeypatch.setattr("gemelo.services.planner.native.sphere_cover.MOST_SPHERES", 1)
     with caplog.at_level(logging.INFO):
         NativePlanner(meshed)
     assert 'link "low_cube" (6 of 6): spheres around 12 triangles ...' in caplog.text
@@ -209,7 +209,7 @@ def test_the_log_says_how_far_it_is_and_which_model_is_too_large(
 def test_the_trial_names_a_model_that_is_too_large_with_the_remedy(
     meshed: ArmDescription, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr("services.planner.native.sphere_cover.MOST_SPHERES", 1)
+    monkeypatch.setattr("gemelo.services.planner.native.sphere_cover.MOST_SPHERES", 1)
     found = [finding for finding in trial(meshed, 0.0) if finding.subject == 'link "brazo_link"']
     assert len(found) == 1
     assert "spheres reach" in found[0].message

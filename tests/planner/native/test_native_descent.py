@@ -8,12 +8,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.model.description import ArmDescription, load_arm
-from services.planner.kinematics.centring import Centring
-from services.planner.kinematics.descent import Descent
-from services.planner.kinematics.targets import ToolTarget
-from services.runtime.deployment import project_root
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.services.planner.kinematics.centring import Centring
+from gemelo.services.planner.kinematics.descent import Descent
+from gemelo.services.planner.kinematics.targets import ToolTarget
+from gemelo.services.runtime.deployment import project_root
 
 ARMS = Path(__file__).parents[1] / "arms"
 FOLDERS = [project_root() / "urdf/rm1", project_root() / "urdf/parol6", *sorted(ARMS.iterdir())]

@@ -11,29 +11,29 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
-from services.planner.native.binding import motion
-from services.planner.native.native_planner import NativePlanner
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
+from gemelo.services.planner.native.binding import motion
+from gemelo.services.planner.native.native_planner import NativePlanner
 from tests.planner.native.conftest import load
 
 STUB = Path(motion.__file__).with_name("_motion.pyi")
 WITHOUT = """
 import sys
-sys.modules["services.planner.native._motion"] = None
+sys.modules["gemelo.services.planner.native._motion"] = None
 try:
-    import services.planner.native.binding
+    import gemelo.services.planner.native.binding
 except ImportError as error:
     print(type(error).__name__, error)
 """
 
 CHOSEN = """
 import sys
-sys.modules["services.planner.native.binding"] = None
-from services.planner.collision.sphere_check import cancel_flag, counted_time, sphere_check
-from services.planner.timing.profile import stop_and_go
-from services.planner.timing.timing import timed_path
-from services.planner.verification.feasibility import peak_rates
-from services.planner.verification.verify import evaluated
+sys.modules["gemelo.services.planner.native.binding"] = None
+from gemelo.services.planner.collision.sphere_check import cancel_flag, counted_time, sphere_check
+from gemelo.services.planner.timing.profile import stop_and_go
+from gemelo.services.planner.timing.timing import timed_path
+from gemelo.services.planner.verification.feasibility import peak_rates
+from gemelo.services.planner.verification.verify import evaluated
 print(type(cancel_flag()).__name__, type(counted_time(0.5)).__name__, type(sphere_check(None)).__name__)
 print(stop_and_go.__name__, timed_path.__name__, peak_rates.__name__, evaluated.__name__)
 """

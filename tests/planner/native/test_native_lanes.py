@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.planner.collision_geometry.shapes import ShapeKind
-from services.planner.native.binding import motion
-from services.planner.native.native_planner import NativePlanner
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.planner.collision_geometry.shapes import ShapeKind
+from gemelo.services.planner.native.binding import motion
+from gemelo.services.planner.native.native_planner import NativePlanner
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import random_shape
 from tests.profiles import count

@@ -7,14 +7,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from schemas.frames import Transform
-from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject
-from services.arm.kinematics.kinematics import Kinematics
-from services.planner.collision.sphere_check import show_scene
-from services.planner.collision.world import World
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
-from services.planner.native.native_planner import NativePlanner
-from services.planner.native.paths import Effort, FreePath
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.planner.collision.sphere_check import show_scene
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
+from gemelo.services.planner.native.native_planner import NativePlanner
+from gemelo.services.planner.native.paths import Effort, FreePath
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import random_shape

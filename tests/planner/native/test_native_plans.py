@@ -9,15 +9,15 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from services.arm.kinematics.kinematics import Kinematics
-from services.bench.scenes import SCENES
-from services.planner.collision.clearance import CLEARANCE
-from services.planner.collision.sphere_check import NativeCheck
-from services.planner.collision.world import World
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
-from services.planner.native.binding import CancelFlag
-from services.planner.native.native_planner import NativePlanner
-from services.planner.native.paths import FailureReason, FreePath, NoPath
+from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.services.bench.scenes import SCENES
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision.sphere_check import NativeCheck
+from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
+from gemelo.services.planner.native.binding import CancelFlag
+from gemelo.services.planner.native.native_planner import NativePlanner
+from gemelo.services.planner.native.paths import FailureReason, FreePath, NoPath
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.conftest import load
 

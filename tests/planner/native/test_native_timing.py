@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.arm.model.description import load_arm
-from services.planner.native.compiled import IN_PYTHON
-from services.planner.path.curve import TurnsOnTheSpot
-from services.planner.path.smoothing import smooth, stopping
-from services.planner.request.deadline import NEVER
-from services.planner.timing.profile import (
+from gemelo.services.arm.model.description import load_arm
+from gemelo.services.planner.native.compiled import IN_PYTHON
+from gemelo.services.planner.path.curve import TurnsOnTheSpot
+from gemelo.services.planner.path.smoothing import smooth, stopping
+from gemelo.services.planner.request.deadline import NEVER
+from gemelo.services.planner.timing.profile import (
     JointLimits,
     NoProfile,
     States,
@@ -23,8 +23,8 @@ from services.planner.timing.profile import (
     stop_and_go_in_python,
     trajectory_of,
 )
-from services.planner.timing.timing import timed_path, timed_path_in_python
-from services.planner.verification.verify import at_times
+from gemelo.services.planner.timing.timing import timed_path, timed_path_in_python
+from gemelo.services.planner.verification.verify import at_times
 from tests.optional import need
 from tests.profiles import examples
 

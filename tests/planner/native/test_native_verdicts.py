@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from services.planner.collision_geometry.shapes import Attachment, CollisionShape, ShapeKind, TriangleMesh
-from services.planner.native.native_planner import ContactPair, NativePlanner
+from gemelo.services.planner.collision_geometry.shapes import Attachment, CollisionShape, ShapeKind, TriangleMesh
+from gemelo.services.planner.native.native_planner import ContactPair, NativePlanner
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import box_mesh, random_shape

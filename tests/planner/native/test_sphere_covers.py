@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.planner.collision_geometry.link_shapes import hull_mesh, link_shapes
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
-from services.planner.collision_geometry.solids import Box, Capsule, ConvexSolid, Cylinder, polytope_around
-from services.planner.native.sphere_cover import (
+from gemelo.services.planner.collision_geometry.link_shapes import hull_mesh, link_shapes
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
+from gemelo.services.planner.collision_geometry.solids import Box, Capsule, ConvexSolid, Cylinder, polytope_around
+from gemelo.services.planner.native.sphere_cover import (
     MOST_SPHERES,
     CompiledPolytope,
     cover_of,

@@ -6,11 +6,11 @@ from functools import partial
 
 import viser
 
-from schemas.device_link import is_old
-from services.panel.model.readings import Readings
-from services.panel.model.units import text_of
-from services.panel.view.gripper_box import GripperBox
-from services.panel.view.kit import Kit, Mirror, Steady, box, esc, set_if_new, table
+from gemelo.schemas.device_link import is_old
+from gemelo.services.panel.model.readings import Readings
+from gemelo.services.panel.model.units import text_of
+from gemelo.services.panel.view.gripper_box import GripperBox
+from gemelo.services.panel.view.kit import Kit, Mirror, Steady, box, esc, set_if_new, table
 
 
 class DeviceTab:

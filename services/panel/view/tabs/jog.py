@@ -6,14 +6,14 @@ from collections.abc import Callable
 from math import radians
 
 import gemelo
-from services.arm.frames.transforms import from_rpy, multiply
-from services.arm.model.description import Joint
-from services.panel.model.jogging import JogWish
-from services.panel.model.operator import Operator
-from services.panel.model.readings import Readings
-from services.panel.model.units import jog_speed
-from services.panel.view.kit import Kit, box, esc, note, set_if_new, without_event
-from services.panel.words.words import Words
+from gemelo.services.arm.frames.transforms import from_rpy, multiply
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.panel.model.jogging import JogWish
+from gemelo.services.panel.model.operator import Operator
+from gemelo.services.panel.model.readings import Readings
+from gemelo.services.panel.model.units import jog_speed
+from gemelo.services.panel.view.kit import Kit, box, esc, note, set_if_new, without_event
+from gemelo.services.panel.words.words import Words
 
 HOLD_RATE = 20.0  # [Hz] of a held button
 LINEAR, ANGULAR = 0.1, 1.0  # [m/s], [rad/s] of the tool at 100 %

@@ -7,14 +7,14 @@ import time
 import viser
 
 import gemelo
-from services.arm.model.description import Joint
-from services.panel.model.motions import PLANNERS, MotionChoice
-from services.panel.model.readings import Readings
-from services.panel.model.units import SHOWN, STEP, meant, slider_range, slider_value, text_of
-from services.panel.view.kit import OWN_CHANGE, Kit, Mirror, box, esc, note, set_if_new, table
-from services.panel.view.tabs.jog import jog_text
-from services.panel.view.tabs.tool_fields import ToolFields
-from services.panel.view.world import DrawnWorld
+from gemelo.services.arm.model.description import Joint
+from gemelo.services.panel.model.motions import PLANNERS, MotionChoice
+from gemelo.services.panel.model.readings import Readings
+from gemelo.services.panel.model.units import SHOWN, STEP, meant, slider_range, slider_value, text_of
+from gemelo.services.panel.view.kit import OWN_CHANGE, Kit, Mirror, box, esc, note, set_if_new, table
+from gemelo.services.panel.view.tabs.jog import jog_text
+from gemelo.services.panel.view.tabs.tool_fields import ToolFields
+from gemelo.services.panel.view.world import DrawnWorld
 
 SCRUB = 100.0  # parts of the plan's duration
 

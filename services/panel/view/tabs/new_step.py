@@ -24,8 +24,8 @@ from gemelo.programs import (
     Wait,
     WaitFor,
 )  # fmt: skip
-from services.panel.model.teaching import target_names
-from services.panel.view.kit import Kit, set_if_new
+from gemelo.services.panel.model.teaching import target_names
+from gemelo.services.panel.view.kit import Kit, set_if_new
 
 KINDS = (
     "go",

@@ -14,11 +14,11 @@ from gemelo.programs import (
     export_script,
     path_text,
 )
-from services.panel.model.problems import problem_of
-from services.panel.model.readings import Readings
-from services.panel.view.kit import Kit, box, esc, note, set_if_new
-from services.panel.view.tabs.new_step import NewStep
-from services.panel.words.step_text import step_text
+from gemelo.services.panel.model.problems import problem_of
+from gemelo.services.panel.model.readings import Readings
+from gemelo.services.panel.view.kit import Kit, box, esc, note, set_if_new
+from gemelo.services.panel.view.tabs.new_step import NewStep
+from gemelo.services.panel.words.step_text import step_text
 
 COLORS = {
     RunStatus.RUNNING: "#2f9e44", RunStatus.PAUSED: "#f59f00", RunStatus.FAILED: "#e03131",

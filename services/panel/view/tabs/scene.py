@@ -9,13 +9,13 @@ from pathlib import Path
 import viser
 
 import gemelo
-from schemas.frames import Transform
-from schemas.scene import BoxShape, CylinderShape, SceneObject, Shape, SphereShape
-from services.panel.model.readings import Readings
-from services.panel.view.browser import LARGEST_UPLOAD
-from services.panel.view.kit import Kit, esc, note, set_if_new
-from services.panel.view.world import DrawnWorld
-from services.panel.words.words import Words
+from gemelo.schemas.frames import Transform
+from gemelo.schemas.scene import BoxShape, CylinderShape, SceneObject, Shape, SphereShape
+from gemelo.services.panel.model.readings import Readings
+from gemelo.services.panel.view.browser import LARGEST_UPLOAD
+from gemelo.services.panel.view.kit import Kit, esc, note, set_if_new
+from gemelo.services.panel.view.world import DrawnWorld
+from gemelo.services.panel.words.words import Words
 
 SIZE = (40.0, 40.0, 40.0)  # [mm] of a new object
 FOLDER = Path("scenes")

@@ -7,11 +7,11 @@ from math import degrees
 import numpy as np
 from viser.transforms import SO3
 
-from schemas.ledger import StepLedger
-from services.panel.model.readings import Readings
-from services.panel.model.units import in_degrees, text_of
-from services.panel.view.browser import Browser
-from services.panel.view.kit import Kit, esc, note, set_if_new, table
+from gemelo.schemas.ledger import StepLedger
+from gemelo.services.panel.model.readings import Readings
+from gemelo.services.panel.model.units import in_degrees, text_of
+from gemelo.services.panel.view.browser import Browser
+from gemelo.services.panel.view.kit import Kit, esc, note, set_if_new, table
 
 LOG_LINES = 8
 

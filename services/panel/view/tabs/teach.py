@@ -9,10 +9,10 @@ import imageio.v3 as imageio
 import numpy as np
 
 import gemelo
-from services.panel.model.problems import problem_of
-from services.panel.model.readings import Readings
-from services.panel.model.units import text_of
-from services.panel.view.kit import Kit, box, esc, note, set_if_new, table
+from gemelo.services.panel.model.problems import problem_of
+from gemelo.services.panel.model.readings import Readings
+from gemelo.services.panel.model.units import text_of
+from gemelo.services.panel.view.kit import Kit, box, esc, note, set_if_new, table
 
 PICTURE = (180, 240)  # [pixels] height, width
 TO_DRAW = 5.0  # [s] that a browser may take for a picture

@@ -10,10 +10,10 @@ from typing import Any
 import viser
 
 import gemelo
-from services.arm.frames.transforms import Point, Quaternion, from_rpy, to_rpy
-from services.panel.model.goal import GoalState
-from services.panel.model.tool_turns import ALL_RINGS
-from services.panel.view.kit import OWN_CHANGE, Kit, set_if_new
+from gemelo.services.arm.frames.transforms import Point, Quaternion, from_rpy, to_rpy
+from gemelo.services.panel.model.goal import GoalState
+from gemelo.services.panel.model.tool_turns import ALL_RINGS
+from gemelo.services.panel.view.kit import OWN_CHANGE, Kit, set_if_new
 
 PLACE_STEP, TURN_STEP = 0.1, 0.1  # [mm], [deg] of the fields
 Event = viser.GuiEvent[viser.GuiVector3Handle]

@@ -8,9 +8,9 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from services.stepper_gateway.links.connection import ReceiveQueue
-from services.stepper_gateway.links.foreign.stand_in import Report
-from services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.links.connection import ReceiveQueue
+from gemelo.services.stepper_gateway.links.foreign.stand_in import Report
+from gemelo.services.stepper_gateway.links.link import Kind, Received
 
 PAUSE = 0.005  # [s] longest wait between two looks at the clock, as a path is played; chosen: a quarter of a knot
 FULL = 1024  # frames that may wait; chosen: the gateway sends some hundred a second

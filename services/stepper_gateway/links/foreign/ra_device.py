@@ -7,13 +7,13 @@ from collections.abc import Callable
 
 import msgspec
 
-from services.arm.device.device_config import reference_steps
-from services.arm.model.description import ArmDescription
-from services.arm.motors.relative_moves import ramp_of
-from services.stepper_gateway.links.foreign import ra_messages
-from services.stepper_gateway.links.foreign.ra_sender import RaSender
-from services.stepper_gateway.links.foreign.stand_in import Report, StandIn
-from services.stepper_gateway.links.link import Kind
+from gemelo.services.arm.device.device_config import reference_steps
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.arm.motors.relative_moves import ramp_of
+from gemelo.services.stepper_gateway.links.foreign import ra_messages
+from gemelo.services.stepper_gateway.links.foreign.ra_sender import RaSender
+from gemelo.services.stepper_gateway.links.foreign.stand_in import Report, StandIn
+from gemelo.services.stepper_gateway.links.link import Kind
 
 NAME = "an AccelStepper sketch on ra/juntas"
 SILENCE = 10.0  # words of its telemetry that a sketch may miss before it counts as gone; chosen: QoS 0 loses some

@@ -14,16 +14,16 @@ from functools import partial
 
 from paho.mqtt import client as paho
 
-from services.arm.model.description import ArmDescription
-from services.mqtt.access import BrokerAccess
-from services.mqtt.client import CONNECT_TIMEOUT, MqttClient, code_of, is_failure
-from services.mqtt.failures import failure, refusal
-from services.stepper_gateway.links.connection import keep_connected
-from services.stepper_gateway.links.foreign import ra_messages
-from services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor
-from services.stepper_gateway.links.foreign.ra_device import RaDevice
-from services.stepper_gateway.links.link import Kind, Received
-from services.stepper_gateway.links.mqtt import KEEP_ALIVE
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.mqtt.access import BrokerAccess
+from gemelo.services.mqtt.client import CONNECT_TIMEOUT, MqttClient, code_of, is_failure
+from gemelo.services.mqtt.failures import failure, refusal
+from gemelo.services.stepper_gateway.links.connection import keep_connected
+from gemelo.services.stepper_gateway.links.foreign import ra_messages
+from gemelo.services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor
+from gemelo.services.stepper_gateway.links.foreign.ra_device import RaDevice
+from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.links.mqtt import KEEP_ALIVE
 
 
 class RaLink:

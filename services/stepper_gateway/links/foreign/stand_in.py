@@ -10,12 +10,12 @@ from collections.abc import Callable, Sequence
 
 import msgspec
 
-from firmware.bindings.device import CoreDevice
-from schemas.device import DeviceCommandKind, DeviceMode
-from schemas.device_config import config_text
-from services.arm.device.device_config import device_config
-from services.arm.model.description import ArmDescription
-from services.stepper_gateway.links.frames import (
+from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.schemas.device import DeviceCommandKind, DeviceMode
+from gemelo.schemas.device_config import config_text
+from gemelo.services.arm.device.device_config import device_config
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.stepper_gateway.links.frames import (
     BadFrame,
     Code,
     CommandFrame,
@@ -26,7 +26,7 @@ from services.stepper_gateway.links.frames import (
     decode,
     encode,
 )
-from services.stepper_gateway.links.link import Kind
+from gemelo.services.stepper_gateway.links.link import Kind
 
 STALL = 0.1  # [s] a later caller was stopped by the operating system, and catches nothing up; chosen: five knots
 LAST_SLOTS = 2000  # [us] that run after a stall; chosen: two slots show that the device stood still

@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import msgspec
 
-from services.arm.device.device_config import reference_steps
-from services.arm.model.description import ArmDescription
-from services.stepper_gateway.links.foreign.stand_in import Report, StandIn
-from services.stepper_gateway.links.foreign.text_exchange import TextExchange
-from services.stepper_gateway.links.foreign.text_messages import AnswerReader, line_of
-from services.stepper_gateway.links.frames import BadFrame, Sync, decode
-from services.stepper_gateway.links.link import Kind
+from gemelo.services.arm.device.device_config import reference_steps
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.stepper_gateway.links.foreign.stand_in import Report, StandIn
+from gemelo.services.stepper_gateway.links.foreign.text_exchange import TextExchange
+from gemelo.services.stepper_gateway.links.foreign.text_messages import AnswerReader, line_of
+from gemelo.services.stepper_gateway.links.frames import BadFrame, Sync, decode
+from gemelo.services.stepper_gateway.links.link import Kind
 
 NAME = "a board that speaks <SEQ,J1,...>"
 SILENCE = 2.0  # [s] without an answer to any line, after which the board is not there; chosen: all RETRIES have failed

@@ -9,7 +9,7 @@ import statistics
 from collections import OrderedDict, deque
 from dataclasses import dataclass
 
-from services.stepper_gateway.links.foreign.text_messages import HALF, SEQ_MODULUS, LineAnswer
+from gemelo.services.stepper_gateway.links.foreign.text_messages import HALF, SEQ_MODULUS, LineAnswer
 
 REMEMBERED = 256  # lines whose answers are told apart; chosen: more than a line is repeated in its patience
 TRIPS = 2048  # latest round trips; chosen: enough for a 99th percentile

@@ -8,12 +8,12 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from services.arm.model.description import ArmDescription
-from services.stepper_gateway.links.connection import keep_connected
-from services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor
-from services.stepper_gateway.links.foreign.text_device import TextDevice
-from services.stepper_gateway.links.link import Kind, Received
-from services.stepper_gateway.links.serial_port import OpenPort, complaint, open_port
+from gemelo.services.arm.model.description import ArmDescription
+from gemelo.services.stepper_gateway.links.connection import keep_connected
+from gemelo.services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor
+from gemelo.services.stepper_gateway.links.foreign.text_device import TextDevice
+from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.links.serial_port import OpenPort, complaint, open_port
 
 
 class TextLink:
