@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from gemelo import Node, topics
-from gemelo.services.arm.frames.frame_buffer import FrameBuffer, FrameError
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.frames.frame_buffer import FrameBuffer, FrameError
+from gemelo.libraries.arm.model.description import load_arm
 
 with Node("tool_pose") as node:
     arm, frames = load_arm(Path(node.deployment.robot)), FrameBuffer()

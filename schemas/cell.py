@@ -1,4 +1,4 @@
-"""`cell.toml` as types: the cameras, things and places around the arm. Read by `gemelo.services.arm.cell`.
+"""`cell.toml` as types: the cameras, things and places around the arm. Read by `gemelo.libraries.arm.cell`.
 
 Everything is SI, positions are in the arm's base frame unless `parent` names a link. `camera.toml` beside it holds what
 was measured of each camera: it is written by `gemelo camera calibrate` and `mount` only, and wins over what is here.

@@ -1,11 +1,11 @@
-"""`urdf/<robot>/robot.toml` as types: what turns steps into motion. Read by `gemelo.services.arm`.
+"""`urdf/<robot>/robot.toml` as types: what turns steps into motion. Read by `gemelo.libraries.arm`.
 
 Numbers that must be exact (gear ratios) are TOML strings holding a fraction or a decimal, for
 example "46.656" or "380/21"; everything else is SI unless the name says otherwise. Bounds stand with the types;
-those that depend on another field or file are checked by `gemelo.services.arm`.
+those that depend on another field or file are checked by `gemelo.libraries.arm`.
 
 An arm to plan and look at only leaves out [device], [[driver]], every [joint.motor] and whatever is wired to a pin, and
-[[joint]] too if it likes: `gemelo.services.arm` then generates a virtual device, and what tick rate is left out.
+[[joint]] too if it likes: `gemelo.libraries.arm` then generates a virtual device, and what tick rate is left out.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from gemelo.services.runtime.process.arithmetic import use_one_kernel
 from tests import optional, profiles
 
 if TYPE_CHECKING:
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 use_one_kernel()  # as the planner's process does: what it computes is compared with recordings of other machines
 
@@ -62,7 +62,7 @@ def rm1_folder() -> Path:
 
 @pytest.fixture(scope="session")
 def rm1(rm1_folder: Path) -> ArmDescription:
-    from gemelo.services.arm.model.description import load_arm  # imports numpy, which has chosen its kernel then
+    from gemelo.libraries.arm.model.description import load_arm  # imports numpy, which has chosen its kernel then
 
     return load_arm(rm1_folder)
 

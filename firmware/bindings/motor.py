@@ -6,9 +6,9 @@ import ctypes as c
 from collections.abc import Sequence
 
 from gemelo.firmware.bindings.library import MAX_CURVE, HornRecord, MotorRecord, load_library
+from gemelo.libraries.arm.model.gripper import METRES, pulse_speed
 from gemelo.schemas.device_config import UNUSED, SensorConfig
 from gemelo.schemas.robot import Motor, ServoGripper
-from gemelo.services.arm.model.gripper import METRES, pulse_speed
 
 MARGIN = 1.25  # a servo turns faster than it is asked to
 

@@ -33,6 +33,8 @@ from gemelo.api.session import Session
 from gemelo.api.targets import as_target, ik_request, joint_state, request_of
 from gemelo.api.units import Pose
 from gemelo.api.verification import OnVerifying, Verification, verify
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
 from gemelo.schemas.gripper import GripperState
@@ -48,8 +50,6 @@ from gemelo.schemas.topics import (
     STEP_LEDGER,
     STOPPING_DISTANCE,
 )
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.runtime.node import Node
 
 

@@ -8,6 +8,8 @@ from gemelo.api.errors import BadArgument, Lost, Refused
 from gemelo.api.homing import joint_name
 from gemelo.api.session import PATIENCE, Session
 from gemelo.api.targets import number
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import (
     ArmCommand,
     ConfigureRequest,
@@ -37,8 +39,6 @@ from gemelo.schemas.topics import (
     DEVICE_STATUS,
     DEVICE_STOP,
 )
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.description import ArmDescription
 
 TO_ANSWER = 3.0  # [s] for a command
 TO_CONFIGURE = 10.0  # [s]: a board may write it to its flash first

@@ -5,11 +5,11 @@ from __future__ import annotations
 from gemelo.api.errors import BadArgument, Lost
 from gemelo.api.session import PATIENCE, Session
 from gemelo.api.units import Pose
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.frames.frame_buffer import FrameBuffer, FrameError
+from gemelo.libraries.arm.frames.transforms import from_message
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.topics import FRAMES, STATIC_FRAMES
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.frames.frame_buffer import FrameBuffer, FrameError
-from gemelo.services.arm.frames.transforms import from_message
 
 
 class Frames:

@@ -7,10 +7,10 @@ import math
 from gemelo.api.errors import Refused
 from gemelo.api.seeing import Seen, body_of
 from gemelo.api.units import Point, Pose
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Quaternion, Rigid, compose, from_axis_angle, rotate
+from gemelo.libraries.arm.model.gripper import jaw_edges
 from gemelo.schemas.cell import Thing
 from gemelo.schemas.robot import Gripper
-from gemelo.services.arm.frames.transforms import IDENTITY, Quaternion, Rigid, compose, from_axis_angle, rotate
-from gemelo.services.arm.model.gripper import jaw_edges
 
 GAP = 0.003  # [m] between the thing's top and the tool, and between the jaws' tips and the table
 OVERLAP = 0.004  # [m] of the jaws' length that must be beside the thing

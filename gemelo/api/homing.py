@@ -9,13 +9,13 @@ from collections.abc import Callable, Iterable, Sequence
 from gemelo.api.errors import Aborted, BadArgument, Interrupted, Refused
 from gemelo.api.homing_report import HOME, OFF, TO, WAITS, HomingProgress, HomingReport
 from gemelo.api.session import Session
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device import DeviceCommand, DeviceEvent, DeviceMode, DeviceState, HomeCommand, StopKind
 from gemelo.schemas.device_faults import fault_text
 from gemelo.schemas.device_link import offline_text
 from gemelo.schemas.robot import HomingDirection
 from gemelo.schemas.topics import DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.description import ArmDescription, Joint
 
 TO_BEGIN = 3.0  # [s] from the device's yes to its first word of homing
 LAST_WORDS = 0.5  # [s] for events that come after the state

@@ -11,11 +11,11 @@ from gemelo.api.arguments import Joints, Vector
 from gemelo.api.errors import BadArgument, Interrupted, Lost, Refused
 from gemelo.api.session import Session
 from gemelo.api.targets import joint_state, named_joints, vector
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceEvent
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.planning import JogCommand, JogStatus
 from gemelo.schemas.topics import DEVICE_EVENTS, JOG, JOG_STATUS, JOINT_STATES, JOINT_TARGETS
-from gemelo.services.arm.model.description import ArmDescription
 
 PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
 ANSWER = 3.0  # [s] of jogging without a word of the planner, after which it counts as lost

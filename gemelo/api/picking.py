@@ -13,11 +13,11 @@ from gemelo.api.grasping import grasp_point, lift_above, looking_down, turn_betw
 from gemelo.api.seeing import Eyes, Seen, add_to_scene, body_of
 from gemelo.api.targets import FULL
 from gemelo.api.units import Point, Pose
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, from_axis_angle
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.cell import Place, PosePlace, Thing
 from gemelo.schemas.robot import Gripper
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose, from_axis_angle
 
 if TYPE_CHECKING:
     from gemelo.api.arguments import Grip

@@ -20,6 +20,7 @@ from gemelo.api.frames import pose_from
 from gemelo.api.session import Session, answer_of
 from gemelo.api.targets import as_target, named_joints
 from gemelo.api.units import Pose
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.motion import JointTrajectory
 from gemelo.schemas.planning import (
@@ -40,7 +41,6 @@ from gemelo.schemas.planning import (
 from gemelo.schemas.scene import Contact
 from gemelo.schemas.text_file import NotUtf8, read_text
 from gemelo.schemas.topics import DEVICE_STATE, FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS, STATE_VALIDITY
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.runtime.clock import token
 from gemelo.services.runtime.requests.client import PendingCall
 

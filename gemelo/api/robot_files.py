@@ -10,10 +10,10 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from gemelo.api.errors import BadArgument, Error, Lost
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model import description as descriptions
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.deployment import Deployment
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model import description as descriptions
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.runtime.deployment import CONFIG, load_deployment, project_root, when_silent
 from gemelo.services.runtime.running import find_deployment, folder_of
 from gemelo.services.runtime.started import deployment_of_arm

@@ -44,7 +44,7 @@ def load_mesh(path: str | Path, scale: float | None = None) -> MeshShape:
 
 def _require_size(path: Path, content: bytes, scale: float | None) -> None:
     """Refuses what is far too large; what is no mesh at all the planner says."""
-    from gemelo.services.arm.stl import BadStl, read_stl  # numpy takes half of the time of `import gemelo`
+    from gemelo.libraries.arm.stl import BadStl, read_stl  # numpy takes half of the time of `import gemelo`
 
     try:
         vertices = read_stl(content).vertices

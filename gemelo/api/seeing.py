@@ -11,14 +11,14 @@ from gemelo.api.errors import BadArgument, Error, Refused
 from gemelo.api.scene import Scene
 from gemelo.api.session import Session
 from gemelo.api.units import Point, Pose
+from gemelo.libraries.arm.cell.cell_file import Cell, cell_of, load_cell
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, from_message
 from gemelo.schemas.camera import CameraCondition, CameraStatus
 from gemelo.schemas.cell import CellTexts, TagThing, Thing
 from gemelo.schemas.detections import Detection, Detections
 from gemelo.schemas.system import Empty
 from gemelo.schemas.topics import CAMERA, CELL, JOINT_STATES, camera_detections, camera_status
-from gemelo.services.arm.cell.cell_file import Cell, cell_of, load_cell
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message
 from gemelo.services.runtime.endpoints import info_request
 from gemelo.services.runtime.topics import Subscription
 

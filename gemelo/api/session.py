@@ -12,10 +12,10 @@ from itertools import count
 from typing import Any, TypeVar
 
 from gemelo.api.errors import Error, Lost, Refused
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import Request, Topic
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.runtime import errors as runtime
 from gemelo.services.runtime.node import Node
 from gemelo.services.runtime.node_clock import NodeClock

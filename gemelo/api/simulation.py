@@ -26,10 +26,10 @@ from gemelo.api.errors import BadArgument, Error
 from gemelo.api.robot_files import Robot, load_robot
 from gemelo.api.session import Session
 from gemelo.api.targets import named_joints
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.robot import Motor
 from gemelo.schemas.simulation import WireConditions
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.description import ArmDescription, Joint
 from gemelo.services.runtime.node import Node
 
 if TYPE_CHECKING:

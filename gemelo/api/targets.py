@@ -14,6 +14,9 @@ from gemelo.api.arguments import ToolGoal
 from gemelo.api.arguments import Waypoint as Waypoint
 from gemelo.api.errors import BadArgument
 from gemelo.api.units import Pose
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.frames.transforms import from_rpy
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import (
     MOST_ATTEMPTS,
@@ -32,9 +35,6 @@ from gemelo.schemas.planning import (
     WaypointGoal,
 )
 from gemelo.schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.frames.transforms import from_rpy
-from gemelo.services.arm.model.description import ArmDescription
 
 LookUp = Callable[[str, str], Pose]  # (target, source): where the frame `source` is in `target` now
 

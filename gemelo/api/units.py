@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from gemelo.services.arm.frames.transforms import from_rpy, rotate
+from gemelo.libraries.arm.frames.transforms import from_rpy, rotate
 
 Point = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 from gemelo.api.errors import BadArgument, Refused
 from gemelo.api.ledger import Ledger
 from gemelo.api.planning import Plan
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device_config import InputRole
 from gemelo.schemas.ledger import VerifiedBy
 from gemelo.schemas.robot import HomingDirection
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.description import ArmDescription, Joint
 
 if TYPE_CHECKING:
     from gemelo.api.arm import Arm

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from gemelo.api.arm import Arm
 from gemelo.api.errors import BadArgument
+from gemelo.libraries.arm.errors import suggestion
 from gemelo.programs.names import checked_folder, program_name
 from gemelo.programs.program import Program
 from gemelo.programs.reading import read_program
 from gemelo.schemas.deployment import Deployment
-from gemelo.services.arm.errors import suggestion
 
 
 def programs_folder(of: Arm | Deployment) -> Path:

@@ -8,6 +8,8 @@ from pathlib import Path
 from gemelo.api.errors import BadArgument, Error
 from gemelo.api.gripping import opening_of
 from gemelo.api.targets import joint_state
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import program_name, read_text
 from gemelo.programs.points import Point
@@ -15,8 +17,6 @@ from gemelo.programs.program import Program
 from gemelo.programs.reading import parse_program, value_mistakes
 from gemelo.programs.steps import AnyStep, Attach, Call, Grip, MotionStep, Output, Pick, WaitFor
 from gemelo.programs.values import DEEPEST, Wrong, in_words_of_a_file
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.description import ArmDescription
 
 PointsByName = Mapping[str, Point]
 ProgramsByName = Mapping[str, Program]

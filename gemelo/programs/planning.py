@@ -10,10 +10,10 @@ from gemelo.api.errors import BadArgument
 from gemelo.api.planning import Plan
 from gemelo.api.targets import FULL, Target, Waypoint
 from gemelo.api.units import Pose
+from gemelo.libraries.arm.errors import suggestion
 from gemelo.programs.points import Point
 from gemelo.programs.sequence import Leg
 from gemelo.programs.steps import Arc, Line, MotionStep, goal_of
-from gemelo.services.arm.errors import suggestion
 
 ALLOWED_TIME = 5.0  # [s] for one plan
 

@@ -12,14 +12,14 @@ from pathlib import Path
 from gemelo.api.errors import BadArgument, Error
 from gemelo.api.targets import Joints, named_joints
 from gemelo.api.whole_files import write_whole
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import checked_folder, point_name, read_text
 from gemelo.programs.program import VERSION
 from gemelo.programs.reading import load_toml
 from gemelo.programs.toml_lines import toml_lines
 from gemelo.programs.toml_text import key_text, value_text
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.description import ArmDescription
 
 LARGEST_PICTURE = 10_000_000  # [bytes]
 KINDS = {b"\x89PNG\r\n\x1a\n": "png", b"\xff\xd8\xff": "jpg"}  # of pictures, by how they begin

@@ -13,13 +13,13 @@ from typing import Any
 import msgspec
 
 from gemelo.api.gripping import CLOSE, OPEN
+from gemelo.libraries.arm.errors import suggestion
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import read_text
 from gemelo.programs.program import VERSION, Program, step_place
 from gemelo.programs.steps import KINDS, AnyStep, Repeat, Step, StepPath, Wait
 from gemelo.programs.toml_lines import Where, toml_lines
 from gemelo.programs.values import DEEPEST, MOST_STEPS, wrong_values
-from gemelo.services.arm.errors import suggestion
 
 UNITS = {"m": ("m", 1.0), "cm": ("m", 0.01), "mm": ("m", 0.001), "rad": ("rad", 1.0), "deg": ("rad", math.pi / 180.0),
          "s": ("s", 1.0), "ms": ("s", 0.001), "min": ("s", 60.0), "m/s": ("m/s", 1.0), "mm/s": ("m/s", 0.001),

@@ -17,13 +17,13 @@ from typing import NamedTuple
 
 import trimesh
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.model.urdf_edit import with_collisions
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanRequest
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription, load_arm
-from gemelo.services.arm.model.urdf_edit import with_collisions
 from gemelo.services.bench.figures import Figure, FigureGoal, of_samples
 from gemelo.services.collision_fitting.fit_writing import write_fits
 from gemelo.services.collision_fitting.mesh_fit import LinkFit, fit_links

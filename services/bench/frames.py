@@ -9,13 +9,13 @@ import time
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
+from gemelo.libraries.arm.frames.frame_buffer import FrameBuffer
+from gemelo.libraries.arm.frames.transforms import to_message
+from gemelo.libraries.arm.kinematics.chain import joint_transform
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceState
 from gemelo.schemas.frames import FrameTransform, FrameTransforms
 from gemelo.schemas.topics import DEVICE_STATE, FRAMES
-from gemelo.services.arm.frames.frame_buffer import FrameBuffer
-from gemelo.services.arm.frames.transforms import to_message
-from gemelo.services.arm.kinematics.chain import joint_transform
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from gemelo.services.bench.scenes import rm1
 from gemelo.services.bench.stack import Running, Stacks

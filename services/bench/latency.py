@@ -9,6 +9,8 @@ import subprocess
 import sys
 import time
 
+from gemelo.libraries.arm.interpolation import TrajectorySampler
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import CommandAck, CommandChunk, DeviceEvent
 from gemelo.schemas.joints import JointTargets
@@ -24,8 +26,6 @@ from gemelo.schemas.topics import (
     JOINT_TARGETS,
     PLAN,
 )
-from gemelo.services.arm.interpolation import TrajectorySampler
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
 from gemelo.services.bench.stack import Running, Stacks
 

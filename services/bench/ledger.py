@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.robot import Motor
 from gemelo.schemas.topics import STEP_LEDGER
-from gemelo.services.arm.model.description import ArmDescription, Joint
 from gemelo.services.bench.figures import Figure, rounded
 from gemelo.services.bench.scenes import rm1
 from gemelo.services.bench.stopping import random_place, smooth_move

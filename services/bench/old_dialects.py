@@ -25,11 +25,11 @@ import msgspec
 from gemelo.firmware.bindings.device import CoreDevice
 from gemelo.firmware.bindings.motor import VirtualMotor
 from gemelo.firmware.platform.host.sketch import AustinStepper, HostSketch
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.model.description import ArmDescription, heard_by_the_board
+from gemelo.libraries.arm.motors.relative_moves import ramp_of
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.schemas.robot import Dialect
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.model.description import ArmDescription, heard_by_the_board
-from gemelo.services.arm.motors.relative_moves import ramp_of
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
 from gemelo.services.bench.scenes import rm1
 from gemelo.services.stepper_gateway.links.foreign.ra_messages import joints_message

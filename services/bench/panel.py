@@ -19,8 +19,8 @@ import psutil
 from playwright.sync_api import Page, sync_playwright
 
 import gemelo
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.joints import JointState
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.bench.bare_browser import Said, bare_browser
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from gemelo.services.bench.stack import Stacks, has_mosquitto

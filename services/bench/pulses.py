@@ -11,9 +11,9 @@ import msgspec
 
 from gemelo.firmware.bindings.device import CoreDevice
 from gemelo.firmware.bindings.frames import PinChange
+from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.device_config import DeviceConfig, InputConfig, InputRole
-from gemelo.services.arm.device.device_config import device_config
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
 from gemelo.services.bench.probe import BOOT, FINE, WireKnot, bench_config, chunk_of, joint_of, play, pulses_of
 from gemelo.services.bench.scenes import parol6, rm1

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.message import Vector
 from gemelo.schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.runtime.deployment import project_root
 
 Array = NDArray[np.float64]

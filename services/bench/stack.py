@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import psutil
 
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.deployment import Deployment
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
 from gemelo.services.runtime.deployment import load_deployment, project_root
 from gemelo.services.runtime.node import Node

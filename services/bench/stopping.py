@@ -15,13 +15,13 @@ from typing import NamedTuple
 
 import msgspec
 
+from gemelo.libraries.arm.kinematics.tool_jacobian import ToolJacobian
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device import DeviceCommandKind
 from gemelo.schemas.ledger import StoppingDistance
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
 from gemelo.schemas.topics import STOPPING_DISTANCE
-from gemelo.services.arm.kinematics.tool_jacobian import ToolJacobian
-from gemelo.services.arm.model.description import ArmDescription, Joint
 from gemelo.services.bench.figures import Figure, NotMeasured, quantile, rounded
 from gemelo.services.bench.scenes import rm1
 from gemelo.services.virtual_arm.gateway_driver import asked

@@ -6,10 +6,10 @@ import math
 import random
 from collections.abc import Callable, Iterator
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import CommandAck, CommandChunk, DeviceMode
 from gemelo.schemas.message import Message
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from gemelo.services.bench.scenes import rm1
 from gemelo.services.stepper_gateway.device.clock import ClockSync

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import cv2
 
+from gemelo.libraries.arm.cell.camera_model import believed_info, exact_info
+from gemelo.libraries.arm.cell.cell_file import Cell
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.camera import CameraCondition, CameraImage
 from gemelo.schemas.cell import CameraRecord, FileSource, FolderSource, V4l2Source, VirtualSource
 from gemelo.schemas.topics import (
@@ -16,9 +19,6 @@ from gemelo.schemas.topics import (
     camera_status,
     camera_truth,
 )
-from gemelo.services.arm.cell.camera_model import believed_info, exact_info
-from gemelo.services.arm.cell.cell_file import Cell
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.camera.core import CameraCore
 from gemelo.services.camera.reader import ClockedReader, ImageReader
 from gemelo.services.camera.sources.source import CameraFault, CameraSource, EncodedImage

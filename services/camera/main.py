@@ -6,13 +6,13 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE
+from gemelo.libraries.arm.cell.cell_file import Cell, load_cell, read_cell_texts
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.cell import CellTexts
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.topics import CELL
-from gemelo.services.arm.cell.camera_file import CAMERA_FILE
-from gemelo.services.arm.cell.cell_file import Cell, load_cell, read_cell_texts
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.runtime.application import service
 from gemelo.services.runtime.deployment import project_root
 from gemelo.services.runtime.node import Node

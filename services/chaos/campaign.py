@@ -9,7 +9,7 @@ from random import Random
 import msgspec
 
 import gemelo
-from gemelo.services.arm.device.device_config import device_config
+from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.services.chaos.faults import BYSTANDERS, FAULTS, READY, Fault
 from gemelo.services.chaos.invariants import is_starved, jerks, jumps, misses, moved, segments
 from gemelo.services.chaos.person import quietly_cancel

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceState
-from gemelo.services.arm.model.description import ArmDescription
 
 SLOT = 0.001  # [s] of the device's path: a state may be one older than it says
 STEPS = 2.0  # by which two rounded positions may be off

@@ -9,10 +9,10 @@ from random import Random
 
 import gemelo
 from gemelo import DeviceMode
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceEvent, DeviceState, ShaftPositions
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DEVICE_EVENTS, DEVICE_SHAFT, DEVICE_STATE, JOINT_STATES
-from gemelo.services.arm.model.description import ArmDescription
 
 SHARES = (0.2, 0.8)  # of a joint's travel between which goals lie
 SPEEDS = (0.3, 1.0)

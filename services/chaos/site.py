@@ -15,12 +15,12 @@ from types import TracebackType
 
 import gemelo
 from gemelo.firmware.platform.host.slot_record import VARIABLE
+from gemelo.libraries.arm.cell.cell_file import deployed_cell
 from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.deployment import Deployment, Wire
 from gemelo.schemas.message import BadMessage, decode
 from gemelo.schemas.system import Exchange
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
-from gemelo.services.arm.cell.cell_file import deployed_cell
 from gemelo.services.broker import mosquitto
 from gemelo.services.broker.replacement import NotInstalled
 from gemelo.services.chaos.clocks import ClockError, SteppingClocks

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.deployment import Deployment
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.cli.credentials import WIFI_PASSWORD, CredentialsChange, certificate, password, require_sound
 from gemelo.services.cli.errors import CommandError, ExitCode, usage
 from gemelo.services.cli.parser import Options, Parser, positive_integer

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from gemelo.libraries.arm.cell.cell_file import Cell, deployed_cell
+from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.schemas.camera import CameraCondition, CameraImage, CameraInfo, CameraStatus
 from gemelo.schemas.cell import CameraRecord
 from gemelo.schemas.detections import Detections
 from gemelo.schemas.topics import camera_detections, camera_image, camera_info, camera_status
-from gemelo.services.arm.cell.cell_file import Cell, deployed_cell
-from gemelo.services.arm.errors import DescriptionError
 from gemelo.services.cli.cells import cell_of
 from gemelo.services.cli.errors import CommandError, ExitCode, require_folder, unknown, usage
 from gemelo.services.cli.output import print_coloured

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import gemelo
-from gemelo.services.arm.frames.transforms import compose
+from gemelo.libraries.arm.frames.transforms import compose
 from gemelo.services.cli import camera_poses
 from gemelo.services.cli.camera_boards import bar_option, tag_board
 from gemelo.services.cli.camera_images import from_bus, info_of, subject

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import gemelo
+from gemelo.libraries.arm.cell.camera_file import MOUNT_BOARD
+from gemelo.libraries.arm.model.urdf import JointKind
 from gemelo.schemas.camera import CameraInfo
-from gemelo.services.arm.cell.camera_file import MOUNT_BOARD
-from gemelo.services.arm.model.urdf import JointKind
 from gemelo.services.cli.camera_boards import tag_board
 from gemelo.services.cli.camera_images import Eye, Subject
 from gemelo.services.cli.errors import CommandError, ExitCode, in_commands, unknown, usage
@@ -36,7 +36,7 @@ from gemelo.services.vision.rigid import Array, from_transform, rigid, to_transf
 
 if TYPE_CHECKING:
     from gemelo import Arm
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 POSES, MOST_POSES = 15, 60
 IMAGES = 3  # of each pose

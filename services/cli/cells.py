@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gemelo.services.arm.cell.cell_file import Cell, deployed_cell
-from gemelo.services.arm.cell.cell_file import cell_of as cell_in
-from gemelo.services.arm.errors import DescriptionError
+from gemelo.libraries.arm.cell.cell_file import Cell, deployed_cell
+from gemelo.libraries.arm.cell.cell_file import cell_of as cell_in
+from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.services.cli.errors import CommandError, ExitCode, usage
 from gemelo.services.cli.session import connect
 

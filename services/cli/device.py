@@ -23,7 +23,7 @@ from gemelo.services.cli.units import parse_joints, share, show
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 BY_NAME: dict[str, DeviceCommand | StopKind] = {
     "arm": ArmCommand(),

@@ -22,7 +22,7 @@ from gemelo.services.cli.terminal import LiveBlock
 from gemelo.services.cli.units import positive_seconds
 
 if TYPE_CHECKING:
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 REFRESH = 5.0  # [Hz]
 

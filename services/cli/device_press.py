@@ -16,7 +16,7 @@ from gemelo.services.cli.units import LENGTH, TIME, parse_quantity
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 HELD = {"on": 1.0, "off": 0.0, "auto": -1.0}
 

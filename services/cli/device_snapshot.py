@@ -16,7 +16,7 @@ from gemelo.services.cli.errors import CommandError, ExitCode
 from gemelo.services.cli.session import CommandSession, other_robots
 
 if TYPE_CHECKING:
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 PATIENCE = 2.0  # [s] for the first messages
 POLL = 0.02  # [s]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.cli.errors import CommandError, ExitCode, usage
 from gemelo.services.cli.parser import Options, Parser, positive_integer
 from gemelo.services.cli.provision import BAUD, open_line

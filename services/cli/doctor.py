@@ -183,7 +183,7 @@ def _refusal(folder: Path) -> OSError | None:
 
 
 def _robot(deployment: Deployment) -> Diagnosis:
-    from gemelo.services.arm.checks.check import Severity, check  # half a second
+    from gemelo.libraries.arm.checks.check import Severity, check  # half a second
 
     errors = [each for each in check(project_root() / deployment.robot) if each.severity is Severity.ERROR]
     if errors:

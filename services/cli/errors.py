@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from gemelo.libraries.arm.model.description import ArmDescription, Joint
     from gemelo.schemas.robot import DigitalOutput, Input, Sensor
-    from gemelo.services.arm.model.description import ArmDescription, Joint
 
 
 class ExitCode(IntEnum):

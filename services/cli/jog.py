@@ -22,7 +22,7 @@ from gemelo.services.cli.units import SPEED_OF, angular_speed, parse_joints, pos
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 PERIOD = 0.02  # [s] between two commands while a key is held
 DRAWN = 0.1  # [s] between two drawings
@@ -115,7 +115,7 @@ class Position:
     """The newest position of tool and joints, as a line."""
 
     def __init__(self, arm: Arm) -> None:
-        from gemelo.services.arm.kinematics.kinematics import Kinematics  # loads numpy
+        from gemelo.libraries.arm.kinematics.kinematics import Kinematics  # loads numpy
 
         self._arm, self._kinematics = arm.description, Kinematics(arm.description)
         self._states = arm.node.latest(JOINT_STATES)

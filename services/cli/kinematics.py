@@ -21,7 +21,7 @@ from gemelo.services.cli.units import SHOWN, angle, length, parse_joints, rotati
 
 if TYPE_CHECKING:
     from gemelo import Arm, Configurations, Pose, Robot
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 XYZ = ("X", "Y", "Z")
 IK_EXAMPLES = """examples:

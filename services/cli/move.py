@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from argparse import _ArgumentGroup as Group
 
     from gemelo import Arm, Motion, Plan, Robot
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 XYZ = ("X", "Y", "Z")
 EXAMPLES = """examples:

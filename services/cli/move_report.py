@@ -16,7 +16,7 @@ from gemelo.services.cli.units import show
 
 if TYPE_CHECKING:
     from gemelo import Plan
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 
 class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -108,7 +108,7 @@ def tool_error(arm: ArmDescription, trajectory: JointTrajectory, errors: Mapping
 
     Forward kinematics of both: the goal, and the goal minus the error.
     """
-    from gemelo.services.arm.kinematics.chain import link_transforms  # slow to load: numpy
+    from gemelo.libraries.arm.kinematics.chain import link_transforms  # slow to load: numpy
 
     goals = dict(zip(trajectory.joint_names, trajectory.points[-1].positions, strict=True))
     reached = {

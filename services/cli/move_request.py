@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import asdict, replace
 
+from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.schemas.planning import (
     MOST_ATTEMPTS,
     CircularMotion,
@@ -23,13 +24,12 @@ from gemelo.schemas.planning import (
     WaypointGoal,
 )
 from gemelo.schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
-from gemelo.services.arm.frames.transforms import from_rpy
 from gemelo.services.cli.errors import unknown, usage
 from gemelo.services.cli.parser import Options
 from gemelo.services.cli.units import parse_joints
 
 if TYPE_CHECKING:
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 DEFAULT_TIME = 1.0  # [s] that planning may take if nothing is said
 LONGEST_TIME = 3600.0  # [s] that planning may be allowed

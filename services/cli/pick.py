@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from gemelo.services.arm.cell.cell_file import deployed_cell
-from gemelo.services.arm.errors import DescriptionError
+from gemelo.libraries.arm.cell.cell_file import deployed_cell
+from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.services.cli.errors import CommandError, ExitCode, in_commands
 from gemelo.services.cli.parser import Choices, Options, Parser, json_option
 from gemelo.services.cli.session import connect_arm, load_robot

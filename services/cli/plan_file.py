@@ -15,7 +15,7 @@ from gemelo.services.cli.errors import CommandError, usage
 
 if TYPE_CHECKING:
     from gemelo import Plan
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 STANDARD_INPUT = "-"
 LARGEST_FILE = 100_000_000  # [bytes] a trajectory of an hour has a tenth of it

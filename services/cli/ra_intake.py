@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from gemelo.services.arm.model.description import ArmDescription, Joint
+    from gemelo.libraries.arm.model.description import ArmDescription, Joint
 
 OUTPUT = "avanzar"
 LARGEST = 256  # [bytes] of a message

@@ -26,7 +26,7 @@ from gemelo.services.cli.units import DEGREE, SHOWN
 
 if TYPE_CHECKING:
     from gemelo import Refused
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 
 def request_text(request: PlanRequest, arm: ArmDescription) -> str:

@@ -16,8 +16,8 @@ from gemelo.services.cli.text_table import table
 from gemelo.services.cli.units import positive_length
 
 if TYPE_CHECKING:
-    from gemelo.services.arm.checks.findings import Finding
-    from gemelo.services.arm.kinematics.collision_matrix import LinkPairData
+    from gemelo.libraries.arm.checks.findings import Finding
+    from gemelo.libraries.arm.kinematics.collision_matrix import LinkPairData
 
 FIT = "gemelo.services.collision_fitting.main"  # in a process of its own: the command line loads no planner
 BULGE = 0.005  # [m] that a sphere may reach beyond its link
@@ -46,7 +46,7 @@ def run_check(options: Options) -> ExitCode:
 
 def print_findings(folder: Path, xacro: Mapping[str, str]) -> ExitCode:
     """Prints every finding; FAILED if one of them is an error."""
-    from gemelo.services.arm.checks.check import Severity  # slow to load: numpy and trimesh
+    from gemelo.libraries.arm.checks.check import Severity  # slow to load: numpy and trimesh
 
     findings = _findings(folder, xacro)
     for finding in findings:
@@ -58,9 +58,9 @@ def print_findings(folder: Path, xacro: Mapping[str, str]) -> ExitCode:
 
 def _findings(folder: Path, xacro: Mapping[str, str]) -> list[Finding]:
     """Of a robot's folder; of a source for `gemelo import` where there is no robot.toml."""
-    from gemelo.services.arm.checks.check import Severity  # slow to load: numpy and trimesh
-    from gemelo.services.arm.checks.check import check as findings_in
-    from gemelo.services.arm.model.description import ROBOT_FILE
+    from gemelo.libraries.arm.checks.check import Severity  # slow to load: numpy and trimesh
+    from gemelo.libraries.arm.checks.check import check as findings_in
+    from gemelo.libraries.arm.model.description import ROBOT_FILE
 
     if (folder / ROBOT_FILE).is_file():
         from gemelo.services.robot_import.trial import trial_findings
@@ -68,7 +68,7 @@ def _findings(folder: Path, xacro: Mapping[str, str]) -> list[Finding]:
         findings = findings_in(folder)
         is_broken = any(finding.severity is Severity.ERROR for finding in findings)
         return findings if is_broken else [*findings, *trial_findings(folder)]
-    from gemelo.services.arm.errors import DescriptionError
+    from gemelo.libraries.arm.errors import DescriptionError
     from gemelo.services.robot_import.importing import ImportOptions, source_findings
 
     print(f"{folder} has no {ROBOT_FILE}: as `gemelo import {folder}` reads it, which mends what is a note")
@@ -145,11 +145,11 @@ def _fitted(folder: Path, *options: str) -> ExitCode:
 
 def print_matrix(folder: Path, write: bool, always_within: float | None) -> ExitCode:
     """Prints the pairs that sampling finds and the changes of the SRDF; changes it if `write`. `always_within` [m]."""
-    from gemelo.services.arm.kinematics.collision_matrix import collision_matrix  # slow to load: coal
-    from gemelo.services.arm.model.description import load_arm
+    from gemelo.libraries.arm.kinematics.collision_matrix import collision_matrix  # slow to load: coal
+    from gemelo.libraries.arm.model.description import load_arm
 
     require_folder(folder, str(folder))
-    from gemelo.services.arm.model.srdf_edit import with_pairs
+    from gemelo.libraries.arm.model.srdf_edit import with_pairs
 
     try:
         arm = load_arm(folder)
@@ -176,8 +176,8 @@ def _say(progress: str) -> None:
 
 def plan_of(text: str, verdicts: list[LinkPairData]) -> tuple[dict[tuple[str, str], str], list[str]]:
     """The pairs that the SRDF is to have with their reasons, and each change as a line; a person's reasons stay."""
-    from gemelo.services.arm.kinematics.collision_matrix import DisabledReason  # slow to load: coal
-    from gemelo.services.arm.model.srdf_edit import entries
+    from gemelo.libraries.arm.kinematics.collision_matrix import DisabledReason  # slow to load: coal
+    from gemelo.libraries.arm.model.srdf_edit import entries
 
     present = {entry.pair: entry.reason for entry in entries(text)}
     ours = {str(reason) for reason in DisabledReason}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import gemelo
+from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import (
     BoxShape,
@@ -16,7 +17,6 @@ from gemelo.schemas.scene import (
     Shape,
     SphereShape,
 )
-from gemelo.services.arm.frames.transforms import from_rpy
 from gemelo.services.cli.errors import usage
 from gemelo.services.cli.parser import Options
 from gemelo.services.cli.request_text import millimetres, rotation_text
@@ -118,7 +118,7 @@ def sized_text(shape: Shape) -> str:
 
 def _mesh_size(shape: MeshShape) -> str:
     """Empty for what is no mesh, which the planner says."""
-    from gemelo.services.arm.stl import BadStl, read_stl  # slow to load: numpy
+    from gemelo.libraries.arm.stl import BadStl, read_stl  # slow to load: numpy
 
     try:
         vertices = read_stl(shape.data or (project_root() / shape.path).read_bytes()).vertices

@@ -13,8 +13,8 @@ from gemelo.services.cli.errors import CommandError, ExitCode, in_commands, usag
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
+    from gemelo.libraries.arm.model.description import ArmDescription
     from gemelo.schemas.deployment import Deployment
-    from gemelo.services.arm.model.description import ArmDescription
     from gemelo.services.runtime.node import Node
 
 

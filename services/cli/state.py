@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from gemelo.libraries.arm.frames.frame_buffer import FrameBuffer, FrameError
 from gemelo.schemas.control import ControlState
 from gemelo.schemas.device import DeviceState, DeviceStatus
 from gemelo.schemas.device_link import offline_word, reason_text, round_trip_text
@@ -23,7 +24,6 @@ from gemelo.schemas.topics import (
     STEP_LEDGER,
     STOPPING_DISTANCE,
 )
-from gemelo.services.arm.frames.frame_buffer import FrameBuffer, FrameError
 from gemelo.services.cli.device_snapshot import OPEN_LOOP
 from gemelo.services.cli.errors import CommandError, ExitCode
 from gemelo.services.cli.output import control
@@ -33,7 +33,7 @@ from gemelo.services.cli.text_table import table
 from gemelo.services.cli.units import SHOWN
 
 if TYPE_CHECKING:
-    from gemelo.services.arm.model.description import ArmDescription
+    from gemelo.libraries.arm.model.description import ArmDescription
 
 PATIENCE = 2.0  # [s] for the first messages
 TO_HEAR_OF_CONTROL = 0.5  # [s] for what the gateway keeps for late joiners

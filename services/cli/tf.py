@@ -12,10 +12,10 @@ from xml.sax.saxutils import escape
 
 import msgspec
 
+from gemelo.libraries.arm.frames.frame_buffer import FrameBuffer, FrameError
+from gemelo.libraries.arm.frames.transforms import to_rpy
 from gemelo.schemas.frames import FrameTransform, FrameTransforms
 from gemelo.schemas.topics import FRAMES, STATIC_FRAMES
-from gemelo.services.arm.frames.frame_buffer import FrameBuffer, FrameError
-from gemelo.services.arm.frames.transforms import to_rpy
 from gemelo.services.cli.errors import CommandError, ExitCode, unknown
 from gemelo.services.cli.field_path import FieldPath
 from gemelo.services.cli.forms import (

@@ -54,7 +54,7 @@ VERB_OF = {"rad": "turns", "m": "slides"}
 
 
 class NamedJoint(Protocol):
-    """The properties of a joint that are needed here; `gemelo.services.arm` has them."""
+    """The properties of a joint that are needed here; `gemelo.libraries.arm` has them."""
 
     @property
     def name(self) -> str: ...

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
-from gemelo.services.arm.model.urdf import Origin
+from gemelo.libraries.arm.model.urdf import Origin
 from gemelo.services.collision_fitting.fitted_shape import Fitted, FittedKind
 from gemelo.services.collision_fitting.hull import corners_and_sides
 

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from gemelo.services.arm.model.urdf import Triple
+from gemelo.libraries.arm.model.urdf import Triple
 from gemelo.services.collision_fitting.fitted_shape import Fitted
 from gemelo.services.collision_fitting.mesh_surface import MeshSurface
 from gemelo.services.planner.collision_geometry.link_shapes import solid_of

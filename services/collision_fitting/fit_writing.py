@@ -9,11 +9,11 @@ from pathlib import Path
 
 import trimesh
 
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription, load_arm
-from gemelo.services.arm.model.urdf import Triple
-from gemelo.services.arm.model.urdf_edit import with_collisions
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.model.urdf import Triple
+from gemelo.libraries.arm.model.urdf_edit import with_collisions
 from gemelo.services.collision_fitting.excess import depth_in
 from gemelo.services.collision_fitting.link_meshes import HULLS
 from gemelo.services.collision_fitting.mesh_fit import LinkFit

@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from gemelo.services.arm.frames.transforms import compose, from_rpy
-from gemelo.services.arm.model.urdf import Origin, Triple
+from gemelo.libraries.arm.frames.transforms import compose, from_rpy
+from gemelo.libraries.arm.model.urdf import Origin, Triple
 from gemelo.services.planner.collision_geometry.link_shapes import hull_mesh
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.frames.transforms import from_rpy
-from gemelo.services.arm.model.urdf import Origin, Triple
+from gemelo.libraries.arm.frames.transforms import from_rpy
+from gemelo.libraries.arm.model.urdf import Origin, Triple
 from gemelo.services.collision_fitting.fitted_shape import Fitted, FittedKind
 from gemelo.services.collision_fitting.hull import corners_and_sides, smallest_ball, smallest_rectangle
 from gemelo.services.planner.collision_geometry.shapes import matrix_of

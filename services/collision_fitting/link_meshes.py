@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.checks.meshes import IN_MILLIMETRES, MOST_TRIANGLES, scene_of
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.frames.transforms import from_rpy
-from gemelo.services.arm.model.urdf import Geometry, UrdfLink
+from gemelo.libraries.arm.checks.meshes import IN_MILLIMETRES, MOST_TRIANGLES, scene_of
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.frames.transforms import from_rpy
+from gemelo.libraries.arm.model.urdf import Geometry, UrdfLink
 from gemelo.services.planner.collision_geometry.shapes import TriangleMesh, matrix_of
 
 Array = NDArray[np.float64]

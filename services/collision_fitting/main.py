@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.errors import ConfigurationError
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.native.sphere_cover import BULGE, link_cover
 

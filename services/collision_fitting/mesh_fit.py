@@ -14,8 +14,8 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from gemelo.services.arm.errors import DescriptionError, suggestion
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.collision_fitting.excess import SHARE, Excess, excess_of
 from gemelo.services.collision_fitting.fitted_shape import Fitted
 from gemelo.services.collision_fitting.link_meshes import link_mesh

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 from gemelo import Target
-from gemelo.services.arm.frames.transforms import compose, inverse
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.libraries.arm.frames.transforms import compose, inverse
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 
 SINE_RATE = 10.0  # [Hz] of the targets
 SINE_TIME = 10.0  # [s]

@@ -9,13 +9,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from gemelo.libraries.arm.cell.cell_file import Cell, Tagged, height_of_frame
+from gemelo.libraries.arm.cell.colours import RGB, nearest_colour
+from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import BoxThing, Colour, ColourThing, OnnxThing, TagRecord, TagThing
 from gemelo.schemas.detections import Detection, DetectionKind, Detections, Unclear
 from gemelo.schemas.frames import Transform
-from gemelo.services.arm.cell.cell_file import Cell, Tagged, height_of_frame
-from gemelo.services.arm.cell.colours import RGB, nearest_colour
-from gemelo.services.arm.frames.transforms import from_rpy
 from gemelo.services.detector.regions import (
     DetectorView,
     distances_from,

@@ -11,15 +11,15 @@ import msgspec
 from msgspec import Meta
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.cell.cell_file import Cell, load_cell
+from gemelo.libraries.arm.frames.transforms import compose, inverse, to_message
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.camera import CameraImage, CameraInfo
 from gemelo.schemas.cell import OnnxThing
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import CAMERA, GATEWAY, JOINT_STATES, camera_detections, camera_image, camera_info
-from gemelo.services.arm.cell.cell_file import Cell, load_cell
-from gemelo.services.arm.frames.transforms import compose, inverse, to_message
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.runtime.application import service
 from gemelo.services.runtime.deployment import project_root
 from gemelo.services.runtime.node import Node

@@ -8,13 +8,13 @@ import tomllib
 from collections import defaultdict
 from pathlib import Path, PurePosixPath
 
+from gemelo.libraries.arm.cell.cell_file import load_cell
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.programs.toml_lines import Where
 from gemelo.schemas.deployment import DeviceKind, Wire
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.roles import ROLES
 from gemelo.schemas.site import Site
-from gemelo.services.arm.cell.cell_file import load_cell
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.credentials.authority import DAYS
 from gemelo.services.hosts.certificates import AUTHORITY_FOLDER
 from gemelo.services.hosts.deployments import HOST

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.site import Site
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.credentials.authority import Authority
 from gemelo.services.credentials.expiry import WARN_WITHIN, days_left, expiry
 from gemelo.services.credentials.private_files import write

@@ -8,6 +8,8 @@ from typing import Any
 
 import msgspec
 
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint, urdf_of
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceEvent, DeviceMode, DeviceState
 from gemelo.schemas.frames import RobotDescription
@@ -17,8 +19,6 @@ from gemelo.schemas.message import Message
 from gemelo.schemas.planning import PlanResponse
 from gemelo.schemas.system import LogLevel, LogRecord, ParameterChange
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, JOINT_STATES
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.urdf import JointKind, UrdfJoint, urdf_of
 from gemelo.services.logger.incident_watch import STOPPED, Trigger
 from gemelo.services.recordings.channels import Entry
 from gemelo.services.recordings.incidents import BLACK_BOX, Happening, Incident, time_of

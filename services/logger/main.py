@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from gemelo.libraries.arm.cell.cell_file import deployed_cell
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import Topic
-from gemelo.services.arm.cell.cell_file import deployed_cell
 from gemelo.services.logger.black_box import BlackBox, BlackBoxWriter, SavingMark
 from gemelo.services.logger.core import Batch, Logger
 from gemelo.services.logger.disk import LoggerParameters, RecordingWriter

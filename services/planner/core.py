@@ -8,6 +8,8 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.motion import MOST_POINTS, JointTrajectory
 from gemelo.schemas.planning import (
@@ -22,8 +24,6 @@ from gemelo.schemas.planning import (
     WaypointGoal,
 )
 from gemelo.schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.cartesian.tool_motions import ToolMotions
 from gemelo.services.planner.collision.checker import CollisionChecker
 from gemelo.services.planner.collision.world import World

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JogCommand, JogStatus
 from gemelo.schemas.topics import (
@@ -15,8 +17,6 @@ from gemelo.schemas.topics import (
     JOG_STATUS,
     JOINT_TARGETS,
 )
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.jog.jog import NEVER, PERIOD, SILENCE, STATUS_PERIOD, Jog, signed
 from gemelo.services.planner.jog.jog_log import JogLog, digest_of

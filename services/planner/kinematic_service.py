@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import FK, IK, STATE_VALIDITY, Request
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
 from gemelo.services.planner.scene.answer_log import AnswerLog

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.topics import JOINT_STATES
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.jog_service import JogService
 from gemelo.services.planner.kinematic_service import KinematicService

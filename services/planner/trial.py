@@ -17,12 +17,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.checks.findings import Finding, error, warning
+from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.model.urdf import JointKind
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse
-from gemelo.services.arm.checks.findings import Finding, error, warning
-from gemelo.services.arm.kinematics.self_collisions import LinkPair
-from gemelo.services.arm.model.description import ArmDescription, load_arm
-from gemelo.services.arm.model.urdf import JointKind
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.native import assembly
 from gemelo.services.planner.request.deadline import Deadline

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
+from gemelo.libraries.arm.frames.transforms import from_rpy
+from gemelo.libraries.arm.stl import BadStl, read_stl
 from gemelo.schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, Shape, SphereShape
-from gemelo.services.arm.frames.transforms import from_rpy
-from gemelo.services.arm.stl import BadStl, read_stl
 from gemelo.services.recordings import foxglove_schemas as fox
 
 LINK = fox.Color(r=0.85, g=0.85, b=0.87, a=1.0)

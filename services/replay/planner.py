@@ -12,10 +12,10 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.planning import PlanCode, PlanInputs, PlanningTimes, PlanRequest, PlanResponse, SceneVersion
 from gemelo.schemas.topics import JOG_INPUTS, PLAN, PLAN_INPUTS, PLANNED_PATH, SCENE
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.core import LONGEST, Planner
 from gemelo.services.recordings.table import exchanges_of
 from gemelo.services.replay import planner_answers, planner_jog

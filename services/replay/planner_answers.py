@@ -8,13 +8,13 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.message import Message
 from gemelo.schemas.planning import AnswerInputs
 from gemelo.schemas.scene import SceneResponse
 from gemelo.schemas.scene_meshes import by_digest
 from gemelo.schemas.topics import ANSWER_INPUTS, FK, IK, SCENE, SCENE_EDIT, STATE_VALIDITY
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
 from gemelo.services.planner.scene.scene_store import SceneStore, changed
 from gemelo.services.planner.scene.standing import link_poses, standing

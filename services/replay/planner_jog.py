@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.planning import JogTaken, JogTick
 from gemelo.schemas.topics import JOG_INPUTS, JOG_STATUS, JOINT_TARGETS, SCENE
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.jog.jog import Jog, signed
 from gemelo.services.planner.jog.jog_log import digest_of
 from gemelo.services.replay.comparison import ABSENT, Comparison

@@ -13,11 +13,11 @@ from typing import Any, Generic, TypeVar, cast
 
 import msgspec
 
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.message import Message
 from gemelo.schemas.scene import SceneMesh
 from gemelo.schemas.text_file import read_text
 from gemelo.schemas.topics import Topic, scene_mesh
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.recordings.channels import schema_of
 from gemelo.services.recordings.foreign import METADATA
 from gemelo.services.recordings.mcap_file import DEPLOYMENT, ROBOT

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.planning import SceneVersion
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.scene_meshes import with_meshes
 from gemelo.schemas.topics import SCENE
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.scene_shapes import SceneError
 from gemelo.services.planner.collision.world import World
 from gemelo.services.replay.recorded import Heard, NotReplayable, Recorded

@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
-from gemelo.services.arm.motors.speed import speed_limits
-from gemelo.services.arm.motors.steps import exact_ratio
-from gemelo.services.arm.motors.tick import fastest_steps
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.libraries.arm.motors.speed import speed_limits
+from gemelo.libraries.arm.motors.steps import exact_ratio
+from gemelo.libraries.arm.motors.tick import fastest_steps
 from gemelo.services.robot_import.parts import PINS, SWITCH_PINS, DriverPart, MotorPart, driver_named, motor_named
 from gemelo.services.robot_import.questions import Questions, above_zero, one_of, whole, yes_or_no
 

@@ -10,11 +10,11 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from gemelo.services.arm.checks.check import check
-from gemelo.services.arm.checks.findings import Finding, Severity, error
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import load_arm
-from gemelo.services.arm.model.virtual_drive import NO_MOTORS
+from gemelo.libraries.arm.checks.check import check
+from gemelo.libraries.arm.checks.findings import Finding, Severity, error
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.arm.model.virtual_drive import NO_MOTORS
 from gemelo.services.robot_import.drive import speed_lines
 from gemelo.services.robot_import.questions import Questions, answers_text, read_answers, yes_or_no
 from gemelo.services.robot_import.robot_folder import Description, step, write_robot

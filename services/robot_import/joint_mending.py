@@ -7,9 +7,9 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping
 
-from gemelo.services.arm.frames.transforms import from_axis_angle, from_rpy, multiply, rotate, to_rpy
-from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
-from gemelo.services.arm.model.xml_reader import XmlReader
+from gemelo.libraries.arm.frames.transforms import from_axis_angle, from_rpy, multiply, rotate, to_rpy
+from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.libraries.arm.model.xml_reader import XmlReader
 from gemelo.services.robot_import.limits import MOST_TRAVEL, TURN
 from gemelo.services.robot_import.mended import Mended
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 
-from gemelo.services.arm.model.urdf import JointKind, Limit, UrdfJoint
+from gemelo.libraries.arm.model.urdf import JointKind, Limit, UrdfJoint
 from gemelo.services.robot_import.mended import Mended
 from gemelo.services.robot_import.questions import Questions, above_zero, number
 

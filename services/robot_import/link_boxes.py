@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.checks.meshes import Facts, MeshFacts
-from gemelo.services.arm.frames.transforms import Rigid, compose, from_rpy, rotate
-from gemelo.services.arm.model.urdf import Geometry, UrdfJoint, UrdfLink, UrdfModel
+from gemelo.libraries.arm.checks.meshes import Facts, MeshFacts
+from gemelo.libraries.arm.frames.transforms import Rigid, compose, from_rpy, rotate
+from gemelo.libraries.arm.model.urdf import Geometry, UrdfJoint, UrdfLink, UrdfModel
 
 Array = NDArray[np.float64]
 Box = tuple[Array, Array]  # (3,) [m] each: the least and the most of each axis

@@ -5,11 +5,11 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from gemelo.services.arm.checks.findings import Finding, error, note
-from gemelo.services.arm.checks.meshes import SMALLEST, Facts, MeshFacts, facts_of, link_volume
-from gemelo.services.arm.checks.units import LARGEST_GYRATION, gyration
-from gemelo.services.arm.checks.urdf import UNTOUCHED, principal_moments
-from gemelo.services.arm.model.urdf import UrdfLink
+from gemelo.libraries.arm.checks.findings import Finding, error, note
+from gemelo.libraries.arm.checks.meshes import SMALLEST, Facts, MeshFacts, facts_of, link_volume
+from gemelo.libraries.arm.checks.units import LARGEST_GYRATION, gyration
+from gemelo.libraries.arm.checks.urdf import UNTOUCHED, principal_moments
+from gemelo.libraries.arm.model.urdf import UrdfLink
 from gemelo.services.robot_import.mended import Mended, links_of, meshes_of, subject_of
 from gemelo.services.robot_import.questions import Questions, yes_or_no
 

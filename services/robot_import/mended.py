@@ -9,11 +9,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gemelo.services.arm.checks.findings import Finding, Severity, error, note, once, warning
-from gemelo.services.arm.checks.meshes import MeshFacts, check_meshes, facts_of
-from gemelo.services.arm.checks.urdf import check_urdf, fault_finding
-from gemelo.services.arm.model.urdf import Geometry, UrdfLink, UrdfModel, model_of
-from gemelo.services.arm.model.xml_reader import XmlReader
+from gemelo.libraries.arm.checks.findings import Finding, Severity, error, note, once, warning
+from gemelo.libraries.arm.checks.meshes import MeshFacts, check_meshes, facts_of
+from gemelo.libraries.arm.checks.urdf import check_urdf, fault_finding
+from gemelo.libraries.arm.model.urdf import Geometry, UrdfLink, UrdfModel, model_of
+from gemelo.libraries.arm.model.xml_reader import XmlReader
 from gemelo.services.robot_import.questions import Questions, one_of
 from gemelo.services.robot_import.source import RobotSource
 

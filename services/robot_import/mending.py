@@ -7,9 +7,9 @@ import re
 import unicodedata
 import xml.etree.ElementTree as ET
 
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.urdf import JointKind, model_of
-from gemelo.services.arm.model.xml_reader import XmlReader, parse_xml
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.urdf import JointKind, model_of
+from gemelo.libraries.arm.model.xml_reader import XmlReader, parse_xml
 from gemelo.services.robot_import import link_mending, mesh_places, motion_limits, number_mending, unit_mending
 from gemelo.services.robot_import.joint_mending import fix_free_base, fix_locked, follow_the_motor
 from gemelo.services.robot_import.mended import Mended, numbers_in

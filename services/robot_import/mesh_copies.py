@@ -5,8 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from gemelo.services.arm.checks.meshes import MOST_TRIANGLES, MeshFacts, facts_of, scene_of
-from gemelo.services.arm.errors import DescriptionError
+from gemelo.libraries.arm.checks.meshes import MOST_TRIANGLES, MeshFacts, facts_of, scene_of
+from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.services.robot_import.coarser import coarser
 from gemelo.services.robot_import.mended import Mended
 from gemelo.services.robot_import.mending import safe_name

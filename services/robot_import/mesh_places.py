@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.checks.meshes import IN_MILLIMETRES
-from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose, from_rpy, inverse, to_rpy
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.model.urdf import Geometry, UrdfLink, UrdfModel
+from gemelo.libraries.arm.checks.meshes import IN_MILLIMETRES
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, from_rpy, inverse, to_rpy
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.model.urdf import Geometry, UrdfLink, UrdfModel
 from gemelo.services.robot_import.link_boxes import (
     Box,
     between,

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gemelo.services.arm.checks.meshes import IN_MILLIMETRES, MeshFacts
-from gemelo.services.arm.model.urdf import Geometry, UrdfLink, UrdfModel
+from gemelo.libraries.arm.checks.meshes import IN_MILLIMETRES, MeshFacts
+from gemelo.libraries.arm.model.urdf import Geometry, UrdfLink, UrdfModel
 from gemelo.services.robot_import.link_boxes import carried_by, corners_of, longest_joint, placed, pose_of
 from gemelo.services.robot_import.mended import Mended, meshes_of, subject_of
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 
-from gemelo.services.arm.checks.urdf import follower_range
-from gemelo.services.arm.model.urdf import JointKind, Limit, UrdfJoint
+from gemelo.libraries.arm.checks.urdf import follower_range
+from gemelo.libraries.arm.model.urdf import JointKind, Limit, UrdfJoint
 from gemelo.services.robot_import.mended import Mended, numbers_in
 
 # Tuning constants: chosen, where a line does not say measured or standard.

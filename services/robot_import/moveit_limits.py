@@ -10,8 +10,8 @@ from typing import Any
 
 import yaml
 
+from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
 from gemelo.schemas.text_file import NotUtf8, read_text
-from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
 from gemelo.services.robot_import.mended import Mended
 from gemelo.services.robot_import.motion_limits import ends_of, joints_of, set_ends
 

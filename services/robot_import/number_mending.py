@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 
-from gemelo.services.arm.model.urdf import JointKind
-from gemelo.services.arm.model.xml_reader import MINUSES
+from gemelo.libraries.arm.model.urdf import JointKind
+from gemelo.libraries.arm.model.xml_reader import MINUSES
 from gemelo.services.robot_import.joint_mending import FREE
 from gemelo.services.robot_import.mended import Mended, numbers_in
 

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import msgspec
 
-from gemelo.services.arm.checks.findings import Finding, error, warning
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.kinematics.collision_matrix import LinkPairData, collision_matrix
-from gemelo.services.arm.model.description import ArmDescription, load_arm
-from gemelo.services.arm.model.srdf_edit import with_pairs
+from gemelo.libraries.arm.checks.findings import Finding, error, warning
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.kinematics.collision_matrix import LinkPairData, collision_matrix
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.model.srdf_edit import with_pairs
 from gemelo.services.robot_import.mended import Mended
 from gemelo.services.robot_import.questions import yes_or_no
 from gemelo.services.robot_import.semantics import OF_SRDF

@@ -10,11 +10,11 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.kinematics.self_collisions import LinkPair
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
 
 Array = NDArray[np.float64]
 Wanted = Callable[[Array], bool]  # of a state (n,) [rad] or [m]

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
+from gemelo.libraries.arm.errors import DescriptionError, suggestion
 from gemelo.schemas.text_file import NotUtf8, read_text
-from gemelo.services.arm.errors import DescriptionError, suggestion
 
 T = TypeVar("T")
 

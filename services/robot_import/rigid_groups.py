@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 
-from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose
-from gemelo.services.arm.kinematics.chain import origin_of
-from gemelo.services.arm.model.urdf import JointKind
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose
+from gemelo.libraries.arm.kinematics.chain import origin_of
+from gemelo.libraries.arm.model.urdf import JointKind
 from gemelo.services.robot_import.link_boxes import pose_of
 from gemelo.services.robot_import.mended import Mended, links_of, subject_of
 from gemelo.services.robot_import.mesh_places import set_origin

@@ -13,14 +13,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from gemelo.libraries.arm.checks.findings import Finding, Severity, note
+from gemelo.libraries.arm.checks.meshes import MeshFacts
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.arm.model.srdf_edit import entries, with_pairs
+from gemelo.libraries.arm.model.urdf import UrdfJoint, UrdfLink, UrdfModel
+from gemelo.libraries.arm.model.virtual_drive import device_name
 from gemelo.schemas.text_file import read_text
-from gemelo.services.arm.checks.findings import Finding, Severity, note
-from gemelo.services.arm.checks.meshes import MeshFacts
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import load_arm
-from gemelo.services.arm.model.srdf_edit import entries, with_pairs
-from gemelo.services.arm.model.urdf import UrdfJoint, UrdfLink, UrdfModel
-from gemelo.services.arm.model.virtual_drive import device_name
 from gemelo.services.robot_import.drive import JointDrive, bare_toml, driven_toml
 from gemelo.services.robot_import.mended import Mended
 from gemelo.services.robot_import.mesh_copies import copy_meshes

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
+from gemelo.libraries.arm.model.description import ROUNDING
+from gemelo.libraries.arm.model.urdf import JointKind, UrdfModel
 from gemelo.schemas.text_file import NotUtf8, read_text
-from gemelo.services.arm.model.description import ROUNDING
-from gemelo.services.arm.model.urdf import JointKind, UrdfModel
 from gemelo.services.robot_import.joint_mending import stand_at
 from gemelo.services.robot_import.mended import Mended
 from gemelo.services.robot_import.poses import zero_state

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from gemelo.services.arm.errors import DescriptionError, nearest_name
+from gemelo.libraries.arm.errors import DescriptionError, nearest_name
 from gemelo.services.robot_import.xacro_files import SUFFIX, expanded, outermost
 
 BESIDE = 2  # innermost folders, whose meshes are the file's own without a package

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from gemelo.services.arm.device.device_config import MAX_COUNTS
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
-from gemelo.services.arm.model.virtual_drive import driven_joints
+from gemelo.libraries.arm.device.device_config import MAX_COUNTS
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
+from gemelo.libraries.arm.model.virtual_drive import driven_joints
 from gemelo.services.robot_import.joint_mending import stand_at
 from gemelo.services.robot_import.mended import Mended
 from gemelo.services.robot_import.poses import zero_state

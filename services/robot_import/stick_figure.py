@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 
-from gemelo.services.arm.checks.units import joint_lengths
-from gemelo.services.arm.model.urdf import UrdfJoint
+from gemelo.libraries.arm.checks.units import joint_lengths
+from gemelo.libraries.arm.model.urdf import UrdfJoint
 from gemelo.services.robot_import.mended import Mended
 
 # Tuning constants: chosen, where a line does not say measured or standard.

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from gemelo.services.arm.checks.findings import Finding, Severity, error
-from gemelo.services.arm.checks.meshes import MOST_TRIANGLES, MeshFacts
-from gemelo.services.arm.errors import DescriptionError, suggestion
-from gemelo.services.arm.model.urdf import UrdfModel
-from gemelo.services.arm.model.virtual_drive import MAX_NAME, device_name, driven_joints
+from gemelo.libraries.arm.checks.findings import Finding, Severity, error
+from gemelo.libraries.arm.checks.meshes import MOST_TRIANGLES, MeshFacts
+from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.model.urdf import UrdfModel
+from gemelo.libraries.arm.model.virtual_drive import MAX_NAME, device_name, driven_joints
 from gemelo.services.robot_import import motion_limits
 from gemelo.services.robot_import.drive import ask_drives
 from gemelo.services.robot_import.limits import ask_limits

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gemelo.services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
+from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
 
 # The ends of a tool's name, the most telling first.
 TOOL_NAMES = (

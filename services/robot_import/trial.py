@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from gemelo.services.arm.checks.findings import Finding, error
+from gemelo.libraries.arm.checks.findings import Finding, error
 
 TRIAL = "gemelo.services.planner.trial"
 

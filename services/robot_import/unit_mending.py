@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 
-from gemelo.services.arm.checks.units import (
+from gemelo.libraries.arm.checks.units import (
     LARGEST_GYRATION,
     MOST_TURN,
     gyration,
     in_millimetres_message,
     is_drawn_in_millimetres,
 )
-from gemelo.services.arm.checks.urdf import principal_moments
-from gemelo.services.arm.model.urdf import JointKind
+from gemelo.libraries.arm.checks.urdf import principal_moments
+from gemelo.libraries.arm.model.urdf import JointKind
 from gemelo.services.robot_import.mended import Mended, links_of, numbers_in
 
 # Tuning constants: chosen, where a line does not say measured or standard.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
-from gemelo.services.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.errors import DescriptionError, suggestion
 from gemelo.services.robot_import.xacro_sandbox.keeper import Confined, Failed, expand
 
 SUFFIX = ".xacro"

@@ -12,9 +12,9 @@ from gemelo.firmware.platform.host.board import Board
 from gemelo.firmware.platform.host.memory import StoredPosition
 from gemelo.firmware.platform.host.virtual_esp32 import VirtualEsp32
 from gemelo.firmware.platform.host.wires import Wires
+from gemelo.libraries.arm.device.device_config import reference_steps
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.robot import Motor
-from gemelo.services.arm.device.device_config import reference_steps
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.runtime.process.readiness import Readiness
 from gemelo.services.runtime.process.unwritten import UnwrittenFiles
 from gemelo.services.simulation.memory_wire import MemoryWire

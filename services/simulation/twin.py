@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.deployment import Deployment, PathsSection, RouterSection
 from gemelo.schemas.robot import Motor
 from gemelo.schemas.simulation import WireConditions
 from gemelo.schemas.system import ParameterValue
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.services.runtime.node import Node
 from gemelo.services.runtime.process.shutdown import ShutdownRequest

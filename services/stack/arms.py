@@ -9,10 +9,10 @@ from pathlib import Path
 import msgspec
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
 from gemelo.schemas.errors import ConfigurationError
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.hosts.quoting import Value, toml
 from gemelo.services.runtime.deployment import ARMS
 

@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
+from gemelo.libraries.arm.cell.cell_file import load_cell
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm, require_motors
+from gemelo.libraries.arm.model.virtual_drive import NO_MOTORS
 from gemelo.schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
 from gemelo.schemas.errors import ConfigurationError
-from gemelo.services.arm.cell.cell_file import load_cell
-from gemelo.services.arm.model.description import ArmDescription, load_arm, require_motors
-from gemelo.services.arm.model.virtual_drive import NO_MOTORS
 from gemelo.services.mqtt.access import device_access, gateway_access
 from gemelo.services.mqtt.secure_folder import require_made
 from gemelo.services.runtime.deployment import exposure, forget_arms, load_deployment, project_root

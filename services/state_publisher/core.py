@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.frames.transforms import to_message
+from gemelo.libraries.arm.kinematics.chain import complete, joint_transform, origin_of
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.urdf import JointKind
 from gemelo.schemas.frames import FrameTransform, FrameTransforms
 from gemelo.schemas.joints import JointState
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.frames.transforms import to_message
-from gemelo.services.arm.kinematics.chain import complete, joint_transform, origin_of
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.urdf import JointKind
 
 
 class Decimator:

@@ -6,13 +6,13 @@ from typing import Annotated
 
 import msgspec
 
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.frames import RobotDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.text_file import read_text
 from gemelo.schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.runtime.application import service
 from gemelo.services.runtime.bus.wire import TooLarge
 from gemelo.services.runtime.deployment import project_root

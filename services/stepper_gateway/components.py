@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.stepper_gateway.control.control_handler import ControlHandler
 from gemelo.services.stepper_gateway.device.command_handler import CommandHandler
 from gemelo.services.stepper_gateway.device.echoes import Echoes

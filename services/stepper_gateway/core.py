@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.control import ControlGive, ControlJoin, ControlTake
 from gemelo.schemas.device import (
     ConfigureResponse,
@@ -24,7 +25,6 @@ from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import DEVICE_STATUS
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.stepper_gateway.components import Components
 from gemelo.services.stepper_gateway.control.clients import MotionCaller
 from gemelo.services.stepper_gateway.control.control_handler import NOBODY

@@ -6,9 +6,9 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm, require_motors
 from gemelo.schemas.deployment import Deployment, DeviceKind, Wire
 from gemelo.schemas.robot import Dialect
-from gemelo.services.arm.model.description import ArmDescription, load_arm, require_motors
 from gemelo.services.runtime.application import service
 from gemelo.services.runtime.deployment import project_root
 from gemelo.services.runtime.node import Node

@@ -10,6 +10,7 @@ from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlTake
 from gemelo.schemas.device import (
@@ -36,7 +37,6 @@ from gemelo.schemas.motion import (
 )
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import Topic
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.stepper_gateway.control.clients import MotionCaller
 from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.device.command_arguments import KINDS

@@ -10,10 +10,10 @@ from dataclasses import replace
 import msgspec
 
 from gemelo.firmware.platform.host.sketch import HostSketch
+from gemelo.libraries.arm.model.description import ArmDescription, heard_by_the_board
+from gemelo.libraries.arm.motors.relative_moves import ramp_of
 from gemelo.schemas.device import DeviceCommandKind
 from gemelo.schemas.robot import Dialect
-from gemelo.services.arm.model.description import ArmDescription, heard_by_the_board
-from gemelo.services.arm.motors.relative_moves import ramp_of
 from gemelo.services.stepper_gateway.links.foreign import ra_messages
 from gemelo.services.stepper_gateway.links.foreign.ra_device import RaDevice
 from gemelo.services.stepper_gateway.links.link import Kind

@@ -13,12 +13,12 @@ from functools import cache
 
 from gemelo.firmware.bindings.device import CoreDevice
 from gemelo.firmware.platform.host.board import DeviceClock
+from gemelo.libraries.arm.device.device_config import device_config, reference_steps
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.model.gripper import gripper_unit
 from gemelo.schemas.device_config import DeviceConfig
 from gemelo.schemas.message import Message, Vector
 from gemelo.schemas.robot import Motor
-from gemelo.services.arm.device.device_config import device_config, reference_steps
-from gemelo.services.arm.model.description import ArmDescription, load_arm
-from gemelo.services.arm.model.gripper import gripper_unit
 from gemelo.services.runtime.deployment import project_root
 from gemelo.services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Kind, Moment
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.gripper import jaw_objects, jaws_apart
 from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.topics import (
     CONTACTS,
@@ -28,8 +30,6 @@ from gemelo.schemas.topics import (
     camera_image,
     camera_info,
 )
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.gripper import jaw_objects, jaws_apart
 from gemelo.services.visualizer.core import Visualizer
 
 

@@ -8,13 +8,13 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.cell.cell_file import deployed_cell
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.frames import RobotDescription
 from gemelo.schemas.scene import MeshShape
 from gemelo.schemas.text_file import read_text
 from gemelo.schemas.topics import ANY, DESCRIPTION, LOG, SCENE
-from gemelo.services.arm.cell.cell_file import deployed_cell
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.runtime.application import service
 from gemelo.services.runtime.deployment import deployments_beside, project_root, robot_name
 from gemelo.services.runtime.node import Node

@@ -18,6 +18,8 @@ from typing import Any
 import msgspec
 import rerun as rr
 
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.camera import CameraImage
 from gemelo.schemas.deployment import ViewerMode
 from gemelo.schemas.frames import RobotDescription
@@ -25,8 +27,6 @@ from gemelo.schemas.scene import MeshShape, PlanningScene, SceneMesh
 from gemelo.schemas.scene_meshes import with_meshes
 from gemelo.schemas.topics import DESCRIPTION, SCENE
 from gemelo.schemas.topics import scene_mesh as mesh_topic
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.recordings.foxglove import CAMERA, IMAGE
 from gemelo.services.recordings.incidents import Incident, incident_in
 from gemelo.services.recordings.reader import BadRecording, RecordingReader, Row

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.arm.checks.check import Severity, check
+from gemelo.libraries.arm.checks.check import Severity, check
 from tests.arm.editing import edit
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pinocchio as pin
 import pytest
 
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from tests.arm.editing import edit
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.arm.cell.camera_file import load_measured, write_measured
+from gemelo.libraries.arm.cell.camera_model import believed_info, exact_info, looking, scaled
+from gemelo.libraries.arm.cell.cell_file import Cell, grasp_width, load_cell
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.frames.transforms import from_message, rotate
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.cell import Calibration, MeasuredCamera, Mount, TagThing, VirtualSource
-from gemelo.services.arm.cell.camera_file import load_measured, write_measured
-from gemelo.services.arm.cell.camera_model import believed_info, exact_info, looking, scaled
-from gemelo.services.arm.cell.cell_file import Cell, grasp_width, load_cell
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.frames.transforms import from_message, rotate
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from tests.arm.editing import edit
 
 

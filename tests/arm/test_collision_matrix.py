@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gemelo.services.arm.kinematics.collision_matrix import DisabledReason, are_adjacent, collision_matrix
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.kinematics.link_distances import LinkDistances
-from gemelo.services.arm.kinematics.self_collisions import SelfCollisionChecker
-from gemelo.services.arm.model.description import load_arm
-from gemelo.services.arm.model.srdf_edit import entries, with_pairs
+from gemelo.libraries.arm.kinematics.collision_matrix import DisabledReason, are_adjacent, collision_matrix
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.link_distances import LinkDistances
+from gemelo.libraries.arm.kinematics.self_collisions import SelfCollisionChecker
+from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.arm.model.srdf_edit import entries, with_pairs
 from tests.arm.editing import edit
 from tests.arm.plates import add_rigid_plates, add_turning_disc
 
@@ -76,7 +76,7 @@ def test_the_bounds_of_the_matrix_hold_and_its_distances_are_the_checkers(rm1_fo
 
 
 def test_progress_of_the_matrix_is_told(rm1_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gemelo.services.arm.kinematics.collision_matrix.SAYING", 0.0)
+    monkeypatch.setattr("gemelo.libraries.arm.kinematics.collision_matrix.SAYING", 0.0)
     said: list[str] = []
     collision_matrix(load_arm(rm1_folder), samples=20, tell=said.append)
     assert re.fullmatch(r"\d+ configurations sampled after \d+\.\d s", said[0])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from gemelo.services.arm.kinematics.convex_meshes import MOST_TRIANGLES, convex_or_same, corners_of
+from gemelo.libraries.arm.kinematics.convex_meshes import MOST_TRIANGLES, convex_or_same, corners_of
 
 BOX = trimesh.creation.box((0.1, 0.2, 0.3))
 

@@ -14,12 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.device.device_config import HEADROOM, device_config, reference_steps
+from gemelo.libraries.arm.device.device_parts import sensor_config
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.device_config import UNUSED, DeviceConfig, InputRole, Pull, SensorKind, config_crc, config_text
 from gemelo.schemas.robot import Sensor
-from gemelo.services.arm.device.device_config import HEADROOM, device_config, reference_steps
-from gemelo.services.arm.device.device_parts import sensor_config
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 
 TABLES = """
 [[input]]

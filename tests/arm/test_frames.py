@@ -8,8 +8,7 @@ import time
 
 import pytest
 
-from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
-from gemelo.services.arm.frames.frame_buffer import (
+from gemelo.libraries.arm.frames.frame_buffer import (
     FrameBuffer,
     FutureError,
     PastError,
@@ -18,6 +17,7 @@ from gemelo.services.arm.frames.frame_buffer import (
     UnknownFrameError,
     WaitTimeout,
 )
+from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
 
 SECOND = 1_000_000_000
 T0 = 1_700_000_000 * SECOND

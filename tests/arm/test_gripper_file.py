@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from msgspec import UNSET
 
+from gemelo.libraries.arm.checks.check import check
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.device_config import ServoConfig
 from gemelo.schemas.robot import OutputGripper, ServoGripper
-from gemelo.services.arm.checks.check import check
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import load_arm
 from tests.arm.editing import edit
 
 URDF = Path(__file__).resolve().parents[2] / "urdf"

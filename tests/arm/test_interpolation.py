@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.interpolation import TrajectorySampler, cubic, quintic
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
-from gemelo.services.arm.interpolation import TrajectorySampler, cubic, quintic
 
 VALUE = st.floats(-10.0, 10.0)
 TIME = st.floats(0.01, 10.0)

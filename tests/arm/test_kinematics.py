@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.frames.transforms import from_message
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.frames.transforms import from_message
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from tests.profiles import examples
 
 RM1 = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")

@@ -9,9 +9,9 @@ from fractions import Fraction
 import msgspec
 import pytest
 
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.motors.speed import speed_limits, step_rate
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.motors.speed import speed_limits, step_rate
 
 FIGURES = {
     "brazo_joint": (Fraction(46656, 10), Fraction(46656, 10)),

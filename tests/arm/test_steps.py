@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.motors.steps import StepScale, step_scale
 from gemelo.schemas.robot import Motor, StepperJoint, Transmission
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.motors.steps import StepScale, step_scale
 
 Q1 = StepScale(Fraction(93312, 5), math.tau)
 RACK = StepScale(Fraction(400), math.tau * 0.0225)

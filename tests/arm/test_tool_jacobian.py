@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.kinematics.tool_jacobian import ToolJacobian
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.tool_jacobian import ToolJacobian
+from gemelo.libraries.arm.model.description import load_arm
 from tests.profiles import examples
 
 ROOT = Path(__file__).parents[2]

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.schemas.frames import Transform
-from gemelo.services.arm.frames.transforms import (
+from gemelo.libraries.arm.frames.transforms import (
     IDENTITY,
     Rigid,
     compose,
@@ -24,6 +23,7 @@ from gemelo.services.arm.frames.transforms import (
     slerp,
     to_message,
 )
+from gemelo.schemas.frames import Transform
 
 ANGLE = st.floats(-math.pi, math.pi)
 POINT = st.tuples(*[st.floats(-2.0, 2.0)] * 3)

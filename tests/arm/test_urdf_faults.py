@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.arm.checks.check import Severity, check
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import load_arm
-from gemelo.services.arm.model.urdf import read_urdf, survey_urdf
+from gemelo.libraries.arm.checks.check import Severity, check
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.arm.model.urdf import read_urdf, survey_urdf
 from tests.arm.bare_arm import URDF, write_bare_arm
 from tests.arm.editing import edit
 

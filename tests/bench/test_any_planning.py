@@ -8,8 +8,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.schemas.planning import PlanCode, Refusal
-from gemelo.services.arm.kinematics.kinematics import Kinematics
 from gemelo.services.bench.any_arm.drawn_problems import ProblemDrawer, problems
 from gemelo.services.bench.any_arm.families import FAMILIES, FEWEST, MOST, settings
 from gemelo.services.bench.any_arm.generated_arms import ArmSketch, SketchSolid, generated_arm, seven_joints, six_joints

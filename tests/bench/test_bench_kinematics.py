@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.services.bench.planner.kinematics import is_solved, random_problems, solve
 from gemelo.services.bench.scenes import parol6, rm1
 from gemelo.services.planner.kinematics.ik import InverseKinematics

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.services.bench.figures import NotMeasured
 from gemelo.services.bench.planner import references
 from gemelo.services.bench.planner.references import CoalChecker, PlainOmpl, Roboplan

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.services.bench.problems.problem_sets import (
     COUNT,
     FILE,

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.planning import JointGoal, PlanRequest
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.bench.virtual_time import Tally, swinging
 from gemelo.services.planner.core import Planner
 from gemelo.services.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire

@@ -11,15 +11,15 @@ import cv2
 import numpy as np
 import pytest
 
+from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE, write_measured
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.camera import CameraCondition, CameraImage, CameraInfo, CameraStatus
 from gemelo.schemas.cell import Calibration, MeasuredCamera
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.detections import Detections
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import JOINT_STATES, camera_image, camera_info, camera_status, camera_truth
-from gemelo.services.arm.cell.camera_file import CAMERA_FILE, write_measured
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.camera.main import run
 from gemelo.services.camera.sources.source import encoded
 from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork

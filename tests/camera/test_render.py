@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, from_rpy
 from gemelo.schemas.camera import CameraInfo
-from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, from_rpy
 from gemelo.services.camera.virtual.render import Optics, render
 from gemelo.services.camera.virtual.solids import Face, PosedSolid, box, cylinder, sphere, tag
 

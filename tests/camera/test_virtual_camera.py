@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.cell.camera_model import exact_info
+from gemelo.libraries.arm.cell.cell_file import Cell, grasp_width, load_cell
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, from_rpy, inverse
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import VirtualSource
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
-from gemelo.services.arm.cell.camera_model import exact_info
-from gemelo.services.arm.cell.cell_file import Cell, grasp_width, load_cell
-from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose, from_rpy, inverse
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.camera.virtual.virtual_camera import (
     VirtualCamera,
     base_from_camera,

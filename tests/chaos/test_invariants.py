@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceState
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.chaos.invariants import jerks, jumps, misses, missing_records, moved, segments
 
 SLOT = 20_000  # [us] between two states

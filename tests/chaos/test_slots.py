@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gemelo.firmware.platform.host.slot_record import STOOD, row
-from gemelo.services.arm.device.device_config import device_config
+from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.services.chaos import slots
 
 

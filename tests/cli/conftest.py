@@ -9,6 +9,7 @@ import pytest
 
 import gemelo
 from gemelo.api.session import Session as ArmSession
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.device import (
@@ -37,7 +38,6 @@ from gemelo.schemas.topics import (
     PLAN,
     STEP_ERRORS,
 )
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.cli.session import CommandSession
 from gemelo.services.planner.core import Planner
 from gemelo.services.runtime.actions import accept, refuse

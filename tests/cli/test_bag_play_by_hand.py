@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DESCRIPTION, Delivery, Topic
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.recordings.channels import Entry

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gemelo import Pose, Seen
-from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.services.cli import camera_check
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import gemelo
+from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE, MOUNT_BOARD
+from gemelo.libraries.arm.cell.camera_model import believed_info
+from gemelo.libraries.arm.cell.cell_file import load_cell
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import TagRecord
-from gemelo.services.arm.cell.camera_file import CAMERA_FILE, MOUNT_BOARD
-from gemelo.services.arm.cell.camera_model import believed_info
-from gemelo.services.arm.cell.cell_file import load_cell
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.bench.vision.mount_images import (
     OFF,
     Setup,

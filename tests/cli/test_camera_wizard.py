@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 from gemelo.api.units import Pose
+from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE
+from gemelo.libraries.arm.cell.camera_model import believed_info, exact_info
+from gemelo.libraries.arm.cell.cell_file import load_cell
+from gemelo.libraries.arm.frames.transforms import from_rpy
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.cell import VirtualSource
 from gemelo.schemas.joints import JointState
-from gemelo.services.arm.cell.camera_file import CAMERA_FILE
-from gemelo.services.arm.cell.camera_model import believed_info, exact_info
-from gemelo.services.arm.cell.cell_file import load_cell
-from gemelo.services.arm.frames.transforms import from_rpy
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.bench.vision import images
 from gemelo.services.bench.vision.images import Surface, render
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera

@@ -18,9 +18,9 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
 import gemelo
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DESCRIPTION, JOINT_STATES, Delivery, Topic
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.recordings.channels import Entry

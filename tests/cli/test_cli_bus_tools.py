@@ -25,6 +25,7 @@ from hypothesis import strategies as st
 from msgspec import Meta
 
 import gemelo
+from gemelo.libraries.arm.frames.transforms import from_rpy, to_rpy
 from gemelo.schemas.device import DeviceStopRequest, StopKind
 from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
 from gemelo.schemas.joints import JointState
@@ -41,7 +42,6 @@ from gemelo.schemas.topics import (
     Delivery,
     Topic,
 )
-from gemelo.services.arm.frames.transforms import from_rpy, to_rpy
 from gemelo.services.cli import (
     action_watch,
     interface,

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.arm.model.srdf_edit import entries
-from gemelo.services.arm.model.urdf import read_urdf
+from gemelo.libraries.arm.model.srdf_edit import entries
+from gemelo.libraries.arm.model.urdf import read_urdf
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.device import ReferenceCommand
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
 from gemelo.schemas.planning import JointGoal, NamedGoal, PoseGoal, Refusal
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.cli.device import reference_request
 from gemelo.services.cli.errors import CommandError, ExitCode
 from gemelo.services.cli.main import parse

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from gemelo.services.arm.model import description
+from gemelo.libraries.arm.model import description
 from gemelo.services.cli.commands import COMMANDS, GROUPS
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import parse, run
@@ -101,7 +101,7 @@ def test_a_robot_that_cannot_be_read_still_completes_the_commands(monkeypatch, c
             (
                 "numpy",
                 "zenoh",
-                "gemelo.services.arm.model.description",
+                "gemelo.libraries.arm.model.description",
                 "gemelo.services.cli.move",
                 "gemelo.services.runtime.actions",
             ),

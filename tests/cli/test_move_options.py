@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.arm.frames.transforms import from_rpy
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.planning import (
     CircularMotion,
     FreeMotion,
@@ -16,8 +18,6 @@ from gemelo.schemas.planning import (
     PoseGoal,
     WaypointGoal,
 )
-from gemelo.services.arm.frames.transforms import from_rpy
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.cli.errors import CommandError
 from gemelo.services.cli.main import parse
 from gemelo.services.cli.move import EXAMPLES

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pytest
 
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.cli import units
 from gemelo.services.cli.commands import COMMANDS
 from gemelo.services.cli.device import reference_request

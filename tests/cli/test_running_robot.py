@@ -11,11 +11,11 @@ import pytest
 from msgspec.structs import replace
 
 import gemelo
+from gemelo.libraries.arm.cell.cell_file import load_cell, read_cell_texts
 from gemelo.schemas.cell import CellTexts
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import CELL, JOINT_STATES
-from gemelo.services.arm.cell.cell_file import load_cell, read_cell_texts
 from gemelo.services.cli import doctor
 from gemelo.services.cli.cells import cell_of
 from gemelo.services.cli.errors import CommandError, ExitCode

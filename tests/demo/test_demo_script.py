@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.demo.script import SINE_PERIOD, sine_of, tour
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")

@@ -95,6 +95,6 @@ def test_a_path_that_is_not_there_is_found(named):
     assert not is_there(named, PurePosixPath("services/planner/native/README.md"))
 
 
-@pytest.mark.parametrize("named", ["core.py", "services/arm", "services/*/core.py", "plan/cancel", "../README.md"])
+@pytest.mark.parametrize("named", ["core.py", "libraries/arm", "services/*/core.py", "plan/cancel", "../README.md"])
 def test_what_is_there_or_no_path_of_ours_is_none(named):
     assert is_there(named, PurePosixPath("services/planner/native/README.md"))

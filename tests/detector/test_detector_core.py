@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.cell.camera_model import believed_info, exact_info
+from gemelo.libraries.arm.cell.cell_file import Cell, load_cell
+from gemelo.libraries.arm.cell.colours import RGB, nearest_colour
+from gemelo.libraries.arm.frames.transforms import from_rpy
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import BoxThing, Colour, ColourThing, VirtualSource
 from gemelo.schemas.detections import Detection, Detections
 from gemelo.schemas.joints import JointState
-from gemelo.services.arm.cell.camera_model import believed_info, exact_info
-from gemelo.services.arm.cell.cell_file import Cell, load_cell
-from gemelo.services.arm.cell.colours import RGB, nearest_colour
-from gemelo.services.arm.frames.transforms import from_rpy
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera, true_detections
 from gemelo.services.camera.virtual.world import CameraWorld
 from gemelo.services.detector.core import Detector

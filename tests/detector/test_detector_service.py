@@ -11,6 +11,11 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.cell.camera_model import believed_info
+from gemelo.libraries.arm.cell.cell_file import Cell, load_cell
+from gemelo.libraries.arm.frames.transforms import compose, from_message, from_rpy, inverse, to_message
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.camera import CameraImage, CameraInfo
 from gemelo.schemas.cell import VirtualSource
 from gemelo.schemas.deployment import Deployment
@@ -18,11 +23,6 @@ from gemelo.schemas.detections import Detections
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import JOINT_STATES, LOG, camera_detections, camera_image, camera_info
-from gemelo.services.arm.cell.camera_model import believed_info
-from gemelo.services.arm.cell.cell_file import Cell, load_cell
-from gemelo.services.arm.frames.transforms import compose, from_message, from_rpy, inverse, to_message
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.camera.sources.source import encoded
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
 from gemelo.services.camera.virtual.world import CameraWorld

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.cell import ColourThing, OnnxThing
 from gemelo.schemas.detections import DetectionKind
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.detector.core import Detector
 from gemelo.services.detector.main import read_models
 from gemelo.services.detector.user_models import BadModel, Found, UserModel, projected_box, standing, without_doubles

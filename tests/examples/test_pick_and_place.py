@@ -11,11 +11,11 @@ import pytest
 
 import gemelo
 from gemelo.api.simulation import SimulatedArm
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneAdd, SceneObject
 from gemelo.schemas.topics import DEVICE_SHAFT, JOINT_STATES, SCENE, STEP_ERRORS
-from gemelo.services.arm.kinematics.kinematics import Kinematics
 from tests.simulated import found_by_connect, is_moving
 from tests.stack.person import jumps
 

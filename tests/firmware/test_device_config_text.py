@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from gemelo.firmware.bindings.parsers import ConfigTextRefused, read_config
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.device_config import DeviceConfig, JointConfig, config_text
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.model.description import load_arm
 from tests.profiles import examples
 
 LARGEST = 8220  # [bytes] kMaxConfigText of core/config_text.h

@@ -17,11 +17,11 @@ import pytest
 from bed_firmware import Bed, open_bed, wait_for
 from bench_firmware import FIRST, LAST, Bench, Row, traj
 
+from gemelo.libraries.arm.device.device_config import device_config, reference_steps
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.device_config import DeviceConfig
 from gemelo.schemas.robot import Motor, PullOut
-from gemelo.services.arm.device.device_config import device_config, reference_steps
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 
 SECONDS = 600
 REAL_SECONDS = int(os.environ.get("GEMELO_SIX_JOINTS_SECONDS", "10"))

@@ -11,10 +11,10 @@ import zlib
 import msgspec
 from bed_firmware import Bed, wait_for
 
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode, InjectKind
 from gemelo.schemas.device_config import DeviceConfig, config_text
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.model.description import ArmDescription
 
 OK = 0
 

@@ -16,10 +16,10 @@ from bed_firmware import Bed, SerialPort, wait_for
 from bench_firmware import BOOT, FIRST, LAST, command, heartbeat, seal, smooth, traj
 
 from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode, InjectKind
 from gemelo.schemas.device_config import DeviceConfig, config_text
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 
 ACK, CMD_ACK, SYNC_R, STATE = 2, 4, 7, 8

@@ -9,10 +9,10 @@ from bench_firmware import Bench
 from msgspec.structs import replace
 
 from gemelo.firmware.bindings.injection import InjectRefused
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode, InjectKind
 from gemelo.schemas.device_config import DeviceConfig, HomingConfig, InputConfig, InputRole, JointConfig
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.model.description import ArmDescription
 
 OK, NOT_READY, NOT_ARMED, ESTOP_PRESSED = 0, 12, 17, 18
 CYCLE = 8  # [steps] by which a motor of rm1 slips

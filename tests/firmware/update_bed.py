@@ -23,8 +23,8 @@ from gemelo.firmware.platform.host.network import Network
 from gemelo.firmware.platform.host.pty import SerialLine
 from gemelo.firmware.platform.host.virtual_esp32 import VirtualEsp32
 from gemelo.firmware.platform.host.wires import Wires
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.device import DeviceCommandKind
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.cli.provision import BAUD, open_line

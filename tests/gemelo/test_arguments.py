@@ -16,6 +16,7 @@ from gemelo.api.arguments import Target
 from gemelo.api.jog import jog_command
 from gemelo.api.planning import refused
 from gemelo.api.targets import as_target, request_of
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.planning import (
     CircularMotion,
     JointGoal,
@@ -28,7 +29,6 @@ from gemelo.schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from gemelo.services.arm.model.description import ArmDescription
 from tests.table import table
 
 HERE = gemelo.Pose((0.2, 0.1, 0.15), (1.0, 0.0, 0.0, 0.0))

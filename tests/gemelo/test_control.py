@@ -16,6 +16,7 @@ import gemelo
 from gemelo.api import control_file
 from gemelo.api.control import Hold
 from gemelo.api.session import Session
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.actions import GoalRequest, GoalResponse, ResultRequest
 from gemelo.schemas.control import ControlAnswer, ControlState, ControlTake
 from gemelo.schemas.deployment import Deployment, PathsSection
@@ -24,7 +25,6 @@ from gemelo.schemas.message import encode
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from gemelo.schemas.system import Failure
 from gemelo.schemas.topics import CONTROL, CONTROL_TAKE, DEVICE_EVENTS, FOLLOW_JOINT_TRAJECTORY, GATEWAY_INPUTS, LOG
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.cli.control import describe
 from gemelo.services.runtime.actions.keys import goal_request, result_request
 from gemelo.services.runtime.bus.interface import BusReply

@@ -10,12 +10,12 @@ import pytest
 
 import gemelo
 from gemelo.api.simulation import SimulatedArm
+from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE, write_measured
+from gemelo.libraries.arm.cell.camera_model import exact_info
+from gemelo.libraries.arm.cell.cell_file import load_cell
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.cell import MeasuredCamera, Mount
 from gemelo.schemas.topics import camera_truth
-from gemelo.services.arm.cell.camera_file import CAMERA_FILE, write_measured
-from gemelo.services.arm.cell.camera_model import exact_info
-from gemelo.services.arm.cell.cell_file import load_cell
-from gemelo.services.arm.model.description import load_arm
 
 BIN, RED = (0.1, 0.3), (0.3, -0.12)  # [m] of rm1's sample cell: the place, and where the red block stands
 ASTRAY = 0.04  # [m]

@@ -12,10 +12,10 @@ from gemelo.api.grasping import lift_above, looking_down, turn_between, yaw_of
 from gemelo.api.picking import look_twice
 from gemelo.api.seeing import Seen
 from gemelo.api.units import Pose
+from gemelo.libraries.arm.frames.transforms import from_axis_angle, rotate
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.cell import ColourThing, TagThing
 from gemelo.schemas.robot import Gripper
-from gemelo.services.arm.frames.transforms import from_axis_angle, rotate
-from gemelo.services.arm.model.description import load_arm
 
 BEYOND = 0.016  # [m] rm1's jaws
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo import BadArgument
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.programs import Points, ProgramError
-from gemelo.services.arm.model.description import load_arm
 
 ROBOT = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 HERE = {"brazo_joint": 0.1, "antebrazo_joint": -0.2, "efector_joint": 0.05}

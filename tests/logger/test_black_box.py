@@ -11,6 +11,7 @@ from mcap.reader import make_reader
 from msgspec import Raw
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.actions import GoalResponse, GoalStatusCode
 from gemelo.schemas.device import (
     DeviceCommandResponse,
@@ -53,7 +54,6 @@ from gemelo.schemas.topics import (
     STEP_LEDGER,
     STOPPING_DISTANCE,
 )
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.logger.black_box import MOST, MOST_BYTES, BlackBox, BlackBoxWriter
 from gemelo.services.logger.incident_story import LONGEST, brief
 from gemelo.services.recordings.incidents import Incident, IncidentKind, black_boxes, read_incident

@@ -15,10 +15,10 @@ from mcap.reader import NonSeekingReader, SeekingReader
 from mcap.writer import CompressionType
 from rerun.chunk import McapReader
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import DESCRIPTION, JOINT_STATES, LOG
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.recordings.channels import Entry
 from gemelo.services.recordings.mcap_file import McapFile
 from gemelo.services.recordings.repair import repair

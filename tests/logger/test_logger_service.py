@@ -21,6 +21,7 @@ from mcap.records import Channel
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import (
     DeviceCommandRequest,
@@ -54,7 +55,6 @@ from gemelo.schemas.topics import (
     Request,
     Topic,
 )
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.logger.main import run
 from gemelo.services.planner.scene.scene_store import SceneStore
 from gemelo.services.runtime.actions import accept

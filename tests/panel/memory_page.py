@@ -14,6 +14,7 @@ from unittest import mock
 
 import gemelo
 from gemelo.api.session import Session
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.device import (
     DeviceCommandResponse,
     DeviceMode,
@@ -26,7 +27,6 @@ from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.planning import FkRequest, FkResponse, PlanCode
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS, DEVICE_STOP, FK, JOINT_STATES, SCENE, STEP_ERRORS
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.bench.bare_browser import BareBrowser, Said, bare_browser
 from gemelo.services.panel.main import TEXTS, Panel
 from gemelo.services.runtime import topics

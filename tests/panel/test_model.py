@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 import gemelo
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.programs import AnyStep, Program, Repeat, RunStatus, StepPath, Wait
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceMode, DeviceState
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.panel.model.availability import CHECKS
 from gemelo.services.panel.model.goal import GoalSolver
 from gemelo.services.panel.model.problems import Problem, problem_of

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, ToolTurns, tool_turns
 from gemelo.services.panel.model.units import STEP, meant, shown, slider_range
 from gemelo.services.panel.words.en import ENGLISH

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo.api.device import Device
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.device import StopKind
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.panel.main import TEXTS
 from gemelo.services.panel.model.pace import EARLY, PERIOD, DrawPace
 from gemelo.services.panel.view.arms import DrawnArm, load_model

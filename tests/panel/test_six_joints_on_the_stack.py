@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import gemelo
+from gemelo.libraries.arm.frames.transforms import from_rpy, multiply
 from gemelo.programs import Go, Line, Program
-from gemelo.services.arm.frames.transforms import from_rpy, multiply
 from gemelo.services.panel.model.tool_turns import ALL_RINGS
 from gemelo.services.panel.words.en import ENGLISH
 from gemelo.services.stack.stack import Stack

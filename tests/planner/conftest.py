@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.core import Planner
 from tests.planner.judging import forget_scenes
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BPoly
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.motion import JointTrajectory
 from gemelo.schemas.scene import PlanningScene
-from gemelo.services.arm.model.description import ArmDescription
 from tests.planner.mujoco_arm import MujocoArm
 
 Array = NDArray[np.float64]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import (
     Goal,
@@ -22,7 +23,6 @@ from gemelo.schemas.planning import (
     WaypointGoal,
 )
 from gemelo.schemas.scene import PlanningScene
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.verification.verify import DENSITY, LOOSE_JERK

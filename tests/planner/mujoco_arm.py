@@ -16,8 +16,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, PlanningScene, SceneObject, SphereShape
-from gemelo.services.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 Numbers = list[float]

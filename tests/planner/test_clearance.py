@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import (
@@ -22,7 +23,6 @@ from gemelo.schemas.planning import (
     ValidityRequest,
 )
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.clearance import CLEARANCE, usable_clearance
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.services.planner.kinematics.closed_form import closed_form, turns_about
 from gemelo.services.planner.kinematics.ik import InverseKinematics
 from gemelo.services.planner.kinematics.targets import ToolTarget

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.bench.scenes import SCENES
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.path.curve import smooth_runs

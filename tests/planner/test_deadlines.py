@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import (
@@ -29,7 +30,6 @@ from gemelo.schemas.planning import (
     WaypointGoal,
 )
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.planner.collision import world as world_module
 from gemelo.services.planner.collision.pair_distances import PairDistances
 from gemelo.services.planner.collision.world import World

@@ -8,9 +8,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanRequest, PoseGoal
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.kinematics.goals import Goals
 from gemelo.services.planner.request.deadline import NEVER

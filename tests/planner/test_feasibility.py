@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.motion import JointTrajectory
 from gemelo.schemas.planning import StepMargin
 from gemelo.schemas.robot import PullOut
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.request.refusals import PlanRefused
 from gemelo.services.planner.timing.profile import joint_limits, straight_line
 from gemelo.services.planner.verification import feasibility

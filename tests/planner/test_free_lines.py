@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.planning import NamedGoal, PlanRequest
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.pipeline.trajectory_builder import TrajectoryBuilder, TrajectoryTouches, lies_on
 from gemelo.services.planner.request.deadline import Stopwatch, endless
 from gemelo.services.planner.timing.profile import joint_limits, straight_line

@@ -12,6 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.frames.transforms import Rigid, compose, from_message, from_rpy, to_message
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.model.gripper import JAWS, jaw_objects, jaws_apart
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.joints import JointState
@@ -34,10 +38,6 @@ from gemelo.schemas.scene import (
     SphereShape,
 )
 from gemelo.schemas.topics import GRIPPER_STATE, JOINT_STATES, SCENE, STATE_VALIDITY
-from gemelo.services.arm.frames.transforms import Rigid, compose, from_message, from_rpy, to_message
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription, load_arm
-from gemelo.services.arm.model.gripper import JAWS, jaw_objects, jaws_apart
 from gemelo.services.planner.collision.scene_shapes import shape_of
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.scene.grasp import width_of

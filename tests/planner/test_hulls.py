@@ -53,7 +53,7 @@ def test_an_arm_of_hulls_is_planned_for_without_scipys_geometry():
     """`scipy.spatial` took half of the time to the first plan, in every worker."""
     folder = generated_arm("six_mesh").folder
     words = (
-        "import sys; from gemelo.services.arm.model.description import load_arm; "
+        "import sys; from gemelo.libraries.arm.model.description import load_arm; "
         "from gemelo.services.planner.core import Planner; "
         f"planner = Planner(load_arm({str(folder)!r})); planner.prepare(); "
         "print(planner.checker.native(0.004) is not None, 'scipy.spatial' in sys.modules)"

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.planner.kinematics.ik import InverseKinematics
 from gemelo.services.planner.kinematics.targets import ToolTarget
 from gemelo.services.planner.request.deadline import NEVER, Deadline

@@ -9,6 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gemelo.libraries.arm.interpolation import TrajectorySampler
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanRequest
@@ -23,9 +26,6 @@ from gemelo.schemas.scene import (
     Shape,
     SphereShape,
 )
-from gemelo.services.arm.interpolation import TrajectorySampler
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
 from tests.planner.independent import Judge, resampled

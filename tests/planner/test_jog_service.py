@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JogCommand, NamedGoal, PlanCode, PlanRequest, PlanResponse
 from gemelo.schemas.topics import JOG, JOG_STATUS, JOINT_STATES, JOINT_TARGETS, PLAN
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner
 

@@ -10,6 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import (
@@ -22,8 +24,6 @@ from gemelo.schemas.planning import (
     ValidityResponse,
 )
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.kinematics.ik import InverseKinematics

@@ -6,9 +6,9 @@ import gc
 import tracemalloc
 from random import Random
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.core import Planner
 
 WARM_UP, PLANS = 40, 60

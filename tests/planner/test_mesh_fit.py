@@ -12,12 +12,12 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.kinematics.collision_matrix import collision_matrix
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription, load_arm
-from gemelo.services.arm.model.srdf_edit import with_pairs
-from gemelo.services.arm.model.urdf_edit import with_collisions
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.kinematics.collision_matrix import collision_matrix
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.model.srdf_edit import with_pairs
+from gemelo.libraries.arm.model.urdf_edit import with_collisions
 from gemelo.services.cli.robot_folder import plan_of
 from gemelo.services.collision_fitting import cuts
 from gemelo.services.collision_fitting.excess import SHARE, depth_in, depths

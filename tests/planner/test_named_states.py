@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.planning import LinearMotion, NamedGoal, PlanCode, PointToPoint, WaypointGoal
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.planner.core import Planner
 from tests.planner.judging import asked
 

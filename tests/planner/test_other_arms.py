@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.checks.check import check
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import FreeMotion, JogCommand, LinearMotion, PointToPoint, PoseGoal, Timing
 from gemelo.schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, SphereShape
-from gemelo.services.arm.checks.check import check
 from gemelo.services.planner.collision.sphere_check import show_scene
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.services.planner.kinematics.ik import InverseKinematics
 from gemelo.services.planner.kinematics.parallel_axes import parallel_axes
 from gemelo.services.planner.kinematics.targets import ToolTarget

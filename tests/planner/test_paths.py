@@ -13,11 +13,11 @@ import msgspec
 import numpy as np
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, Timing
 from gemelo.schemas.scene import MeshShape, PlanningScene, SceneObject
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.bench.problems.problem_sets import path_length
 from gemelo.services.bench.scenes import SCENES, box
 from gemelo.services.planner.collision.clearance import CLEARANCE

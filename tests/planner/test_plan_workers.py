@@ -16,11 +16,11 @@ import numpy as np
 import psutil
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Timing
 from gemelo.schemas.scene import BoxShape, MeshShape, PlanningScene, SceneObject
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.planner import core
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.workers import worker

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.request.refusals import PlanRefused
 from gemelo.services.planner.request.start_state import resolve_start

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import (
     FreeMotion,
@@ -25,7 +26,6 @@ from gemelo.schemas.planning import (
     Refusal,
 )
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
 from tests.profiles import examples

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PointToPoint, PoseGoal
 from gemelo.schemas.scene import AllowedPair, BoxShape, PlanningScene, SceneObject, SphereShape
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
 

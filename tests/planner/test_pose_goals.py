@@ -13,9 +13,9 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.kinematics.kinematics import FramePose, Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.planning import PlanCode, PoseGoal, Refusal
-from gemelo.services.arm.kinematics.kinematics import FramePose, Kinematics
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.planner.kinematics.goals import Goals, Start
 from gemelo.services.planner.request.deadline import NEVER
 from gemelo.services.planner.request.refusals import PlanRefused

@@ -17,7 +17,7 @@ from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import FreeMotion, JointGoal, PlanRequest
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.collision.world import World
 

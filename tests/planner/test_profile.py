@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
+from gemelo.libraries.arm.interpolation import TrajectorySampler
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.motion import JointTrajectory
-from gemelo.services.arm.interpolation import TrajectorySampler
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.planner.timing import profile
 from gemelo.services.planner.timing.profile import joint_limits, straight_line
 from gemelo.services.planner.verification.verify import require_ends, require_within_limits, sample

@@ -9,12 +9,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from gemelo.libraries.arm.kinematics import self_collisions
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.self_collisions import driver_of, shape_reach
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import AllowedPair, MeshShape, PlanningScene, SceneObject
-from gemelo.services.arm.kinematics import self_collisions
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.kinematics.self_collisions import driver_of, shape_reach
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.bench.planner.scene_intake import drawn_scene
 from gemelo.services.planner.collision import arm_geometry
 from gemelo.services.planner.collision.world import World

@@ -10,6 +10,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint
@@ -27,8 +29,6 @@ from gemelo.schemas.scene import (
     SphereShape,
 )
 from gemelo.schemas.topics import CONTACTS, JOINT_STATES, PLAN, SCENE, SCENE_EDIT
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.scene.scene_file import load_scene, save_scene
 from gemelo.services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner

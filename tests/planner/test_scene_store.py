@@ -11,6 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.frames.transforms import compose, from_message, to_message
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import (
     AllowedPair,
@@ -35,9 +38,6 @@ from gemelo.schemas.scene import (
     Shape,
     SphereShape,
 )
-from gemelo.services.arm.frames.transforms import compose, from_message, to_message
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.planner.scene.scene_check import require_scene
 from gemelo.services.planner.scene.scene_file import DamagedScene, load_scene, put_aside, save_scene
 from gemelo.services.planner.scene.scene_store import SceneStore

@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.planning import PoseGoal
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.planner.kinematics.goals import Goals
 from gemelo.services.planner.kinematics.targets import AxisPointing, ToolTarget
 from gemelo.services.planner.kinematics.task_space import TaskSpace, task_space

@@ -9,6 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.interpolation import TrajectorySampler
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import (
@@ -28,8 +30,6 @@ from gemelo.schemas.planning import (
     WaypointGoal,
 )
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
-from gemelo.services.arm.interpolation import TrajectorySampler
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from gemelo.services.arm.kinematics.kinematics import FramePose
+from gemelo.libraries.arm.kinematics.kinematics import FramePose
 from gemelo.services.planner.cartesian.arcs import arc_about, arc_through
 from gemelo.services.planner.cartesian.tool_path import ToolPath, polyline
 from gemelo.services.planner.path.path_curve import NO_LENGTH, CubicSpline, rounded_runs

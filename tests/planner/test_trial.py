@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.arm.checks.findings import Severity
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.checks.findings import Severity
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.planner.trial import looking_the_same, trial

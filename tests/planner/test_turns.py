@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.planning import FreeMotion, JointGoal, Motion, PlanCode, PlanResponse, PointToPoint
 from gemelo.schemas.scene import PlanningScene
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.planner.core import Planner
 from tests.planner.judging import asked, require_sound, show
 from tests.planner.walled import NAMES, wall

@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 import pytest
 
+from gemelo.libraries.arm.interpolation import TrajectorySampler
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.motion import JointTrajectory
-from gemelo.services.arm.interpolation import TrajectorySampler
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.clearance import first_collision
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.timing.profile import States, joint_limits, straight_line

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import (
     AllowedPair,
@@ -20,8 +22,6 @@ from gemelo.schemas.scene import (
     Shape,
     SphereShape,
 )
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.planner.collision.scene_shapes import SceneError
 from gemelo.services.planner.collision.world import World
 

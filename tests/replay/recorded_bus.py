@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.topics import DESCRIPTION
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.recordings.channels import Entry
 from gemelo.services.recordings.mcap_file import McapFile
 from gemelo.services.recordings.table import recorded_topics

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.arm.checks.check import Severity, check
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest
-from gemelo.services.arm.checks.check import Severity, check
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.planner.core import Planner

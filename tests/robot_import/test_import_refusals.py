@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from gemelo.services.arm.checks.check import check
-from gemelo.services.arm.checks.findings import Severity
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.checks.check import check
+from gemelo.libraries.arm.checks.findings import Severity
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.robot_import.limits import ask_limits

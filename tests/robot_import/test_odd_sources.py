@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.arm.checks.check import check
-from gemelo.services.arm.checks.findings import Severity
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.checks.check import check
+from gemelo.libraries.arm.checks.findings import Severity
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.robot_import.limits import ask_limits

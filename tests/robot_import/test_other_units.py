@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gemelo.services.arm.checks.check import check
-from gemelo.services.arm.checks.findings import Severity
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.model.urdf import UrdfModel
+from gemelo.libraries.arm.checks.check import check
+from gemelo.libraries.arm.checks.findings import Severity
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.model.urdf import UrdfModel
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.robot_import.limits import ask_limits

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from gemelo.libraries.arm.checks.findings import Severity
+from gemelo.libraries.arm.checks.meshes import MOST_TRIANGLES
+from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.arm.model.srdf_edit import entries
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import PlanRequest, PoseGoal
-from gemelo.services.arm.checks.findings import Severity
-from gemelo.services.arm.checks.meshes import MOST_TRIANGLES
-from gemelo.services.arm.model.description import load_arm
-from gemelo.services.arm.model.srdf_edit import entries
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.planner.core import Planner

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.urdf import JointKind
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.urdf import JointKind
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.robot_import.mended import Mended

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.services.robot_import.parts import DRIVERS, MOTORS, driver_named, motor_named
 from gemelo.services.robot_import.questions import Questions, above_zero, answers_text, read_answers, whole, yes_or_no
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.arm.checks.findings import Severity
+from gemelo.libraries.arm.checks.findings import Severity
 from gemelo.services.robot_import.mended import Mended
 from gemelo.services.robot_import.mending import mend
 from gemelo.services.robot_import.questions import Questions

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
-from gemelo.services.arm.model.virtual_drive import driven_joints
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.libraries.arm.model.virtual_drive import driven_joints
 from gemelo.services.robot_import.mended import Mended
 from gemelo.services.robot_import.mending import mend
 from gemelo.services.robot_import.poses import zero_state

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.arm.model.urdf import UrdfModel, urdf_of
+from gemelo.libraries.arm.model.urdf import UrdfModel, urdf_of
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.robot_import.tool_link import other_tools, tool_link

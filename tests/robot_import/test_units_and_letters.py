@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from gemelo.services.arm.checks import meshes
-from gemelo.services.arm.checks.meshes import MeshFacts, facts_of
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.urdf import Limit
+from gemelo.libraries.arm.checks import meshes
+from gemelo.libraries.arm.checks.meshes import MeshFacts, facts_of
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.urdf import Limit
 from gemelo.services.robot_import.limits import ask_limits
 from gemelo.services.robot_import.mending import mend
 from gemelo.services.robot_import.mesh_copies import copy_meshes

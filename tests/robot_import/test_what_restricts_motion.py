@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.arm.checks.findings import Severity
-from gemelo.services.arm.checks.urdf import check_urdf
-from gemelo.services.arm.model.description import load_arm
-from gemelo.services.arm.model.srdf import read_srdf
-from gemelo.services.arm.model.srdf_edit import entries
+from gemelo.libraries.arm.checks.findings import Severity
+from gemelo.libraries.arm.checks.urdf import check_urdf
+from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.arm.model.srdf import read_srdf
+from gemelo.libraries.arm.model.srdf_edit import entries
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.robot_import.questions import Questions

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.robot_import.source import find_source

@@ -6,6 +6,7 @@ import msgspec
 import pytest
 from _pytest.mark.structures import ParameterSet
 
+from gemelo.libraries.arm.stl import MAX_TRIANGLES
 from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.message import Message, encode
 from gemelo.schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
@@ -13,7 +14,6 @@ from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanRespon
 from gemelo.schemas.scene import MeshShape, SceneAdd, SceneObject, SceneRequest, SceneResponse
 from gemelo.schemas.system import Exchange, LogRecord
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, LOG, PLAN, SCENE_EDIT
-from gemelo.services.arm.stl import MAX_TRIANGLES
 from gemelo.services.runtime.actions import accept, refuse
 from gemelo.services.runtime.actions.keys import goal_request, status_topic
 from gemelo.services.runtime.bus.wire import LARGEST, MAX_PAYLOAD, MAX_PAYLOAD_OF, TooLarge, encoded, limit_of

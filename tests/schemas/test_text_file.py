@@ -10,12 +10,12 @@ import pytest
 
 import gemelo
 from gemelo.api.scene_files import read_scene, write_scene
+from gemelo.libraries.arm.cell.cell_file import load_cell
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.programs import Points
 from gemelo.programs.reading import read_program
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.text_file import NotUtf8, decode_text
-from gemelo.services.arm.cell.cell_file import load_cell
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.cli.plan_file import read_plan
 from gemelo.services.hosts.site_file import read_site
 from gemelo.services.robot_import.questions import read_answers

@@ -14,10 +14,10 @@ import sys
 import tempfile
 from pathlib import Path
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.device import DeviceEvent
 from gemelo.schemas.frames import FrameTransforms
 from gemelo.schemas.topics import DEVICE_EVENTS, FRAMES, JOINT_STATES
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.bench.figures import quantile
 from gemelo.services.bench.handshake import joins
 from gemelo.services.bench.latency import follow, sharp_start

@@ -20,8 +20,8 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from gemelo.firmware.platform.host.slot_record import ROW, VARIABLE
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.chaos.slots import SlotFile, steps_in, violations
 from gemelo.services.cli.text_table import table
 from gemelo.services.hosts.checks import load_site

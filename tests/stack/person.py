@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from itertools import pairwise
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.device import DeviceCommandRequest, DeviceMode, DeviceStopRequest, ReferenceCommand, StopKind
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
@@ -18,7 +19,6 @@ from gemelo.schemas.topics import (
     JOINT_STATES,
     PLAN,
 )
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.runtime.deployment import load_deployment, project_root
 from gemelo.services.runtime.errors import GoalRefused, NoAnswer, RequestRefused
 from gemelo.services.runtime.node import Node

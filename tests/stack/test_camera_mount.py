@@ -7,11 +7,11 @@ import re
 import numpy as np
 import pytest
 
-from gemelo.services.arm.cell.camera_file import CAMERA_FILE, MOUNT_BOARD, load_measured
-from gemelo.services.arm.cell.camera_model import exact_info
-from gemelo.services.arm.cell.cell_file import load_cell
-from gemelo.services.arm.frames.transforms import to_message
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE, MOUNT_BOARD, load_measured
+from gemelo.libraries.arm.cell.camera_model import exact_info
+from gemelo.libraries.arm.cell.cell_file import load_cell
+from gemelo.libraries.arm.frames.transforms import to_message
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.bench.vision.mount_images import FIRST
 from gemelo.services.bench.vision.mounting import tool_error
 from gemelo.services.cli.errors import ExitCode

@@ -7,11 +7,11 @@ import time
 
 import pytest
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest
 from gemelo.schemas.topics import PLAN, STEP_ERRORS
-from gemelo.services.arm.kinematics.kinematics import Kinematics
 from tests.stack.gemelo import gemelo
 from tests.stack.person import Operator, jumps
 

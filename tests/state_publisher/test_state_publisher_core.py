@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gemelo.libraries.arm.frames.frame_buffer import FrameBuffer
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.joints import JointState
-from gemelo.services.arm.frames.frame_buffer import FrameBuffer
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription, load_arm
 from gemelo.services.state_publisher.core import StatePublisher
 
 STAMP = 1_700_000_000_123_456_789

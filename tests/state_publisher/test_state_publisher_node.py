@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.services.runtime.node import Node
 from gemelo.services.runtime.process.shutdown import ShutdownRequest

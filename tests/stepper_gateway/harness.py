@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from pathlib import Path
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
 from gemelo.services.stepper_gateway.motion.paths import profile
 from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1

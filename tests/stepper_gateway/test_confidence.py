@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.motors.torque import BEYOND, torque_share
 from gemelo.schemas.ledger import VerifiedBy
-from gemelo.services.arm.motors.torque import BEYOND, torque_share
 from gemelo.services.stepper_gateway.ledger.confidence import (
     AGE,
     CLEAN,

@@ -7,11 +7,11 @@ from dataclasses import replace as with_
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.schemas.device import ConfigureResponse, DeviceCommandKind, DeviceConfiguration, DeviceMode
 from gemelo.schemas.device_config import config_crc, config_text
 from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATUS
-from gemelo.services.arm.device.device_config import device_config
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import move

@@ -8,6 +8,8 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import (
     DeviceCommand,
@@ -21,8 +23,6 @@ from gemelo.schemas.device import (
 )
 from gemelo.schemas.message import BadMessage, decode
 from gemelo.schemas.topics import JOINT_STATES
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.virtual_arm.gateway_driver import asked
 from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1

@@ -6,10 +6,10 @@ import math
 
 import pytest
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.planning import JogCommand, JogStatus
 from gemelo.schemas.topics import DEVICE_EVENTS, JOINT_STATES
-from gemelo.services.arm.kinematics.kinematics import Kinematics
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.jog.jog import PERIOD, Jog

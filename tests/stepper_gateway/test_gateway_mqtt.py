@@ -14,11 +14,11 @@ from paho.mqtt import publish
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
+from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import ArmCommand, DeviceCommandKind, DeviceStatus, ReferenceCommand, StopKind
 from gemelo.schemas.device_config import config_crc, config_text
 from gemelo.schemas.motion import FollowErrorCode
-from gemelo.services.arm.device.device_config import device_config
 from gemelo.services.stepper_gateway.links.frames import Chunk, CommandFrame, decode
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.links.mqtt import MqttLink

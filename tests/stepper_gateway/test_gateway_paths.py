@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.interpolation import TrajectorySampler
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
-from gemelo.services.arm.interpolation import TrajectorySampler
 from gemelo.services.stepper_gateway.device.clock import ClockSync
 from gemelo.services.stepper_gateway.goals.limit_checks import within
 from gemelo.services.stepper_gateway.motion.commanded_path import CommandedPath

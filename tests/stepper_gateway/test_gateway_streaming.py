@@ -192,7 +192,7 @@ def test_whatever_the_targets_the_tracker_keeps_every_limit(
 
 
 ENDS = """
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.runtime.deployment import project_root
 from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.services.runtime.node import Node

@@ -7,11 +7,11 @@ import json
 import pytest
 
 from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.libraries.arm.device.device_config import device_config, reference_steps
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceStatus, StopKind
 from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.topics import DEVICE_STATUS
-from gemelo.services.arm.device.device_config import device_config, reference_steps
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.virtual_arm.virtual_arm import BOOT_ID, VirtualArm, rm1
 from tests.stepper_gateway.harness import move

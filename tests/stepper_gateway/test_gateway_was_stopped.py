@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.device import DeviceStopRequest, StopKind
 from gemelo.schemas.topics import DEVICE_STOP
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.runtime.bus.identity import identify
 from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.services.runtime.bus.name_holder import AGAIN, STOPPED

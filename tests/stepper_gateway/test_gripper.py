@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo.firmware.bindings.injection import InjectRefused, inject
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.model.gripper import opening_of, pulse_of
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandKind, InjectKind, InjectRequest, OutputCommand, StopKind
 from gemelo.schemas.gripper import GripperCommandGoal, GripperState
 from gemelo.schemas.robot import ServoGripper
 from gemelo.schemas.topics import GRIPPER_STATE
-from gemelo.services.arm.model.description import ArmDescription, load_arm
-from gemelo.services.arm.model.gripper import opening_of, pulse_of
 from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.profiles import examples
 

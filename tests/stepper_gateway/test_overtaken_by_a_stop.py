@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.actions import GoalRequest, ResultRequest, ResultResponse
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.device import DeviceCommandRequest, DeviceStopRequest, SpeedCommand, StopKind
@@ -24,7 +25,6 @@ from gemelo.schemas.topics import (
     GATEWAY,
     GRIPPER_COMMAND,
 )
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.runtime.actions.keys import goal_request, result_request
 from gemelo.services.runtime.bus.interface import BusReply
 from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork

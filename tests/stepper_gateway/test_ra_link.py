@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandKind
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.stepper_gateway.main import open_device
 from tests.stepper_gateway.dialects import robot_with
 from tests.stepper_gateway.processes import DEVICE, Processes

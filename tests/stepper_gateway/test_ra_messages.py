@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo.firmware.platform.host.sketch import AustinStepper, HostSketch
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.arm.motors.relative_moves import Ramp, ramp_of
 from gemelo.schemas.robot import Sketch as SketchTable
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import load_arm
-from gemelo.services.arm.motors.relative_moves import Ramp, ramp_of
 from gemelo.services.stepper_gateway.links.foreign.ra_messages import (
     BadRaMessage,
     degrees,

@@ -14,11 +14,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.model.description import ArmDescription, heard_by_the_board, load_arm
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.deployment import Deployment, SerialSection
 from gemelo.schemas.device import DeviceCommandKind
 from gemelo.schemas.robot import Dialect
-from gemelo.services.arm.model.description import ArmDescription, heard_by_the_board, load_arm
 from gemelo.services.stepper_gateway.links.foreign.text_exchange import RETRIES, TextExchange
 from gemelo.services.stepper_gateway.links.foreign.text_link import TextLink
 from gemelo.services.stepper_gateway.links.foreign.text_messages import AnswerReader, LineAnswer, line_of, read_answer

@@ -8,8 +8,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import InjectRequest, InjectResponse
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.mqtt.access import BrokerAccess
 from gemelo.services.stepper_gateway.links.link import Link
 from gemelo.services.stepper_gateway.links.mqtt import MqttLink

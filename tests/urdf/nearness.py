@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 import pinocchio as pin
 
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.description import ArmDescription
 
 
 def nearest_distances(arm: ArmDescription, configurations: Iterable[np.ndarray]) -> dict[frozenset[str], float]:

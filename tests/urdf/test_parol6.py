@@ -15,11 +15,11 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.arm.checks.check import check
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import load_arm
-from gemelo.services.arm.motors.speed import speed_limits
+from gemelo.libraries.arm.checks.check import check
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.arm.motors.speed import speed_limits
 from tests.profiles import examples
 from tests.urdf.nearness import nearest_distances
 

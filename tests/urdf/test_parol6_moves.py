@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.model.description import Joint, load_arm
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
-from gemelo.services.arm.model.description import Joint, load_arm
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.kinematics.ik import InverseKinematics
 from gemelo.services.planner.kinematics.targets import ToolTarget

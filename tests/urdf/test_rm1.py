@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.collision_geometry.shapes import ShapeKind

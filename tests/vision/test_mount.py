@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.services.bench.vision.mounting import (
     MountingTrial,
     closed_form,

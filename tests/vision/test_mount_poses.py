@@ -9,8 +9,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.bench.vision.mount_images import (
     Setup,
     Sight,

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.joints import JointState
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.runtime.deployment import project_root
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.core import Visualizer

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.device import DeviceMode, DeviceState
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import DESCRIPTION, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS, Delivery, Topic
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.recordings.channels import Entry
 from gemelo.services.recordings.incidents import Happening, Incident, IncidentKind, incident_metadata
 from gemelo.services.recordings.mcap_file import ROBOT, McapFile

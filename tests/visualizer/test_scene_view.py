@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import rerun as rr
 
+from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.arm.model.gripper import JAWS, jaw_objects
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.scene import (
@@ -24,8 +26,6 @@ from gemelo.schemas.scene import (
     Shape,
     SphereShape,
 )
-from gemelo.services.arm.model.description import load_arm
-from gemelo.services.arm.model.gripper import JAWS, jaw_objects
 from gemelo.services.visualizer.content import entities, palette
 from gemelo.services.visualizer.content.scene import SceneView
 from gemelo.services.visualizer.content.updates import ClearEntity, Labels, Poses, SolidMesh, TranslucentArm

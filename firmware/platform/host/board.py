@@ -14,11 +14,11 @@ from gemelo.firmware.bindings.parsers import ProvisionRefused, asks_for_factory_
 from gemelo.firmware.platform.host.firmware_slots import Booted, FirmwareSlots
 from gemelo.firmware.platform.host.flash import Flash, NetworkCredentials
 from gemelo.firmware.platform.host.memory import BootState, PositionStore, StoredPosition
+from gemelo.libraries.arm.device.device_config import device_config, reference_steps
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.gripper import gripper_unit
 from gemelo.schemas.device_config import config_text
 from gemelo.schemas.robot import Motor
-from gemelo.services.arm.device.device_config import device_config, reference_steps
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.gripper import gripper_unit
 from gemelo.services.runtime.clock import SYSTEM, Clock
 from gemelo.services.runtime.process.unwritten import UnwrittenFiles, remedy_of
 

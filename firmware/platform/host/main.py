@@ -23,10 +23,10 @@ from gemelo.firmware.platform.host.slot_record import VARIABLE, SlotRecord
 from gemelo.firmware.platform.host.virtual_esp32 import VirtualEsp32
 from gemelo.firmware.platform.host.virtual_sketch import VirtualSketch
 from gemelo.firmware.platform.host.wires import Wires
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.deployment import Deployment, DeviceKind, Wire
 from gemelo.schemas.robot import Dialect
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.credentials.private_files import AccessError
 from gemelo.services.mqtt.access import device_access
 from gemelo.services.runtime.deployment import DeploymentError, load_deployment, project_root

@@ -13,7 +13,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from gemelo.services.arm.motors.relative_moves import Ramp
+from gemelo.libraries.arm.motors.relative_moves import Ramp
 
 PASS = 40e-6  # [s] of one loop(), without what blocks it
 PUBLISH = 0.002  # [s] that the two messages of the telemetry block it

@@ -10,8 +10,8 @@ from paho.mqtt import client as paho
 
 from gemelo.firmware.platform.host.link import Item, MqttMessage, ShutdownRequested
 from gemelo.firmware.platform.host.sketch import HostSketch
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.motors.relative_moves import ramp_of
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.motors.relative_moves import ramp_of
 from gemelo.services.mqtt.access import BrokerAccess
 from gemelo.services.mqtt.client import MqttClient
 from gemelo.services.runtime.process.readiness import Readiness

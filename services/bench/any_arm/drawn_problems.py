@@ -11,10 +11,10 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanRequest
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.bench.any_arm.families import FAMILIES, Setting, ToolPose, settings
 from gemelo.services.bench.problems.problem_sets import ALLOWED, tool_pose
 from gemelo.services.planner.collision.world import World

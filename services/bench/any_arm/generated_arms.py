@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 
 Point = tuple[float, float, float]
 HALF = math.pi / 2.0

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.bench.figures import Figure, NotMeasured, of_samples, quantile
 from gemelo.services.bench.planner.references import CoalChecker
 from gemelo.services.bench.scenes import CHECK_SCENE, parol6, random_configurations, rm1
@@ -41,7 +41,7 @@ def state_check_us() -> Figure:
         samples.append((time.thread_time() - started) / BATCH * 1e6)
     reference = {
         "pinocchio + coal, same scene": coal_us(arm),
-        "gemelo.services.arm.kinematics, self only": self_us(arm),
+        "gemelo.libraries.arm.kinematics, self only": self_us(arm),
         "motion core, one configuration a call": single_us(core, rows),
         "rm1, motion core": batch_us(rm1()),
         "rm1, pinocchio + coal, same scene": coal_us(rm1()),

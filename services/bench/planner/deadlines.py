@@ -8,11 +8,11 @@ from itertools import product
 
 import numpy as np
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.bench.figures import Figure, FigureGoal, of_samples, quantile
 from gemelo.services.bench.planner.mesh_planning import dented_ball
 from gemelo.services.bench.scenes import rm1

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.frames.transforms import inverse, multiply
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.frames.transforms import inverse, multiply
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile, rounded
 from gemelo.services.bench.scenes import parol6, random_configurations, rm1
 from gemelo.services.planner.kinematics.ik import InverseKinematics

@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanRequest, PlanResponse
 from gemelo.schemas.scene import MeshShape, PlanningScene, SceneObject
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.bench.figures import Figure, of_samples
 from gemelo.services.bench.planner.trials import spread
 from gemelo.services.bench.problems.problem_sets import ALLOWED
@@ -54,7 +54,7 @@ import sys, time
 from pathlib import Path
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.planner.core import Planner
 began = time.process_time()
 arm = load_arm(Path(sys.argv[1]))

@@ -16,10 +16,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.kinematics.joint_mapping import JointMapping
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import BoxShape, CylinderShape, PlanningScene, Shape
-from gemelo.services.arm.kinematics.joint_mapping import JointMapping
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.bench.figures import NotMeasured
 from gemelo.services.bench.problems.problem_sets import ALLOWED
 

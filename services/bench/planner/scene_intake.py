@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 import pinocchio as pin
 
+from gemelo.libraries.arm.kinematics.self_collisions import load_collision_geometry
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, SphereShape
-from gemelo.services.arm.kinematics.self_collisions import load_collision_geometry
 from gemelo.services.bench.figures import Figure, FigureGoal, of_samples, quantile
 from gemelo.services.bench.scenes import parol6, rm1
 from gemelo.services.planner.collision.scene_shapes import shape_of

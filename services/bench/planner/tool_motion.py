@@ -7,11 +7,11 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JogCommand, LinearMotion, PlanCode, PlanRequest, PoseGoal
 from gemelo.schemas.scene import PlanningScene
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.bench.figures import Figure, FigureGoal, of_samples, quantile
 from gemelo.services.bench.planner.path_quality import least_time
 from gemelo.services.bench.scenes import CHECK_SCENE, parol6, rm1

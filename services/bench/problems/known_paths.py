@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.bench.problems.problem_sets import path_length
 from gemelo.services.planner.collision.checker import CollisionChecker
 from gemelo.services.planner.collision.clearance import CLEARANCE

@@ -17,13 +17,13 @@ import cv2
 import psutil
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.cell.camera_model import exact_info
+from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.schemas.camera import CameraImage
 from gemelo.schemas.cell import VirtualSource
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.system import SetParameter
 from gemelo.schemas.topics import camera_detections, camera_image
-from gemelo.services.arm.cell.camera_model import exact_info
-from gemelo.services.arm.cell.cell_file import load_cell
 from gemelo.services.bench.figures import Figure, NotMeasured, of_samples, quantile
 from gemelo.services.bench.scenes import rm1
 from gemelo.services.bench.stack import Stacks, cpu_seconds, families

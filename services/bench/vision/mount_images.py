@@ -12,13 +12,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from gemelo.libraries.arm.cell.camera_model import exact_info
+from gemelo.libraries.arm.cell.cell_file import Cell
+from gemelo.libraries.arm.frames.transforms import from_rpy, to_message
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.cell import CameraRecord, TagRecord, VirtualSource
 from gemelo.schemas.joints import JointState
-from gemelo.services.arm.cell.camera_model import exact_info
-from gemelo.services.arm.cell.cell_file import Cell
-from gemelo.services.arm.frames.transforms import from_rpy, to_message
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
 from gemelo.services.camera.virtual.world import CameraWorld
 from gemelo.services.vision.boards import Sighting, TagBoard

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.vision.boards import Sighting, TagBoard
 from gemelo.services.vision.calibration.reprojection import BoardView, Carrier
 from gemelo.services.vision.camera_model import CameraModel

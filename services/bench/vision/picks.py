@@ -14,10 +14,10 @@ from functools import cache, partial
 from pathlib import Path
 
 import gemelo
+from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.schemas.cell import PosePlace
 from gemelo.schemas.detections import Detections
 from gemelo.schemas.topics import camera_truth
-from gemelo.services.arm.cell.cell_file import load_cell
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
 from gemelo.services.runtime.deployment import project_root
 from gemelo.services.runtime.topics import Latest

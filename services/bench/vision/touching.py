@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.cell.camera_model import exact_info
+from gemelo.libraries.arm.cell.cell_file import Cell
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.cell import CameraRecord, TagRecord, VirtualSource
 from gemelo.schemas.joints import JointState
-from gemelo.services.arm.cell.camera_model import exact_info
-from gemelo.services.arm.cell.cell_file import Cell
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.bench.figures import Figure, of_samples, quantile
 from gemelo.services.bench.scenes import rm1
 from gemelo.services.bench.vision.mounting import tool_error

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, from_rpy
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.stl import BadStl, read_stl
 from gemelo.schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, Shape, SphereShape
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, from_rpy
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.stl import BadStl, read_stl
 from gemelo.services.camera.virtual.solids import Array, Colour, PosedSolid, box, cylinder, sphere, triangles
 
 LINKS: tuple[Colour, ...] = ((196, 198, 202), (70, 72, 78), (150, 154, 160))  # one after the other

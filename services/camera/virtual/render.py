@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.frames.transforms import Rigid, compose, inverse
 from gemelo.schemas.camera import CameraInfo
-from gemelo.services.arm.frames.transforms import Rigid, compose, inverse
 from gemelo.services.camera.virtual.lens import Array, Lens, Samples, lens_of
 from gemelo.services.camera.virtual.solids import Colour, Face, PosedSolid
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.frames.transforms import IDENTITY, Rigid
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid
 
 Array = NDArray[np.float64]
 Texture = NDArray[np.uint8]

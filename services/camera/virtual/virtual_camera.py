@@ -8,10 +8,10 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
+from gemelo.libraries.arm.frames.transforms import Rigid, compose, from_message, inverse, rotate, to_message
 from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import CameraRecord, TagThing, Thing, VirtualSource
 from gemelo.schemas.detections import Detection, DetectionKind, Detections
-from gemelo.services.arm.frames.transforms import Rigid, compose, from_message, inverse, rotate, to_message
 from gemelo.services.camera.sources.source import EncodedImage, encoded
 from gemelo.services.camera.virtual.render import Image, Optics, expose, render
 from gemelo.services.camera.virtual.world import WorldSnapshot

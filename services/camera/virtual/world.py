@@ -12,14 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gemelo.schemas.cell import ColourThing, TagPlace, TagRecord, TagThing, Thing
-from gemelo.schemas.gripper import GripperState
-from gemelo.schemas.joints import JointState
-from gemelo.schemas.scene import PlanningScene
-from gemelo.services.arm.cell.camera_file import MOUNT_BOARD
-from gemelo.services.arm.cell.cell_file import Cell, grasp_width, height_of_frame
-from gemelo.services.arm.cell.colours import RGB
-from gemelo.services.arm.frames.transforms import (
+from gemelo.libraries.arm.cell.camera_file import MOUNT_BOARD
+from gemelo.libraries.arm.cell.cell_file import Cell, grasp_width, height_of_frame
+from gemelo.libraries.arm.cell.colours import RGB
+from gemelo.libraries.arm.frames.transforms import (
     IDENTITY,
     Point,
     Rigid,
@@ -30,9 +26,13 @@ from gemelo.services.arm.frames.transforms import (
     inverse,
     rotate,
 )
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.gripper import JAWS, jaw_edges, jaw_objects
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.gripper import JAWS, jaw_edges, jaw_objects
+from gemelo.schemas.cell import ColourThing, TagPlace, TagRecord, TagThing, Thing
+from gemelo.schemas.gripper import GripperState
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.scene import PlanningScene
 from gemelo.services.camera.virtual.arm_solids import arm_solids, solid_of
 from gemelo.services.camera.virtual.solids import Face, PosedSolid, box, tag
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import gemelo
-from gemelo.services.arm.cell.cell_file import deployed_cell
+from gemelo.libraries.arm.cell.cell_file import deployed_cell
 from gemelo.services.panel.model.cameras import CameraPictures
 from gemelo.services.panel.model.goal import GoalSolver
 from gemelo.services.panel.model.jogging import Jogging

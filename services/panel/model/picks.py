@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 
 import gemelo
-from gemelo.services.arm.cell.cell_file import Cell
+from gemelo.libraries.arm.cell.cell_file import Cell
 from gemelo.services.panel.model.problems import Problem
 
 

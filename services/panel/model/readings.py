@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import gemelo
 from gemelo.api.device import fault_of
+from gemelo.libraries.arm.model.gripper import jaw_objects, jaws_apart
 from gemelo.schemas.control import ControlState
 from gemelo.schemas.device import DeviceState, DeviceStatus
 from gemelo.schemas.gripper import GripperState
@@ -20,7 +21,6 @@ from gemelo.schemas.planning import JogStatus, PlannedPath
 from gemelo.schemas.scene import Contacts, PlanningScene, SceneObject
 from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import Topic
-from gemelo.services.arm.model.gripper import jaw_objects, jaws_apart
 from gemelo.services.panel.model.pace import DrawPace
 from gemelo.services.runtime.scene_meshes import SceneMeshes
 from gemelo.services.runtime.topics import Latest

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.frames.transforms import rotate
-from gemelo.services.arm.kinematics.chain import link_transforms
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.frames.transforms import rotate
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 Rings = tuple[bool, bool, bool]  # about the tool's x, y and z

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from math import degrees, inf, pi, radians
 
-from gemelo.services.arm.model.description import Joint
+from gemelo.libraries.arm.model.description import Joint
 
 SHOWN = {"rad": "°", "m": "mm"}
 STEP = {"rad": 0.1, "m": 0.1}  # [deg] or [mm] of a slider

@@ -13,10 +13,10 @@ import yourdfpy
 from numpy.typing import NDArray
 from viser.extras import ViserUrdf
 
-from gemelo.services.arm.frames.transforms import Rigid
-from gemelo.services.arm.kinematics.chain import complete, joint_transform, link_transforms, origin_of
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.libraries.arm.frames.transforms import Rigid
+from gemelo.libraries.arm.kinematics.chain import complete, joint_transform, link_transforms, origin_of
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
 from gemelo.services.panel.model.pace import UNSEEN
 
 Array = NDArray[np.float64]

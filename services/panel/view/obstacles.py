@@ -10,9 +10,9 @@ import trimesh
 import viser
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.stl import BadStl, read_stl
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import BoxShape, Contact, CylinderShape, MeshShape, SceneObject, SphereShape
-from gemelo.services.arm.stl import BadStl, read_stl
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 
-from gemelo.services.arm.model.description import Joint
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.services.panel.model.problems import Problem
 from gemelo.services.panel.model.units import text_of
 

@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.kinematics.kinematics import FramePose
 from gemelo.schemas.planning import PlanCode, Refusal
-from gemelo.services.arm.kinematics.kinematics import FramePose
 from gemelo.services.planner.cartesian.tool_path import ArcPiece
 from gemelo.services.planner.request.refusals import PlanRefused
 

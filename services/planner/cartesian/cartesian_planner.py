@@ -10,10 +10,10 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.motion import JointTrajectory
 from gemelo.schemas.planning import PlanCode, Refusal, Timing
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.cartesian.continuation import FINEST, Continuation, FollowedPath, StopReason, is_same
 from gemelo.services.planner.cartesian.path_points import Run, between, states_of_runs
 from gemelo.services.planner.cartesian.tool_limits import ToolLimits

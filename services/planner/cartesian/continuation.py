@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.kinematics.kinematics import FramePose, Kinematics
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.kinematics.kinematics import FramePose, Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.cartesian.tool_path import ToolPath
 from gemelo.services.planner.cartesian.tool_solver import ToolSolver
 from gemelo.services.planner.path.path_curve import CubicSpline

@@ -6,6 +6,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.frames.transforms import IDENTITY, compose
+from gemelo.libraries.arm.kinematics.kinematics import FramePose, Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.message import Vector
 from gemelo.schemas.planning import (
     CircularMotion,
@@ -17,9 +20,6 @@ from gemelo.schemas.planning import (
     Refusal,
     WaypointGoal,
 )
-from gemelo.services.arm.frames.transforms import IDENTITY, compose
-from gemelo.services.arm.kinematics.kinematics import FramePose, Kinematics
-from gemelo.services.arm.model.description import ArmDescription, Joint
 from gemelo.services.planner.cartesian.arcs import arc_about, arc_through
 from gemelo.services.planner.cartesian.cartesian_planner import CartesianPath, CartesianPlanner, CartesianTerms
 from gemelo.services.planner.cartesian.tool_limits import ToolLimits, require_tool_limits

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from gemelo.services.arm.kinematics.kinematics import FramePose
+from gemelo.libraries.arm.kinematics.kinematics import FramePose
 from gemelo.services.planner.path.path_curve import NO_LENGTH, blending, cut
 
 Array = NDArray[np.float64]

@@ -12,10 +12,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics, frame_of_link
+from gemelo.libraries.arm.kinematics.self_collisions import driver_of, load_collision_geometry, shape_reach
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.scene import PlanningScene, SceneObject
-from gemelo.services.arm.kinematics.kinematics import Kinematics, frame_of_link
-from gemelo.services.arm.kinematics.self_collisions import driver_of, load_collision_geometry, shape_reach
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.scene_shapes import SceneError, is_read_from_a_file, shape_of
 from gemelo.services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
 from gemelo.schemas.scene import Contact
-from gemelo.services.arm.kinematics.self_collisions import LinkPair
 from gemelo.services.planner.collision.sphere_check import sphere_check
 from gemelo.services.planner.collision.world import Positions, World
 from gemelo.services.planner.request.deadline import NEVER

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.scene import PlanningScene, SceneObject
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.scene_shapes import allows, shape_of
 from gemelo.services.planner.collision_geometry.shapes import Attachment, CollisionShape
 

@@ -8,10 +8,10 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
+from gemelo.libraries.arm.frames.transforms import Rigid, from_message
+from gemelo.libraries.arm.stl import BadStl, read_stl
 from gemelo.schemas.message import Vector
 from gemelo.schemas.scene import AllowedPair, BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, SphereShape
-from gemelo.services.arm.frames.transforms import Rigid, from_message
-from gemelo.services.arm.stl import BadStl, read_stl
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 LARGEST_FILE = 32_000_000  # [bytes]; chosen: the 500,000 triangles that a mesh may have are 25 million

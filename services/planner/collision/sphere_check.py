@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.kinematics.self_collisions import LinkPair
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.native_scene import native_scene
 from gemelo.services.planner.collision.world import Positions, World
 from gemelo.services.planner.native import compiled

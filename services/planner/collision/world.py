@@ -16,10 +16,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.scene import Contact, PlanningScene
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.kinematics.self_collisions import LinkPair
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.continuous import ContinuousCheck
 from gemelo.services.planner.collision.pair_distances import PairDistances
 from gemelo.services.planner.collision.world_geometry import LowerBounds, WorldGeometry

@@ -10,10 +10,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.scene import AllowedPair, PlanningScene
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.kinematics.self_collisions import LinkPair
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.arm_geometry import Mask, arm_geometry
 from gemelo.services.planner.collision.scene_shapes import ANY, SceneError
 

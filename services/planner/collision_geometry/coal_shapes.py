@@ -9,7 +9,7 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.kinematics.convex_meshes import convex_hull
+from gemelo.libraries.arm.kinematics.convex_meshes import convex_hull
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 Array = NDArray[np.float64]

@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.kinematics.convex_meshes import corners_of, hull_of, triangles_of
-from gemelo.services.arm.kinematics.self_collisions import load_collision_geometry
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.kinematics.convex_meshes import corners_of, hull_of, triangles_of
+from gemelo.libraries.arm.kinematics.self_collisions import load_collision_geometry
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.collision_geometry.coal_shapes import mesh_of
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from gemelo.services.planner.collision_geometry.solids import (

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.frames.transforms import IDENTITY, Rigid
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.description import ArmDescription
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState, JointTargets
 from gemelo.schemas.planning import JogCommand, JogLimit, JogStatus
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.jog.braking import Braking
 from gemelo.services.planner.jog.jog_command import BadJog, JogInterpreter, JogRefused, Wanted, standing_position

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JogCommand, JogLimit
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.jog.jog_limits import no_command, singularity, speed_limit
 from gemelo.services.planner.jog.twist import TwistSolver
 from gemelo.services.planner.request.refusals import PlanRefused

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.planning import JogLimit
-from gemelo.services.arm.kinematics.self_collisions import LinkPair
-from gemelo.services.arm.model.description import Joint
 
 
 def collision(names: LinkPair, distance: float, clearance: float) -> JogLimit:

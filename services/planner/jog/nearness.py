@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.kinematics.self_collisions import LinkPair
+from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
 from gemelo.services.planner.collision.world import World
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.planning import JogLimit
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.jog.braking import Braking
 from gemelo.services.planner.jog.jog_limits import joint_limit

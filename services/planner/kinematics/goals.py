@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, from_message
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.message import Vector
 from gemelo.schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
-from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, from_message
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.clearance import DistanceChecker
 from gemelo.services.planner.kinematics.ik import InverseKinematics
 from gemelo.services.planner.kinematics.joint_ranges import FullTurns

@@ -9,8 +9,8 @@ from itertools import chain, islice, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.kinematics.centring import Centring
 from gemelo.services.planner.kinematics.closed_form import ClosedForm, chain_order, closed_form, completed, turns_about
 from gemelo.services.planner.kinematics.descent import Attempt, Descent

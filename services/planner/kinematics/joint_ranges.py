@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.services.planner.native.compiled import motion, where_built
 
 Array = NDArray[np.float64]

@@ -8,6 +8,8 @@ from itertools import islice
 import msgspec
 import numpy as np
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import (
     FkRequest,
@@ -20,8 +22,6 @@ from gemelo.schemas.planning import (
     ValidityResponse,
 )
 from gemelo.schemas.scene import Contact
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.clearance import DistanceChecker, last_free
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.kinematics.goals import INVALID, Goals, Start

@@ -11,8 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.kinematics.kinematics import FramePose, Kinematics
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.kinematics.kinematics import FramePose, Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.kinematics.closed_form import chain_order
 from gemelo.services.planner.kinematics.joint_ranges import FullTurns, one_turn
 from gemelo.services.planner.kinematics.targets import any_normal

@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Point, Quaternion, Rigid, compose, inverse, rotate
+from gemelo.libraries.arm.kinematics.kinematics import FramePose
 from gemelo.schemas.message import Vector
 from gemelo.schemas.planning import PlanCode, PoseGoal
-from gemelo.services.arm.frames.transforms import IDENTITY, Point, Quaternion, Rigid, compose, inverse, rotate
-from gemelo.services.arm.kinematics.kinematics import FramePose
 from gemelo.services.planner.kinematics.targets import AxisPointing, ToolTarget, turn_between
 from gemelo.services.planner.request.refusals import malformed
 

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from gemelo.services.arm.kinematics.kinematics import FramePose, Kinematics
+from gemelo.libraries.arm.kinematics.kinematics import FramePose, Kinematics
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, inverse
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.message import Vector
 from gemelo.schemas.planning import PlanCode, PoseGoal, Refusal
-from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose, inverse
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.clearance import DistanceChecker, last_free
 from gemelo.services.planner.kinematics.ik import InverseKinematics
 from gemelo.services.planner.kinematics.pose_goals import as_goal

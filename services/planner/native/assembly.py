@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.collision_geometry.shapes import Attachment, CollisionShape, ShapeKind, TriangleMesh
 from gemelo.services.planner.native.binding import motion

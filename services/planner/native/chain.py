@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.errors import DescriptionError
-from gemelo.services.arm.kinematics.chain import origin_of
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.kinematics.chain import origin_of
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
 from gemelo.services.planner.collision_geometry.shapes import matrix_of
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.native.binding import motion
 from gemelo.services.planner.native.chain import frames_of, transform_row
 

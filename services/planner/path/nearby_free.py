@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.path.validity import ValidityChecker
 from gemelo.services.planner.request.deadline import Deadline
 

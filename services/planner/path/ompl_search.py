@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.path.path import PathNotFound
 from gemelo.services.planner.path.roadmap import shortest_path
 from gemelo.services.planner.path.validity import ValidityChecker

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.planning import PlanCode, Refusal
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.checker import CollisionChecker
 from gemelo.services.planner.path.native_search import NATIVE, native_path
 from gemelo.services.planner.path.nearby_free import nearby_free

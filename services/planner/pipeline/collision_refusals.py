@@ -9,9 +9,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.message import Vector
 from gemelo.schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.checker import CollisionChecker
 from gemelo.services.planner.collision.clearance import ROUNDING, first_collision, last_free, usable_clearance
 from gemelo.services.planner.kinematics.goals import Goals

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.model.description import ArmDescription, Joint
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.services.planner.collision.checker import CollisionChecker
 from gemelo.services.planner.jog.jog_obstacles import CONTACT_SPEED, comes_away
 from gemelo.services.planner.path.path import Start

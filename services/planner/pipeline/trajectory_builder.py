@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.motion import JointTrajectory
 from gemelo.schemas.planning import PlanRequest, StepMargin, StepPolicy, Timing
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.clearance import PathChecker
 from gemelo.services.planner.path.curve import TurnsOnTheSpot
 from gemelo.services.planner.path.path import Array, Path, Start

@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.motion import JointTrajectory
 from gemelo.schemas.planning import FreeMotion, Timing, WaypointGoal
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.cartesian.path_points import Run, states_of_runs
 from gemelo.services.planner.cartesian.tool_motions import points_of
 from gemelo.services.planner.collision.checker import CollisionChecker

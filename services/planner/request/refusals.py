@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 
+from gemelo.libraries.arm.errors import nearest_name, suggestion
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import MOST_POINTS
 from gemelo.schemas.planning import PlanCode, PlanResponse, Refusal
 from gemelo.schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
-from gemelo.services.arm.errors import nearest_name, suggestion
-from gemelo.services.arm.model.description import ArmDescription, Joint
 
 Point = Sequence[float]
 

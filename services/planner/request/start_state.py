@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from gemelo.libraries.arm.model.description import ROUNDING, ArmDescription, Joint
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import PlanCode
-from gemelo.services.arm.model.description import ROUNDING, ArmDescription, Joint
 from gemelo.services.planner.request.per_arm import once_per_arm
 from gemelo.services.planner.request.refusals import (
     malformed,

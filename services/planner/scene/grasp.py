@@ -9,11 +9,11 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.frames.transforms import Rigid, compose, from_message, inverse, rotate
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.gripper import jaw_edges
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import PlaneShape, PlanningScene, SceneObject
-from gemelo.services.arm.frames.transforms import Rigid, compose, from_message, inverse, rotate
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.gripper import jaw_edges
 from gemelo.services.planner.collision.scene_shapes import Folders, SceneError, pose_of, shape_of
 from gemelo.services.planner.collision_geometry.coal_shapes import geometry_of
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind

@@ -6,11 +6,11 @@ from collections.abc import Iterable
 
 import msgspec
 
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.gripper import JAWS
 from gemelo.schemas.scene import AllowedPair, PlaneShape, PlanningScene, SceneObject
 from gemelo.schemas.scene_meshes import meshes_in
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.gripper import JAWS
 from gemelo.services.planner.collision.scene_shapes import ANY, Folders, SceneError, shape_of
 
 # Tuning constants: chosen, where a line does not say measured or standard.

@@ -6,6 +6,9 @@ from collections.abc import Callable, Mapping
 
 import msgspec
 
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import (
     AllowedPair,
@@ -25,9 +28,6 @@ from gemelo.schemas.scene import (
     SceneReplace,
     SceneResize,
 )
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.scene_shapes import SceneError, pose_of
 from gemelo.services.planner.scene.grasp import Grasp
 from gemelo.services.planner.scene.scene_check import require_link

@@ -9,6 +9,9 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.gripper import jaw_objects, jaws_apart
 from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import Vector
@@ -24,9 +27,6 @@ from gemelo.schemas.scene import (
 )
 from gemelo.schemas.scene_meshes import by_digest, meshes_in
 from gemelo.schemas.topics import CONTACTS, GRIPPER_STATE, SCENE, SCENE_EDIT, scene_mesh
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.gripper import jaw_objects, jaws_apart
 from gemelo.services.planner.collision.clearance import ROUNDING
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.scene.answer_log import AnswerLog

@@ -10,9 +10,9 @@ from typing import TypeVar
 
 import msgspec
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.scene import PlanningScene, SceneGrip, SceneRelease, SceneRequest, SceneResponse
 from gemelo.schemas.scene_meshes import by_digest, edit_with_meshes, meshes_in
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.scene_shapes import Folders, SceneError
 from gemelo.services.planner.scene.grasp import find_grasp
 from gemelo.services.planner.scene.scene_check import require_scene

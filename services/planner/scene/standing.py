@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.gripper import JAWS
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import Vector
 from gemelo.schemas.planning import SceneVersion
 from gemelo.schemas.scene import PlanningScene
-from gemelo.services.arm.kinematics.kinematics import Kinematics
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.gripper import JAWS
 from gemelo.services.planner.request.start_state import STALE_AFTER
 
 

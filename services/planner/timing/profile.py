@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.native.compiled import motion, where_built
 from gemelo.services.planner.request.per_arm import once_per_arm
 

@@ -15,9 +15,9 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
 from gemelo.schemas.planning import PlanCode, Refusal, StepMargin
-from gemelo.services.arm.model.description import ArmDescription, Joint
 from gemelo.services.planner.native.compiled import motion, where_built
 from gemelo.services.planner.request.deadline import NEVER, Deadline
 from gemelo.services.planner.request.per_arm import once_per_arm

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.motion import JointTrajectory
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.planner.native.compiled import motion, where_built
 from gemelo.services.planner.request.per_arm import once_per_arm
 from gemelo.services.planner.timing.profile import JointLimits, States

@@ -15,8 +15,8 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import IO
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.planning import PlanPhase, PlanResponse, Refusal, Timing
-from gemelo.services.arm.model.description import load_arm
 from gemelo.services.planner.collision.sphere_check import cancel_flag
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner

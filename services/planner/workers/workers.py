@@ -12,6 +12,7 @@ from queue import Empty, SimpleQueue
 
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.model.gripper import JAWS
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import (
     PlanCancelResult,
@@ -23,7 +24,6 @@ from gemelo.schemas.planning import (
     Refusal,
 )
 from gemelo.schemas.scene import PlanningScene
-from gemelo.services.arm.model.gripper import JAWS
 from gemelo.services.planner.core import LONGEST
 from gemelo.services.planner.workers.jobs import Job
 from gemelo.services.planner.workers.pending_plan import Answer, Cancelled, OnInputs, PendingPlan

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import services
-from gemelo.services.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import DescriptionError
 
 LONGEST = 30.0  # [s] of one expansion, chosen: the largest published robots take 2
 LARGEST_FILE = 20_000_000  # [bytes] chosen

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device import (
     ArmCommand,
     DeviceCommand,
@@ -15,8 +17,6 @@ from gemelo.schemas.device import (
     SpeedCommand,
     StopKind,
 )
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.description import ArmDescription, Joint
 from gemelo.services.stepper_gateway.device.pending_commands import NO_ARGUMENTS, Arguments
 from gemelo.services.stepper_gateway.goals.limit_checks import SLACK, beyond
 from gemelo.services.stepper_gateway.goals.rejections import invalid

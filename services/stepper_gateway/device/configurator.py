@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import ConfigureResponse, DeviceConfiguration, DeviceMode
 from gemelo.schemas.device_config import config_crc, config_text
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import DEVICE_CONFIGURATION
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.stepper_gateway.device.session import DeviceSession
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.links.reports import ConfigAckReport

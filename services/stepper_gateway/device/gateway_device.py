@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceEvent, DeviceStatus
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import DEVICE_EVENTS
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.stepper_gateway.device.configurator import Configuration
 from gemelo.services.stepper_gateway.device.pending_commands import PendingCommands
 from gemelo.services.stepper_gateway.device.readiness import not_ready_reason

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import msgspec
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import InjectKind, InjectRequest, InjectResponse
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from gemelo.services.stepper_gateway.links.link import Kind

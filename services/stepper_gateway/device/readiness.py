@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.device_config import InputRole
 from gemelo.schemas.device_faults import fault_text
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.stepper_gateway.links.frames import StateFlag, StateFrame
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState, ShaftPositions
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.message import Vector
-from gemelo.services.arm.model.description import ArmDescription, Joint
 from gemelo.services.stepper_gateway.device.clock import ClockSync
 from gemelo.services.stepper_gateway.device.readiness import input_names, joint_name
 from gemelo.services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, StateFlag, StateFrame, code_name

@@ -7,6 +7,7 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import (
@@ -15,7 +16,6 @@ from gemelo.schemas.motion import (
     FollowJointTrajectoryResult,
     TrajectoryPoint,
 )
-from gemelo.services.arm.model.description import Joint
 from gemelo.services.stepper_gateway.goals.goal_validator import MotionStart, ValidatedGoal
 from gemelo.services.stepper_gateway.links.frames import StateFrame
 from gemelo.services.stepper_gateway.moment import Moment

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from gemelo.libraries.arm.interpolation import TrajectorySampler
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from gemelo.services.arm.interpolation import TrajectorySampler
-from gemelo.services.arm.model.description import Joint
 from gemelo.services.stepper_gateway.goals.limit_checks import Samples, path_within, points_within
 from gemelo.services.stepper_gateway.goals.pieces import PIECE, Part, Pieces
 from gemelo.services.stepper_gateway.goals.trajectory_checks import ordered_trajectory

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from gemelo.services.arm.model.description import Joint
 from gemelo.services.stepper_gateway.goals.goal_checks import GoalChecks
 from gemelo.services.stepper_gateway.goals.limit_checks import within
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid

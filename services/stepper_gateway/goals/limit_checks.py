@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.motion import JointTrajectory
-from gemelo.services.arm.model.description import Joint
 from gemelo.services.stepper_gateway.goals.pieces import PIECE, Pieces
 from gemelo.services.stepper_gateway.goals.rejections import invalid
 from gemelo.services.stepper_gateway.motion.knot_sources import KNOT_TIME

@@ -6,6 +6,8 @@ from collections import Counter
 from itertools import pairwise
 from typing import NamedTuple
 
+from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import (
     MOST_POINTS,
@@ -14,8 +16,6 @@ from gemelo.schemas.motion import (
     JointTrajectory,
     TrajectoryPoint,
 )
-from gemelo.services.arm.errors import suggestion
-from gemelo.services.arm.model.description import Joint
 from gemelo.services.stepper_gateway.goals.pieces import PIECE, Pieces
 from gemelo.services.stepper_gateway.goals.rejections import invalid, invalid_joints
 

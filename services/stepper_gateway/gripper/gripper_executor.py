@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gemelo.libraries.arm.model.gripper import METRES, gripper_unit
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandResponse, DeviceMode
 from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
 from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import GRIPPER_STATE
-from gemelo.services.arm.model.gripper import METRES, gripper_unit
 from gemelo.services.stepper_gateway.device.command_handler import CommandHandler, OnAnswer
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.gripper import opening_of, pulse_of
 from gemelo.schemas.device import DeviceCommandKind
 from gemelo.schemas.robot import OutputGripper, ServoGripper
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.model.gripper import opening_of, pulse_of
 from gemelo.services.stepper_gateway.device.pending_commands import Arguments
 from gemelo.services.stepper_gateway.goals.rejections import invalid
 from gemelo.services.stepper_gateway.links.frames import StateFrame

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from gemelo.services.arm.model.description import Joint
-from gemelo.services.arm.motors.torque import NO_CURVE, torque_share
+from gemelo.libraries.arm.model.description import Joint
+from gemelo.libraries.arm.motors.torque import NO_CURVE, torque_share
 from gemelo.services.stepper_gateway.ledger.confidence import Evidence
 
 WATCHED = 0.1  # [s] between two states, beyond which the hardest motion is assumed; chosen: five states

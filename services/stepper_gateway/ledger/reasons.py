@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.ledger import VerifiedBy
-from gemelo.services.arm.model.description import Joint
 from gemelo.services.stepper_gateway.ledger.confidence import AGE, TURNS, Evidence, strong_enough
 
 

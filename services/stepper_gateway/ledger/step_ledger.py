@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
+from gemelo.libraries.arm.kinematics.tool_jacobian import ToolJacobian
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.ledger import StepLedger, VerifiedBy
 from gemelo.schemas.topics import STEP_LEDGER
-from gemelo.services.arm.kinematics.tool_jacobian import ToolJacobian
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.ledger.confidence import (
     LATE,

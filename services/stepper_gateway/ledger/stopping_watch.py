@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.frames.transforms import Point
+from gemelo.libraries.arm.kinematics.tool_jacobian import ToolJacobian
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.ledger import StoppingDistance
 from gemelo.schemas.message import Vector
 from gemelo.schemas.topics import STOPPING_DISTANCE
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.frames.transforms import Point
-from gemelo.services.arm.kinematics.tool_jacobian import ToolJacobian
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.links.frames import StateFrame
 from gemelo.services.stepper_gateway.moment import Moment

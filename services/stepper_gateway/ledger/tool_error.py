@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from gemelo.services.arm.frames.transforms import Point
-from gemelo.services.arm.model.description import Joint
+from gemelo.libraries.arm.frames.transforms import Point
+from gemelo.libraries.arm.model.description import Joint
 
 CERTAIN = 1.0  # [steps] that a verified joint may be off: half for rounding, half for the switch's latch
 

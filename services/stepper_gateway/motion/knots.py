@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from gemelo.libraries.arm.device.device_config import UNLIMITED_Q8
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.message import Vector
-from gemelo.services.arm.device.device_config import UNLIMITED_Q8
-from gemelo.services.arm.model.description import Joint
 
 
 class Knot(NamedTuple):

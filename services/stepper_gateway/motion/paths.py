@@ -11,9 +11,9 @@ from typing import Protocol
 
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 
+from gemelo.libraries.arm.interpolation import TrajectorySampler
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import JointTrajectory
-from gemelo.services.arm.interpolation import TrajectorySampler
 from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.device import DeviceMode
-from gemelo.services.arm.model.description import Joint
 from gemelo.services.stepper_gateway.device.clock import ClockSync
 from gemelo.services.stepper_gateway.links.frames import (
     NO_JOINT,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.message import Vector
-from gemelo.services.arm.model.description import Joint
 from gemelo.services.stepper_gateway.goals.limit_checks import SLACK, beyond
 from gemelo.services.stepper_gateway.goals.rejections import invalid, invalid_joints
 from gemelo.services.stepper_gateway.goals.trajectory_checks import require_known

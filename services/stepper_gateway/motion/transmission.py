@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gemelo.services.arm.model.description import Joint
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.services.stepper_gateway.device.clock import ClockSync
 from gemelo.services.stepper_gateway.links.frames import Chunk
 from gemelo.services.stepper_gateway.moment import Moment

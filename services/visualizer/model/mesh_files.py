@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gemelo.libraries.arm.stl import BadStl, read_stl
 from gemelo.schemas.scene import MeshShape
-from gemelo.services.arm.stl import BadStl, read_stl
 from gemelo.services.visualizer.model.triangle_meshes import ShadedMesh
 from gemelo.services.visualizer.model.visual_model import VisualModel
 

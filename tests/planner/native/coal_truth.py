@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from gemelo.services.arm.kinematics.joint_mapping import JointMapping
-from gemelo.services.arm.kinematics.kinematics import frame_of_link
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.kinematics.joint_mapping import JointMapping
+from gemelo.libraries.arm.kinematics.kinematics import frame_of_link
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.collision_geometry.coal_shapes import hull_around
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 

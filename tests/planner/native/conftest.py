@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gemelo.services.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.services.planner.native.native_planner import NativePlanner
 
 ARMS = ("rm1", "parol6")

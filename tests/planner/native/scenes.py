@@ -7,7 +7,7 @@ import struct
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.arm.frames.transforms import Rigid
+from gemelo.libraries.arm.frames.transforms import Rigid
 from gemelo.services.planner.collision_geometry.link_shapes import hull_mesh
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 

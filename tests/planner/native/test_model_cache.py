@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gemelo.services.arm.kinematics import self_collisions
-from gemelo.services.arm.model.description import ArmDescription, load_arm
-from gemelo.services.arm.stl import read_stl
+from gemelo.libraries.arm.kinematics import self_collisions
+from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.arm.stl import read_stl
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes, solid_of
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from gemelo.services.planner.core import Planner
@@ -181,7 +181,7 @@ def meshed(rm1_folder: Path, tmp_path: Path) -> ArmDescription:
 
 def test_another_process_finds_what_the_first_has_made(meshed: ArmDescription, made: list[int], folder: Path):
     program = (
-        "import sys; from pathlib import Path; from gemelo.services.arm.model.description import load_arm; "
+        "import sys; from pathlib import Path; from gemelo.libraries.arm.model.description import load_arm; "
         "from gemelo.services.planner.native.native_planner import NativePlanner; "
         "NativePlanner(load_arm(Path(sys.argv[1])))"
     )

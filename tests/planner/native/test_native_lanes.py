@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.services.planner.collision_geometry.shapes import ShapeKind
 from gemelo.services.planner.native.binding import motion
 from gemelo.services.planner.native.native_planner import NativePlanner

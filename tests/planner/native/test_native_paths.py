@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject
-from gemelo.services.arm.kinematics.kinematics import Kinematics
 from gemelo.services.planner.collision.sphere_check import show_scene
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind

@@ -9,7 +9,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from gemelo.services.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.services.bench.scenes import SCENES
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.sphere_check import NativeCheck

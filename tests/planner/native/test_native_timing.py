@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.arm.model.description import load_arm
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.planner.native.compiled import IN_PYTHON
 from gemelo.services.planner.path.curve import TurnsOnTheSpot
 from gemelo.services.planner.path.smoothing import smooth, stopping

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from math import radians
 
 import gemelo
-from gemelo.services.arm.frames.transforms import from_rpy, multiply
-from gemelo.services.arm.model.description import Joint
+from gemelo.libraries.arm.frames.transforms import from_rpy, multiply
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.services.panel.model.jogging import JogWish
 from gemelo.services.panel.model.operator import Operator
 from gemelo.services.panel.model.readings import Readings

@@ -7,7 +7,7 @@ import time
 import viser
 
 import gemelo
-from gemelo.services.arm.model.description import Joint
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.services.panel.model.motions import PLANNERS, MotionChoice
 from gemelo.services.panel.model.readings import Readings
 from gemelo.services.panel.model.units import SHOWN, STEP, meant, slider_range, slider_value, text_of

@@ -10,7 +10,7 @@ from typing import Any
 import viser
 
 import gemelo
-from gemelo.services.arm.frames.transforms import Point, Quaternion, from_rpy, to_rpy
+from gemelo.libraries.arm.frames.transforms import Point, Quaternion, from_rpy, to_rpy
 from gemelo.services.panel.model.goal import GoalState
 from gemelo.services.panel.model.tool_turns import ALL_RINGS
 from gemelo.services.panel.view.kit import OWN_CHANGE, Kit, set_if_new

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import msgspec
 
-from gemelo.services.arm.device.device_config import reference_steps
-from gemelo.services.arm.model.description import ArmDescription
-from gemelo.services.arm.motors.relative_moves import ramp_of
+from gemelo.libraries.arm.device.device_config import reference_steps
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.motors.relative_moves import ramp_of
 from gemelo.services.stepper_gateway.links.foreign import ra_messages
 from gemelo.services.stepper_gateway.links.foreign.ra_sender import RaSender
 from gemelo.services.stepper_gateway.links.foreign.stand_in import Report, StandIn

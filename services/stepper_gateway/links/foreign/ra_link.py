@@ -14,7 +14,7 @@ from functools import partial
 
 from paho.mqtt import client as paho
 
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.mqtt.access import BrokerAccess
 from gemelo.services.mqtt.client import CONNECT_TIMEOUT, MqttClient, code_of, is_failure
 from gemelo.services.mqtt.failures import failure, refusal

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from gemelo.services.arm.motors.relative_moves import Ramp
+from gemelo.libraries.arm.motors.relative_moves import Ramp
 
 JOINTS, STATES, SENSORS = "ra/juntas", "ra/estados", "ra/sensores"
 OUTPUT = "avanzar"

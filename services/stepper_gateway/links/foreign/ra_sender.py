@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gemelo.services.arm.motors.relative_moves import GATHERING, LONGEST_GAP, MARGIN, Ramp
+from gemelo.libraries.arm.motors.relative_moves import GATHERING, LONGEST_GAP, MARGIN, Ramp
 
 
 class RaSender:

@@ -11,10 +11,10 @@ from collections.abc import Callable, Sequence
 import msgspec
 
 from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode
 from gemelo.schemas.device_config import config_text
-from gemelo.services.arm.device.device_config import device_config
-from gemelo.services.arm.model.description import ArmDescription
 from gemelo.services.stepper_gateway.links.frames import (
     BadFrame,
     Code,

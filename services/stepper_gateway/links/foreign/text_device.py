@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import msgspec
 
-from gemelo.services.arm.device.device_config import reference_steps
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.device.device_config import reference_steps
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.stepper_gateway.links.foreign.stand_in import Report, StandIn
 from gemelo.services.stepper_gateway.links.foreign.text_exchange import TextExchange
 from gemelo.services.stepper_gateway.links.foreign.text_messages import AnswerReader, line_of

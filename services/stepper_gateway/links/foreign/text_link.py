@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from gemelo.services.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.stepper_gateway.links.connection import keep_connected
 from gemelo.services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor
 from gemelo.services.stepper_gateway.links.foreign.text_device import TextDevice

@@ -1,0 +1,1 @@
+"""Libraries that several processes and tools stand on."""

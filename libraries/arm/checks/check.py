@@ -1,0 +1,127 @@
+"""`gemelo check`: everything that can be known to be wrong with a robot's folder before anything moves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+
+from gemelo.libraries.arm.checks.cross_check import check_with_yourdfpy
+from gemelo.libraries.arm.checks.device import check_device
+from gemelo.libraries.arm.checks.findings import Finding, Severity, error, note, once
+from gemelo.libraries.arm.checks.homing import check_homing
+from gemelo.libraries.arm.checks.meshes import check_meshes, mesh_facts
+from gemelo.libraries.arm.checks.motors import check_motors
+from gemelo.libraries.arm.checks.pull_out import check_pull_out
+from gemelo.libraries.arm.checks.srdf import check_srdf
+from gemelo.libraries.arm.checks.urdf import check_urdf, fault_finding
+from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.model.description import DEFAULT_URDF, ROBOT_FILE, load_arm
+from gemelo.libraries.arm.model.robot_file import (
+    dotted,
+    line_of,
+    not_finite,
+    parse_toml,
+    read_text,
+    typed_robot,
+    unknown_keys,
+    where_of,
+)
+from gemelo.libraries.arm.model.srdf import read_srdf
+from gemelo.libraries.arm.model.urdf import UrdfModel, survey_urdf
+from gemelo.libraries.arm.model.virtual_drive import NO_MOTORS, TO_DRIVE, lacks_motors, with_virtual_drive
+from gemelo.schemas.robot import RobotFile
+
+__all__ = ["Finding", "Severity", "check"]
+
+TYPES_REMEDY = "write a value of that type and range; docs/my_own_arm.md says what each key is"
+
+
+def check(folder: Path) -> list[Finding]:
+    """Every finding in `folder`, errors first; empty where all is well."""
+    folder = Path(folder)
+    try:
+        text = read_text(folder / ROBOT_FILE)
+        data = parse_toml(folder / ROBOT_FILE, text)
+    except DescriptionError as problem:
+        return [error(ROBOT_FILE, "file", str(problem), f"a robot is a folder with a {ROBOT_FILE}")]
+    findings = [*_unknown_keys(data, text), *_not_finite(data, text)]
+    urdf_path = folder / str(data.get("urdf", DEFAULT_URDF))
+    try:
+        model, faults = survey_urdf(urdf_path)
+    except DescriptionError as problem:
+        return [*findings, error(urdf_path.name, "file", str(problem))]
+    findings += [fault_finding(fault, urdf_path.name) for fault in faults]
+    try:
+        is_bare = lacks_motors(data, folder / ROBOT_FILE)
+        robot = typed_robot(with_virtual_drive(_known(data), model) if is_bare else _known(data))
+    except DescriptionError as problem:
+        return [*findings, error(ROBOT_FILE, "motors", str(problem), TO_DRIVE)]
+    except msgspec.ValidationError as problem:
+        subject = where_of(problem, text).removeprefix(", ") or "types"
+        return [*findings, error(ROBOT_FILE, subject, str(problem), TYPES_REMEDY)]
+    if not_finite(data):
+        return findings
+    findings += _files(folder, robot, model)
+    if not any(finding.severity is Severity.ERROR for finding in findings):
+        findings += _cross_checks(folder)
+    if is_bare:
+        findings.append(note(ROBOT_FILE, "robot", NO_MOTORS, TO_DRIVE))
+    return sorted(once(findings), key=lambda finding: list(Severity).index(finding.severity))
+
+
+def _unknown_keys(data: dict[str, object], text: str) -> list[Finding]:
+    return [
+        error(ROBOT_FILE, f"line {key.line}", f"unknown key `{dotted(key.path)}`{key.hint}", "correct or remove it")
+        for key in unknown_keys(data, text)
+    ]
+
+
+def _not_finite(data: dict[str, object], text: str) -> list[Finding]:
+    return [
+        error(ROBOT_FILE, f"line {line_of(key, text)}", f"`{dotted(key)}` is {value}", "write a number that is finite")
+        for key, value in not_finite(data)
+    ]
+
+
+def _known(data: dict[str, object]) -> dict[str, object]:
+    """`data` without the keys that its types do not have, so that one of them does not hide what else is wrong."""
+    unknown = {key.path for key in unknown_keys(data, "")}
+
+    def keep(value: object, path: tuple[str | int, ...]) -> object:
+        if isinstance(value, dict):
+            return kept(value, path)
+        if isinstance(value, list):
+            return [keep(v, (*path, i)) for i, v in enumerate(value)]
+        return value
+
+    def kept(table: dict[str, object], path: tuple[str | int, ...]) -> dict[str, object]:
+        return {k: keep(v, (*path, k)) for k, v in table.items() if (*path, k) not in unknown}
+
+    return kept(data, ())
+
+
+def _files(folder: Path, robot: RobotFile, model: UrdfModel) -> list[Finding]:
+    """Each file for itself, then the motors against the URDF."""
+    findings = check_urdf(model, folder / robot.urdf)
+    findings += check_motors(robot, model)
+    findings += check_device(robot)
+    findings += check_homing(robot, model)
+    findings += check_pull_out(robot)
+    try:
+        findings += check_srdf(read_srdf(folder / robot.srdf), robot, model)
+    except DescriptionError as problem:
+        findings.append(error(robot.srdf, "file", str(problem)))
+    return findings
+
+
+def _cross_checks(folder: Path) -> list[Finding]:
+    """Checks that need the whole description."""
+    try:
+        arm = load_arm(folder)
+        device_config(arm)
+    except DescriptionError as problem:
+        return [error(ROBOT_FILE, "robot", str(problem))]
+    # The meshes themselves only where yourdfpy has opened them all.
+    return check_with_yourdfpy(arm) or check_meshes(arm.model, arm.urdf_path.name, mesh_facts(arm.urdf_path.parent))

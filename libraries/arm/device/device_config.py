@@ -1,0 +1,158 @@
+"""The device configuration, made from the arm's description."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+from msgspec import UNSET, UnsetType
+
+from gemelo.libraries.arm.device.device_parts import input_config, output_config, sensor_config
+from gemelo.libraries.arm.device.device_values import device_name, int32, nearest, pin_or_unused
+from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.model.description import ArmDescription, Joint
+from gemelo.libraries.arm.model.gripper import pulse_speed
+from gemelo.libraries.arm.motors.steps import Q8, StepScale
+from gemelo.schemas.device_config import DeviceConfig, HomingConfig, JointConfig, ServoConfig
+from gemelo.schemas.robot import Homing, HomingDirection, PinLevel, ServoGripper
+
+# Knots are rounded to 1/256 step and sampled from profiles that touch their limits.
+HEADROOM = 1.02
+UNLIMITED_Q8 = 1 << 30  # of a joint without limits: 4 million steps each way
+SERVO_NAME = "gripper"  # in what the device says of its configuration
+MAX_COUNTS = {"joint": 8, "input": 16, "output": 8, "sensor": 8}  # of one device, the firmware's
+DEFAULT_TRAVEL_FACTOR = 1.1  # how far a joint looks for its switch, where robot.toml does not say
+
+
+def device_config(arm: ArmDescription) -> DeviceConfig:
+    """The device configuration of an arm; raises `DescriptionError` with the thing, its value and the remedy."""
+    _require_counts(arm)
+    device = arm.device
+    return DeviceConfig(
+        name=device_name(device.name, "[device] name"),
+        joints=tuple(_joint(joint, arm) for joint in arm.joints),
+        tick_hz=device.tick_hz,
+        queue_capacity=device.queue_capacity,
+        sensor_hz=_sensor_hz(device.sensor_hz),
+        enable_lead_ms=max(math.ceil(joint.driver.enable_lead_ms) for joint in arm.joints),
+        armed_at_boot=device.armed_at_boot,
+        enable_pin=pin_or_unused(device.enable_pin),
+        enable_inverted=device.enable_active is PinLevel.LOW,
+        inputs=tuple(input_config(switch, arm) for switch in arm.inputs),
+        outputs=tuple(output_config(output) for output in arm.outputs),
+        sensors=tuple(sensor_config(sensor) for sensor in arm.sensors),
+        servo=_servo(arm),
+    )
+
+
+def reference_steps(arm: ArmDescription) -> tuple[int, ...]:
+    """Whole steps of the pose that robot.toml declares as the reference."""
+    positions = zip(arm.joints, arm.reference_position, strict=True)
+    return tuple(math.floor(joint.steps.to_steps(position) + 0.5) for joint, position in positions)
+
+
+def _joint(joint: Joint, arm: ArmDescription) -> JointConfig:
+    where, motor = f'joint "{joint.name}"', joint.drive.motor
+    _require_tick(joint, arm.device.tick_hz)
+    scale = joint.steps.per_unit * Q8 * HEADROOM
+    return JointConfig(
+        name=device_name(joint.wire_name, f"{where}: wire_name"),
+        lower_q8=_limit_q8(joint, joint.lower),
+        upper_q8=_limit_q8(joint, joint.upper),
+        max_velocity_q8=int32(math.ceil(joint.velocity * scale), f"{where}: its velocity limit"),
+        max_acceleration_q8=int32(math.ceil(joint.acceleration * scale), f"{where}: its acceleration limit"),
+        inverted=motor.inverted,
+        dir_setup_us=math.ceil(joint.driver.dir_setup_us),
+        step_pin=pin_or_unused(motor.step_pin),
+        dir_pin=pin_or_unused(motor.dir_pin),
+        text_scale_q32=_text_scale(joint.steps),
+        homing=_homing(joint.drive.homing, joint, arm) if joint.drive.homing is not None else None,
+    )
+
+
+def _servo(arm: ArmDescription) -> ServoConfig | UnsetType:
+    gripper = arm.gripper
+    if not isinstance(gripper, ServoGripper):
+        return UNSET
+    return ServoConfig(
+        name=SERVO_NAME,
+        pin=gripper.pin,
+        lower_us=min(gripper.open_us, gripper.closed_us),
+        upper_us=max(gripper.open_us, gripper.closed_us),
+        speed_us_s=round(pulse_speed(gripper)),
+        off_at_estop=gripper.off_at_estop,
+    )
+
+
+def _homing(homing: Homing, joint: Joint, arm: ArmDescription) -> HomingConfig:
+    where = f'joint "{joint.name}": homing'
+    names = [switch.name for switch in arm.inputs]
+    if homing.switch not in names:
+        raise DescriptionError(f'{where}.switch "{homing.switch}" is no [[input]]{suggestion(homing.switch, names)}')
+    return HomingConfig(
+        input=names.index(homing.switch),
+        group=homing.group,
+        direction=1 if homing.direction is HomingDirection.UPPER else -1,
+        fast_q8=_steps_q8(joint, homing.fast, f"{where}.fast"),
+        slow_q8=_steps_q8(joint, homing.slow, f"{where}.slow"),
+        back_off_q8=_steps_q8(joint, homing.back_off, f"{where}.back_off"),
+        position_q8=int32(joint.steps.to_q8(homing.position), f"{where}.position"),
+        max_travel_q8=_steps_q8(joint, _max_travel(homing, joint), f"{where}.max_travel"),
+        timeout_ms=int32(math.ceil(homing.timeout * 1000.0), f"{where}.timeout"),
+    )
+
+
+def _max_travel(homing: Homing, joint: Joint) -> float:
+    """[rad] or [m] on the way to the switch."""
+    if homing.max_travel is not None:
+        return homing.max_travel
+    if math.isinf(joint.upper - joint.lower):
+        raise DescriptionError(
+            f'joint "{joint.name}" turns without limits, so homing.max_travel has no default: write how far it may '
+            "turn on the way to its switch"
+        )
+    return (joint.upper - joint.lower) * DEFAULT_TRAVEL_FACTOR
+
+
+def _sensor_hz(rate: int) -> int:
+    if 1000 % rate:
+        lower = next(divisor for divisor in range(rate, 0, -1) if 1000 % divisor == 0)
+        raise DescriptionError(f"[device] sensor_hz is {rate}, which does not divide 1000: write {lower}")
+    return rate
+
+
+def _require_counts(arm: ArmDescription) -> None:
+    parts = {"joint": arm.joints, "input": arm.inputs, "output": arm.outputs, "sensor": arm.sensors}
+    for kind, things in parts.items():
+        if len(things) > MAX_COUNTS[kind]:
+            raise DescriptionError(f"{len(things)} [[{kind}]] are more than the {MAX_COUNTS[kind]} that a device has")
+
+
+def _require_tick(joint: Joint, tick_hz: int) -> None:
+    tick_us = 1e6 / tick_hz
+    needed_us = max(joint.driver.step_high_us, joint.driver.step_low_us)
+    if tick_us < needed_us:
+        raise DescriptionError(
+            f'joint "{joint.name}": a tick of {tick_us:g} us is shorter than the {needed_us:g} us '
+            f"that its driver {joint.driver.name} needs; lower [device] tick_hz"
+        )
+
+
+def _limit_q8(joint: Joint, position: float) -> int:
+    if math.isinf(position):
+        return UNLIMITED_Q8 if position > 0 else -UNLIMITED_Q8
+    return int32(joint.steps.to_q8(position), f'joint "{joint.name}": its limit {position:g} {joint.unit}')
+
+
+def _steps_q8(joint: Joint, value: float, where: str) -> int:
+    """[1/256 step] of a travel or speed that is not zero."""
+    q8 = joint.steps.to_q8(value)
+    if q8 < 1:
+        raise DescriptionError(f"{where} is {value:g}, less than 1/256 step: write at least one step")
+    return int32(q8, where)
+
+
+def _text_scale(scale: StepScale) -> int:
+    """[1/256 step per 1e-7 rad or m] Q32; 0 where it does not fit: the joint then has no text mode."""
+    exact = scale.steps_per_turn * Q8 / Fraction(scale.travel_per_turn) / 10**7
+    return nearest(exact * 2**32) if exact * 2**32 < 2**63 else 0

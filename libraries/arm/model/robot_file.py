@@ -1,0 +1,166 @@
+"""robot.toml, read strictly: an unknown key is an error with file, line, key and the nearest known one."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from types import UnionType
+from typing import get_args, get_origin, get_type_hints
+
+import msgspec
+
+from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.motors.tick import chosen_tick
+from gemelo.schemas import text_file
+from gemelo.schemas.robot import RobotFile
+
+Keys = tuple[str | int, ...]
+TAG_FIELD = "kind"  # of tables of which there are several kinds
+
+
+@dataclass(frozen=True)
+class UnknownKey:
+    """A key that no type of schemas/robot.py has: `path` is where it stands, e.g. ("joint", 0, "motr")."""
+
+    path: Keys
+    line: int  # 0 where it was not found
+    hint: str
+
+
+def read_robot_data(path: Path, text: str, kind: type[msgspec.Struct] = RobotFile) -> dict[str, object]:
+    """The tables of robot.toml, whose keys are known and whose numbers are finite; raises `DescriptionError`.
+
+    `kind` is the type of another file that is read as strictly.
+    """
+    data = parse_toml(path, text)
+    for unknown in unknown_keys(data, text, kind):
+        raise DescriptionError(f"{path}, line {unknown.line}: unknown key `{dotted(unknown.path)}`{unknown.hint}")
+    for key, value in not_finite(data):
+        raise DescriptionError(f"{path}, line {line_of(key, text)}: `{dotted(key)}` is {value}: it must be finite")
+    return data
+
+
+def typed_robot(data: object) -> RobotFile:
+    """The tables as types, with a tick rate; raises `msgspec.ValidationError`."""
+    robot = msgspec.convert(data, RobotFile)
+    if robot.device.tick_hz:
+        return robot
+    device = msgspec.structs.replace(robot.device, tick_hz=chosen_tick(robot))
+    return msgspec.structs.replace(robot, device=device)
+
+
+def read_text(path: Path) -> str:
+    """The text of a file of the robot's folder; raises `DescriptionError` where there is none."""
+    try:
+        return text_file.read_text(path)
+    except FileNotFoundError as error:
+        raise DescriptionError(f"{path}: there is no such file") from error
+    except text_file.NotUtf8 as error:
+        raise DescriptionError(f"{path}: {error}") from error
+    except OSError as error:
+        raise DescriptionError(f"{path}: cannot be read: {error}") from error
+
+
+def parse_toml(path: Path, text: str) -> dict[str, object]:
+    """The raw tables of robot.toml; raises `DescriptionError` with the parser's line."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise DescriptionError(f"{path}: not TOML: {error}") from error
+
+
+def unknown_keys(data: dict[str, object], text: str, kind: type[msgspec.Struct] = RobotFile) -> list[UnknownKey]:
+    """Every key of `data` that the types do not have."""
+    return [UnknownKey(path, line_of(path, text), hint) for path, hint in _walk(data, kind, ())]
+
+
+def not_finite(data: object, path: Keys = ()) -> list[tuple[Keys, float]]:
+    """Every NaN and infinity in the TOML data with its key path; the values are dimensionless."""
+    match data:
+        case dict():
+            return [found for key, value in data.items() for found in not_finite(value, (*path, key))]
+        case list():
+            return [found for index, value in enumerate(data) for found in not_finite(value, (*path, index))]
+        case float() if not math.isfinite(data):
+            return [(path, data)]
+        case _:
+            return []
+
+
+def where_of(error: msgspec.ValidationError, text: str) -> str:
+    """ ", line 14" of the key that a wrong type or a value out of bounds stands at; empty where it is not found."""
+    place = re.search(r"`\$\.(.+)`$", str(error))
+    words = re.findall(r"\w+", place[1]) if place else []
+    line = line_of(tuple(int(word) if word.isdecimal() else word for word in words), text) if words else 0
+    return f", line {line}" if line else ""
+
+
+def dotted(path: Keys) -> str:
+    """("joint", 0, "motor") as joint[0].motor."""
+    text = ""
+    for key in path:
+        text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else key
+    return text
+
+
+def line_of(path: Keys, text: str) -> int:
+    """The line, from 1, of a key in TOML written with table headers; 0 where it is not found."""
+    header: list[str | int] = []
+    counts: dict[str, int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if table := re.match(r"\s*\[(\[?)\s*([\w.\-]+)\s*\]", line):
+            header = _header(table[2], bool(table[1]), counts)
+            if tuple(header[: len(path)]) == path:  # the table itself, or the first below it where it has no header
+                return number
+        elif (key := re.match(r"\s*\"?([\w\-]+)\"?\s*=", line)) and (*header, key[1]) == path:
+            return number
+    return 0
+
+
+def _header(name: str, is_array: bool, counts: dict[str, int]) -> list[str | int]:
+    """The key path of a table header, counting the tables of every array so far."""
+    if is_array:
+        counts[name] = counts.get(name, -1) + 1
+    path: list[str | int] = []
+    parts = name.split(".")
+    for depth, part in enumerate(parts, start=1):
+        path.append(part)
+        if (index := counts.get(".".join(parts[:depth]))) is not None:
+            path.append(index)
+    return path
+
+
+def _chosen(kind: object, data: object) -> object:
+    """Of several tables that may stand there, the one that its own `kind` names; else `kind` itself."""
+    if not (isinstance(kind, UnionType) and isinstance(data, dict)):
+        return kind
+    for option in get_args(kind):
+        if _tag_of(option) and _tag_of(option).get(TAG_FIELD) == data.get(TAG_FIELD):
+            return option
+    return kind
+
+
+def _tag_of(kind: object) -> dict[str, object]:
+    """The key that names the table's kind, where it has one, and its word."""
+    config = getattr(kind, "__struct_config__", None)
+    return {config.tag_field: config.tag} if config is not None and config.tag is not None else {}
+
+
+def _walk(data: object, kind: object, path: Keys) -> list[tuple[Keys, str]]:
+    if get_origin(kind) is tuple and isinstance(data, list):
+        item = get_args(kind)[0]
+        return [found for index, entry in enumerate(data) for found in _walk(entry, item, (*path, index))]
+    kind = _chosen(kind, data)
+    if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct) and isinstance(data, dict)):
+        return []
+    types = get_type_hints(kind) | _tag_of(kind)
+    found: list[tuple[Keys, str]] = []
+    for key, value in data.items():
+        if key in types:
+            found += _walk(value, types[key], (*path, key))
+        else:
+            found.append(((*path, key), suggestion(key, types)))
+    return found
