@@ -28,7 +28,7 @@ SECTIONS = (  # title, names
 ELSEWHERE = """## Nodes
 
 `from gemelo import Node, topics` is how one writes a node; [examples/](../examples) has five. `topics` is the table of
-[schemas/topics.py](../schemas/topics.py), `Node` is that of [services/runtime/node.py](../services/runtime/node.py).
+[schemas/topics.py](../schemas/topics.py), `Node` is that of [libraries/runtime/node.py](../libraries/runtime/node.py).
 `DeviceMode`, `GoalStatusCode` and `StopKind` are enumerations of [schemas/](../schemas).
 """
 TABLES = ("Target", "ToolGoal")

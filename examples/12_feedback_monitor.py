@@ -1,10 +1,10 @@
 """A node: prints how every trajectory goes, whoever sends it: point, time and the largest error on the way."""
 
 from gemelo import Node
+from gemelo.libraries.runtime.actions.keys import feedback_topic, status_topic
 from gemelo.schemas.actions import GoalFeedback
 from gemelo.schemas.message import decode
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from gemelo.services.runtime.actions.keys import feedback_topic, status_topic
 
 
 def show(message: GoalFeedback) -> None:

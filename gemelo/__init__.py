@@ -38,10 +38,10 @@ if TYPE_CHECKING:
     from gemelo.api.simulation import SimulatedArm, SimulatedArms, SimulatedWorld, Simulation, simulate
     from gemelo.api.units import Pose, deg, mm
     from gemelo.api.verification import Verification
+    from gemelo.libraries.runtime.node import Node
     from gemelo.schemas import topics
     from gemelo.schemas.actions import GoalStatusCode
     from gemelo.schemas.device import DeviceMode, StopKind
-    from gemelo.services.runtime.node import Node
 
 __all__ = [
     "Aborted",
@@ -112,7 +112,7 @@ MODULES = {
     "gemelo.api.verification": ("Verification",),
     "gemelo.schemas.actions": ("GoalStatusCode",),
     "gemelo.schemas.device": ("DeviceMode", "StopKind"),
-    "gemelo.services.runtime.node": ("Node",),
+    "gemelo.libraries.runtime.node": ("Node",),
 }
 _MODULE_OF = {name: module for module, names in MODULES.items() for name in names}
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from gemelo.services.runtime.process.arithmetic import use_one_kernel
+from gemelo.libraries.runtime.process.arithmetic import use_one_kernel
 from tests import optional, profiles
 
 if TYPE_CHECKING:

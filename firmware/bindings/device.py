@@ -14,10 +14,10 @@ from gemelo.firmware.bindings.frames import OUTPUTS, InputLevels, LastingState, 
 from gemelo.firmware.bindings.library import LIBRARY, MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
 from gemelo.firmware.bindings.motor import MotorError, horn_record, motor_record
 from gemelo.libraries.arm.model.gripper import opening_of, pulse_of
+from gemelo.libraries.runtime.serial_frames import LARGEST, JsonFrame
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.device_config import DeviceConfig, config_text
 from gemelo.schemas.robot import Gripper, Motor, ServoGripper
-from gemelo.services.runtime.serial_frames import LARGEST, JsonFrame
 
 LARGEST_OUTPUT = 1024
 UNCONFIGURED = DeviceConfig(name="", joints=())

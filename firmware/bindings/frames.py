@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from gemelo.services.runtime.serial_frames import JsonFrame
+from gemelo.libraries.runtime.serial_frames import JsonFrame
 
 OUTPUTS = ("traj/ack", "cmd/ack", "sync/r", "state", "event", "status", "config/ack", "sensors", "text", "update/ack")
 

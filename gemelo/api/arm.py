@@ -35,6 +35,7 @@ from gemelo.api.units import Pose
 from gemelo.api.verification import OnVerifying, Verification, verify
 from gemelo.libraries.arm.errors import suggestion
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
 from gemelo.schemas.gripper import GripperState
@@ -50,7 +51,6 @@ from gemelo.schemas.topics import (
     STEP_LEDGER,
     STOPPING_DISTANCE,
 )
-from gemelo.services.runtime.node import Node
 
 
 class Arm:

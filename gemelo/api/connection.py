@@ -9,10 +9,10 @@ from gemelo.api.arm import Arm
 from gemelo.api.errors import Error, Lost
 from gemelo.api.robot_files import Robot, find_robot, require_router
 from gemelo.api.session import Session, open_node
+from gemelo.libraries.runtime.deployment import is_loopback, load_deployment
+from gemelo.libraries.runtime.robots import robots_on
+from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.deployment import Deployment
-from gemelo.services.runtime.deployment import is_loopback, load_deployment
-from gemelo.services.runtime.robots import robots_on
-from gemelo.services.runtime.started import load_started
 
 GATEWAY = "stepper_gateway"
 LOOK_EVERY = 0.1  # [s] while the twin is awaited

@@ -12,12 +12,12 @@ from typing import Self
 from gemelo.api import control_file
 from gemelo.api.errors import Lost, Refused
 from gemelo.api.session import Session
+from gemelo.libraries.runtime import errors as runtime
+from gemelo.libraries.runtime.clock import token
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlState, ControlTake
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.topics import CONTROL, CONTROL_GIVE, CONTROL_JOIN, CONTROL_TAKE
-from gemelo.services.runtime import errors as runtime
-from gemelo.services.runtime.clock import token
-from gemelo.services.runtime.node import Node
 
 TO_REST = 15.0  # [s] that the arm may take to come to rest, where another moves it
 TO_ANSWER = 2.0  # [s]

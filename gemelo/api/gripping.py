@@ -11,14 +11,14 @@ from gemelo.api.motion import check_of
 from gemelo.api.scene import Scene
 from gemelo.api.session import Session
 from gemelo.api.targets import number
+from gemelo.libraries.runtime import errors as runtime
+from gemelo.libraries.runtime.actions import ActionClient, GoalHandle
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import InjectKind, InjectRequest
 from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
 from gemelo.schemas.robot import Gripper, ServoGripper
 from gemelo.schemas.scene import SceneGrip, SceneRelease
 from gemelo.schemas.topics import DEVICE_INJECT, DEVICE_STATUS, GRIPPER_COMMAND, GRIPPER_STATE
-from gemelo.services.runtime import errors as runtime
-from gemelo.services.runtime.actions import ActionClient, GoalHandle
 
 OPEN, CLOSE = "open", "close"
 TO_ANSWER = 3.0  # [s] for an injection into a virtual device

@@ -9,6 +9,8 @@ from typing import Any
 from gemelo.api.errors import Aborted, Canceled, Error, Interrupted, Lost, Refused
 from gemelo.api.planning import Plan, words_of
 from gemelo.api.session import Session
+from gemelo.libraries.runtime import errors as runtime
+from gemelo.libraries.runtime.actions import ActionClient, ActionOutcome, GoalHandle
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import (
     FollowErrorCode,
@@ -17,8 +19,6 @@ from gemelo.schemas.motion import (
     FollowJointTrajectoryResult,
 )
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
-from gemelo.services.runtime import errors as runtime
-from gemelo.services.runtime.actions import ActionClient, ActionOutcome, GoalHandle
 
 Handle = GoalHandle[FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
 Client = ActionClient[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]

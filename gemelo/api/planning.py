@@ -21,6 +21,8 @@ from gemelo.api.session import Session, answer_of
 from gemelo.api.targets import as_target, named_joints
 from gemelo.api.units import Pose
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.clock import token
+from gemelo.libraries.runtime.requests.client import PendingCall
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.motion import JointTrajectory
 from gemelo.schemas.planning import (
@@ -41,8 +43,6 @@ from gemelo.schemas.planning import (
 from gemelo.schemas.scene import Contact
 from gemelo.schemas.text_file import NotUtf8, read_text
 from gemelo.schemas.topics import DEVICE_STATE, FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS, STATE_VALIDITY
-from gemelo.services.runtime.clock import token
-from gemelo.services.runtime.requests.client import PendingCall
 
 MARGIN = 2.0  # [s] that a planner may take beyond its allowed time before it counts as gone
 TO_CANCEL = 0.5  # [s] for its answer to a cancel

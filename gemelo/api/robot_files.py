@@ -13,10 +13,10 @@ from gemelo.api.errors import BadArgument, Error, Lost
 from gemelo.libraries.arm.errors import suggestion
 from gemelo.libraries.arm.model import description as descriptions
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.deployment import CONFIG, load_deployment, project_root, when_silent
+from gemelo.libraries.runtime.running import find_deployment, folder_of
+from gemelo.libraries.runtime.started import deployment_of_arm
 from gemelo.schemas.deployment import Deployment
-from gemelo.services.runtime.deployment import CONFIG, load_deployment, project_root, when_silent
-from gemelo.services.runtime.running import find_deployment, folder_of
-from gemelo.services.runtime.started import deployment_of_arm
 
 LOOK_TIMEOUT = 1.0  # [s] of one look for the router
 

@@ -9,9 +9,9 @@ import msgspec
 from gemelo.api.errors import BadArgument, Error
 from gemelo.api.targets import number
 from gemelo.api.whole_files import write_whole
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.scene import MeshShape, PlanningScene
 from gemelo.schemas.text_file import read_text
-from gemelo.services.runtime.deployment import project_root
 
 LARGEST_MESH = 10.0  # [m]; what is larger was drawn in mm
 LARGEST_UNSAID = 3.0  # [m] of a mesh for which no scale is given: larger than what such arms reach

@@ -14,13 +14,13 @@ from gemelo.api.units import Point, Pose
 from gemelo.libraries.arm.cell.cell_file import Cell, cell_of, load_cell
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, from_message
+from gemelo.libraries.runtime.endpoints import info_request
+from gemelo.libraries.runtime.topics import Subscription
 from gemelo.schemas.camera import CameraCondition, CameraStatus
 from gemelo.schemas.cell import CellTexts, TagThing, Thing
 from gemelo.schemas.detections import Detection, Detections
 from gemelo.schemas.system import Empty
 from gemelo.schemas.topics import CAMERA, CELL, JOINT_STATES, camera_detections, camera_status
-from gemelo.services.runtime.endpoints import info_request
-from gemelo.services.runtime.topics import Subscription
 
 NO_CELL = "(urdf/rm1/cell.toml is a sample: GEMELO_CELL=urdf/rm1/cell.toml make up)"
 TO_READ = 2.0  # [s] for the cell to come over the bus

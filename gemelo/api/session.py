@@ -13,14 +13,14 @@ from typing import Any, TypeVar
 
 from gemelo.api.errors import Error, Lost, Refused
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime import errors as runtime
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.node_clock import NodeClock
+from gemelo.libraries.runtime.requests.client import PendingCall
+from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import Request, Topic
-from gemelo.services.runtime import errors as runtime
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.node_clock import NodeClock
-from gemelo.services.runtime.requests.client import PendingCall
-from gemelo.services.runtime.topics import Latest
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)

@@ -28,9 +28,9 @@ from gemelo.api.session import Session
 from gemelo.api.targets import named_joints
 from gemelo.libraries.arm.errors import suggestion
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.robot import Motor
 from gemelo.schemas.simulation import WireConditions
-from gemelo.services.runtime.node import Node
 
 if TYPE_CHECKING:
     from gemelo.services.simulation.twin import Twin

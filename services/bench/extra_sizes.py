@@ -10,8 +10,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
-from gemelo.services.runtime.deployment import project_root
 
 EXTRAS = ("record", "planner", "view", "panel", "eyes")
 GOAL = FigureGoal(median=150.0)  # [MB] of a host with nothing but a gateway

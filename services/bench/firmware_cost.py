@@ -14,10 +14,10 @@ from functools import cache
 import msgspec
 
 from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.serial_frames import packet
 from gemelo.schemas.device_config import DeviceConfig, JointConfig
 from gemelo.services.bench.figures import Figure, NotMeasured, of_samples, quantile
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.serial_frames import packet
 
 RUN = "firmware/tests/rv32/run"
 

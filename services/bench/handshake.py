@@ -12,13 +12,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.bus.zenoh_config import locked_router
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.permissions import access_control
 from gemelo.schemas.deployment import RouterSection
 from gemelo.services.bench.figures import Figure, NotMeasured, of_samples, quantile
 from gemelo.services.credentials.authority import Authority
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.bus.zenoh_config import locked_router
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.permissions import access_control
 from gemelo.services.stack.stack import free_ports
 
 ROUNDS = 40
@@ -69,7 +69,7 @@ def _router(folder: Path, port: int, more: Mapping[str, str]) -> Iterator[None]:
     """A router as a process of its own; raises `NotMeasured` where it does not start."""
     paths = {"GEMELO_PATHS_RUN": str(folder / "run"), "GEMELO_PATHS_OUT": str(folder / "out")}
     environment = os.environ | paths | {"GEMELO_ROUTER_PORT": str(port)} | dict(more)
-    command = [sys.executable, "-m", "gemelo.services.runtime.router"]
+    command = [sys.executable, "-m", "gemelo.libraries.runtime.router"]
     process = subprocess.Popen(command, cwd=project_root(), env=environment, stderr=subprocess.DEVNULL)
     try:
         end = time.monotonic() + READY

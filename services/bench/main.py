@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 import msgspec
 
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.process.ending import ended_by_signals
 from gemelo.services.bench.figures import Figure, guarded, report_of, text_of
 from gemelo.services.bench.stack import Stacks
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.process.ending import ended_by_signals
 
 
 class FigureRow(NamedTuple):

@@ -19,15 +19,15 @@ from pathlib import Path
 
 import psutil
 
+from gemelo.libraries.runtime.bus.interface import Arrival
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.deployment import RouterSection
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import decode
 from gemelo.schemas.topics import JOINT_STATES
 from gemelo.services.bench.figures import Figure, NotMeasured, quantile, rounded
 from gemelo.services.bench.stack import cpu_seconds, has_mosquitto, rss_mb
-from gemelo.services.runtime.bus.interface import Arrival
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.deployment import project_root
 from gemelo.services.stack.stack import free_ports
 
 COUNTS = (1, 2, 4, 8, 12, 16, 20, 24, 32, 40, 50)
@@ -102,7 +102,8 @@ class ArmsOnOneRouter:
             self._closing = opened
             run = self._folder / "run"
             self._common = [
-                self._start(module, run) for module in ("gemelo.services.runtime.router", "gemelo.services.broker.main")
+                self._start(module, run)
+                for module in ("gemelo.libraries.runtime.router", "gemelo.services.broker.main")
             ]
             _wait(lambda: all((run / f"{name}.ready").exists() for name in ("router", "broker")), "router and broker")
             self._bus = opened.enter_context(closing(ZenohBus(RouterSection(port=self._router_port), "")))

@@ -20,6 +20,7 @@ from playwright.sync_api import Page, sync_playwright
 
 import gemelo
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.deployment import load_deployment, project_root
 from gemelo.schemas.joints import JointState
 from gemelo.services.bench.bare_browser import Said, bare_browser
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
@@ -28,7 +29,6 @@ from gemelo.services.bench.stops import StopWire
 from gemelo.services.panel.model.goal import GoalSolver
 from gemelo.services.panel.model.pace import UNSEEN
 from gemelo.services.panel.view.browser import STOP_SIGN
-from gemelo.services.runtime.deployment import load_deployment, project_root
 from gemelo.services.stack.stack import Stack
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.device import DeviceFault, DeviceMode, DeviceState
 from gemelo.schemas.topics import DEVICE_STATE
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
@@ -20,7 +21,6 @@ from gemelo.services.recordings.reader import RecordingReader
 from gemelo.services.recordings.table import recorded_topics
 from gemelo.services.replay.main import SERVICES, replay, text_of
 from gemelo.services.replay.make_recordings import FOLDER
-from gemelo.services.runtime.deployment import project_root
 
 SETTLE = 3.0  # [s] of motion that are not counted
 WINDOW, WINDOWS = 5.0, 4  # [s]

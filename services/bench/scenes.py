@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.message import Vector
 from gemelo.schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject
-from gemelo.services.runtime.deployment import project_root
 
 Array = NDArray[np.float64]
 

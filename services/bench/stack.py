@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import psutil
 
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime.deployment import load_deployment, project_root
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.deployment import Deployment
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
-from gemelo.services.runtime.deployment import load_deployment, project_root
-from gemelo.services.runtime.node import Node
 from gemelo.services.stack.stack import Stack
 
 IDLE_GOAL = FigureGoal(median=25.0)  # [% of one core]

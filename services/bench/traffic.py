@@ -26,6 +26,9 @@ import msgspec
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
+from gemelo.libraries.runtime.bus.pace import Pace, Rate
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.errors import BusError
 from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.deployment import RouterSection
 from gemelo.schemas.device import (
@@ -51,9 +54,6 @@ from gemelo.schemas.topics import (
     PLAN,
 )
 from gemelo.services.mqtt.client import stop_loop
-from gemelo.services.runtime.bus.pace import Pace, Rate
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.errors import BusError
 
 THERE, BACK = "gemelo-bench/there", "gemelo-bench/back"
 PATIENCE = 5.0  # [s] for a connection

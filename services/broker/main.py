@@ -10,19 +10,19 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
+from gemelo.libraries.runtime.certificate_watch import CertificateWatch
+from gemelo.libraries.runtime.deployment import DeploymentError, exposure, load_deployment
+from gemelo.libraries.runtime.process.logs import LEVELS, line_logger
+from gemelo.libraries.runtime.process.ports import PortTaken, require_free
+from gemelo.libraries.runtime.process.priority import step_ahead
+from gemelo.libraries.runtime.process.readiness import Readiness
+from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.deployment import Broker, Deployment, MqttSection
 from gemelo.services.broker import embedded, mosquitto
 from gemelo.services.broker.replacement import NotInstalled, become
 from gemelo.services.credentials.private_files import AccessError
 from gemelo.services.mqtt.access import gateway_access
 from gemelo.services.mqtt.secure_folder import CERTIFICATE, require_made
-from gemelo.services.runtime.certificate_watch import CertificateWatch
-from gemelo.services.runtime.deployment import DeploymentError, exposure, load_deployment
-from gemelo.services.runtime.process.logs import LEVELS, line_logger
-from gemelo.services.runtime.process.ports import PortTaken, require_free
-from gemelo.services.runtime.process.priority import step_ahead
-from gemelo.services.runtime.process.readiness import Readiness
-from gemelo.services.runtime.process.unwritten import UnwrittenFiles
 
 BEAT = 1.0  # [s] of the readiness file
 RENEWAL = (

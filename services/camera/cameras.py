@@ -7,6 +7,10 @@ import cv2
 from gemelo.libraries.arm.cell.camera_model import believed_info, exact_info
 from gemelo.libraries.arm.cell.cell_file import Cell
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.bus.wire import TooLarge
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.node_clock import NodeClock
+from gemelo.libraries.runtime.scene_meshes import SceneMeshes
 from gemelo.schemas.camera import CameraCondition, CameraImage
 from gemelo.schemas.cell import CameraRecord, FileSource, FolderSource, V4l2Source, VirtualSource
 from gemelo.schemas.topics import (
@@ -26,10 +30,6 @@ from gemelo.services.camera.sources.stored import FolderOfImages, Video
 from gemelo.services.camera.sources.v4l2 import V4l2Camera
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera, true_detections
 from gemelo.services.camera.virtual.world import CameraWorld
-from gemelo.services.runtime.bus.wire import TooLarge
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.node_clock import NodeClock
-from gemelo.services.runtime.scene_meshes import SceneMeshes
 
 REOPEN = 3_000_000_000  # [ns] between two attempts to wake a camera that gives the same image again and again
 

@@ -10,12 +10,12 @@ from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE
 from gemelo.libraries.arm.cell.cell_file import Cell, load_cell, read_cell_texts
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime.application import service
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.cell import CellTexts
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.topics import CELL
-from gemelo.services.runtime.application import service
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.node import Node
 
 RATE = 10.0  # [Hz] of the watch over the cameras
 ASIDE_RATE = 1.0  # [Hz]

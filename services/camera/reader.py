@@ -8,9 +8,9 @@ from collections.abc import Callable
 
 import cv2
 
+from gemelo.libraries.runtime.clock import Clock
 from gemelo.schemas.camera import CameraCondition
 from gemelo.services.camera.sources.source import CameraFault, CameraSource, EncodedImage
-from gemelo.services.runtime.clock import Clock
 
 RETRY = 0.5  # [s] between two attempts to open
 

@@ -8,6 +8,8 @@ from random import Random
 import msgspec
 
 import gemelo
+from gemelo.libraries.runtime.actions import keys
+from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
 from gemelo.schemas.actions import GoalRequest, GoalStatusCode, ResultRequest
 from gemelo.schemas.device import DeviceStopRequest
 from gemelo.schemas.message import encode
@@ -16,8 +18,6 @@ from gemelo.schemas.topics import DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY
 from gemelo.services.chaos.invariants import is_starved
 from gemelo.services.chaos.person import random_goal
 from gemelo.services.chaos.site import ChaosSite
-from gemelo.services.runtime.actions import keys
-from gemelo.services.runtime.errors import NoAnswer, RequestRefused
 
 HOLDS, STOPS, BREATHS = (8, 30), (4, 8), (2, 5)  # how many, from and to
 TURN, RUN, BREATH = 0.06, 0.4, 0.03  # [s] at most: between hold and resume; of a move; between a goal and its stop

@@ -18,6 +18,8 @@ import msgspec
 from mcap.exceptions import EndOfFile, McapError
 from mcap.stream_reader import StreamReader
 
+from gemelo.libraries.runtime.deployment import load_deployment
+from gemelo.libraries.runtime.process.ending import ended_by_signals
 from gemelo.schemas.deployment import DeviceKind
 from gemelo.schemas.topics import JOINT_STATES
 from gemelo.services.chaos.campaign import Campaign, Episode, order
@@ -26,8 +28,6 @@ from gemelo.services.chaos.invariants import missing_records
 from gemelo.services.chaos.options import add_chaos_options
 from gemelo.services.chaos.report import ChaosReport, page_of, text_of
 from gemelo.services.chaos.site import ChaosSite, installed_broker, processes_of
-from gemelo.services.runtime.deployment import load_deployment
-from gemelo.services.runtime.process.ending import ended_by_signals
 from gemelo.services.stack.results import new_results
 from gemelo.services.stack.stack import StackError
 

@@ -7,13 +7,13 @@ from contextlib import suppress
 from random import Random
 
 import gemelo
+from gemelo.libraries.runtime.actions import keys
+from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
 from gemelo.schemas.actions import GoalRequest, GoalResponse
 from gemelo.schemas.message import decode, encode
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
 from gemelo.services.chaos.invariants import STEPS, is_starved
 from gemelo.services.chaos.site import ChaosSite
-from gemelo.services.runtime.actions import keys
-from gemelo.services.runtime.errors import NoAnswer, RequestRefused
 from gemelo.services.stack.stack import StackError
 
 Send = Callable[[ChaosSite, GoalRequest], str]  # again; how it was answered

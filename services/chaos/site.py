@@ -16,6 +16,10 @@ from types import TracebackType
 import gemelo
 from gemelo.firmware.platform.host.slot_record import VARIABLE
 from gemelo.libraries.arm.cell.cell_file import deployed_cell
+from gemelo.libraries.runtime.actions.keys import goal_request
+from gemelo.libraries.runtime.deployment import deployment_file, load_deployment, project_root
+from gemelo.libraries.runtime.requests.exchanges import exchange_topic
+from gemelo.libraries.runtime.saved_parameters import SavedParameters
 from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.deployment import Deployment, Wire
 from gemelo.schemas.message import BadMessage, decode
@@ -31,10 +35,6 @@ from gemelo.services.chaos.slow_link import SlowLink
 from gemelo.services.chaos.small_disk import SmallDisk, may_mount
 from gemelo.services.chaos.strangers import BusStranger, WireStranger
 from gemelo.services.chaos.twins import TwinClient, TwinProcess
-from gemelo.services.runtime.actions.keys import goal_request
-from gemelo.services.runtime.deployment import deployment_file, load_deployment, project_root
-from gemelo.services.runtime.requests.exchanges import exchange_topic
-from gemelo.services.runtime.saved_parameters import SavedParameters
 from gemelo.services.stack.stack import PROCESSES, Stack, StackError, free_ports
 
 EYES = ("camera", "detector")

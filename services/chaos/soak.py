@@ -21,14 +21,14 @@ import numpy as np
 import psutil
 
 import gemelo
+from gemelo.libraries.runtime.deployment import load_deployment
+from gemelo.libraries.runtime.endpoints import parameter_request
+from gemelo.libraries.runtime.errors import NoAnswer
+from gemelo.libraries.runtime.process.ending import ended_by_signals
 from gemelo.schemas.deployment import DeviceKind
 from gemelo.schemas.system import SetParameter
 from gemelo.services.chaos.options import add_soak_options
 from gemelo.services.chaos.site import ChaosSite, installed_broker
-from gemelo.services.runtime.deployment import load_deployment
-from gemelo.services.runtime.endpoints import parameter_request
-from gemelo.services.runtime.errors import NoAnswer
-from gemelo.services.runtime.process.ending import ended_by_signals
 from gemelo.services.stack.results import new_results
 from gemelo.services.stack.stack import StackError
 

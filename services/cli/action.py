@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gemelo.libraries.runtime.errors import GoalRefused
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.message import Message
 from gemelo.schemas.text_file import NotUtf8, decode_text
@@ -17,7 +18,6 @@ from gemelo.services.cli.parser import Choices, Options, Parser, json_option
 from gemelo.services.cli.session import CommandSession, connect, share_control
 from gemelo.services.cli.terminal import CANCELLING, two_stage_interrupt
 from gemelo.services.cli.text_table import table
-from gemelo.services.runtime.errors import GoalRefused
 
 if TYPE_CHECKING:
     from gemelo import Robot

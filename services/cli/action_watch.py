@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from typing import Any, NamedTuple
 
+from gemelo.libraries.runtime.actions import keys
+from gemelo.libraries.runtime.errors import NoAnswer
 from gemelo.schemas.actions import CancelRequest, GoalFeedback, GoalStatus, GoalStatuses, ResultRequest
 from gemelo.schemas.message import Message, decode
 from gemelo.schemas.topics import Action
@@ -14,8 +16,6 @@ from gemelo.services.cli.field_path import FieldPath
 from gemelo.services.cli.forms import Form, count_options, csv_lines, form_options, json_line, yaml_document
 from gemelo.services.cli.parser import Options, Parser
 from gemelo.services.cli.session import CommandSession, connect
-from gemelo.services.runtime.actions import keys
-from gemelo.services.runtime.errors import NoAnswer
 
 TIMEOUT = 2.0  # [s]
 LOOK = 0.02  # [s] between two looks for the first status

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.services.cli.errors import CommandError, ExitCode, unknown, usage
 from gemelo.services.cli.parser import Options, Parser, json_option
 from gemelo.services.cli.text_table import table
@@ -16,7 +17,6 @@ from gemelo.services.recordings.contents import Contents, WriterClock, contents_
 from gemelo.services.recordings.export import FORMS, NothingToExport, export
 from gemelo.services.recordings.reader import BadRecording
 from gemelo.services.recordings.repair import repair
-from gemelo.services.runtime.clock_offset import ClockOffset
 
 
 def file_option(parser: Parser) -> None:

@@ -13,6 +13,12 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from gemelo.libraries.runtime.bus.connection import connect
+from gemelo.libraries.runtime.bus.interface import Bus
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.errors import NodeNameTaken
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Deployment
 from gemelo.services.cli.bag import file_option, one_sentence
 from gemelo.services.cli.errors import CommandError, ExitCode, usage
@@ -23,12 +29,6 @@ from gemelo.services.recordings.export import chosen, topics_in
 from gemelo.services.recordings.player import NODE, Player, Roles
 from gemelo.services.recordings.reader import RecordingReader
 from gemelo.services.recordings.shadow import NAME, recorded_robot, shadow_folder, write_shadow
-from gemelo.services.runtime.bus.connection import connect
-from gemelo.services.runtime.bus.interface import Bus
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.errors import NodeNameTaken
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 
 RATE = 100.0  # [Hz] of looks at what is due
 LEAVE = ("q", "x", "\x03", "\x04")

@@ -9,6 +9,7 @@ from typing import Any
 
 from mcap.writer import CompressionType
 
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import DESCRIPTION, Delivery, Topic
 from gemelo.services.cli.bag import one_sentence
@@ -20,7 +21,6 @@ from gemelo.services.recordings.mcap_file import McapFile
 from gemelo.services.recordings.origin import metadata_of
 from gemelo.services.recordings.subscriptions import Subscriptions
 from gemelo.services.recordings.table import recorded_topics
-from gemelo.services.runtime.deployment import project_root
 
 COMPRESSIONS = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4, "none": CompressionType.NONE}
 WRITE_RATE = 2.0  # [Hz]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.cli.bag import one_sentence
 from gemelo.services.cli.errors import CommandError, ExitCode
 from gemelo.services.cli.parser import Options, Parser, json_option
@@ -23,7 +24,6 @@ from gemelo.services.recordings.incidents import (
     read_incident,
     time_of,
 )
-from gemelo.services.runtime.deployment import project_root
 
 SAVING = "a black box of what has just happened is being saved: `gemelo blackbox list` has it in a few seconds"
 

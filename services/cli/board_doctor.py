@@ -6,10 +6,10 @@ import re
 import time
 from typing import NamedTuple
 
+from gemelo.libraries.runtime.serial_frames import JsonFrame, PacketDecoder, packet, parse_json_frame, sync_frame
 from gemelo.services.cli.errors import CommandError, ExitCode
 from gemelo.services.cli.parser import Options, Parser, positive_integer
 from gemelo.services.cli.provision import BAUD, BoardLine, open_line
-from gemelo.services.runtime.serial_frames import JsonFrame, PacketDecoder, packet, parse_json_frame, sync_frame
 
 BOOT_BAUD = 115_200  # of the chip's own boot loader, which is in ROM
 LISTENING = 3.0  # [s] at each rate

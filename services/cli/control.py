@@ -14,11 +14,11 @@ import msgspec
 
 import gemelo
 from gemelo.api import control_file
+from gemelo.libraries.runtime.process.ending import EndedBySignal, ended_by_signals
 from gemelo.schemas.control import ControlState
 from gemelo.services.cli.errors import CommandError, ExitCode
 from gemelo.services.cli.parser import Options, Parser, json_option
 from gemelo.services.cli.session import connect_arm, load_robot
-from gemelo.services.runtime.process.ending import EndedBySignal, ended_by_signals
 
 if TYPE_CHECKING:
     from gemelo import Arm

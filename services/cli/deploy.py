@@ -7,12 +7,12 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gemelo.libraries.runtime.deployment import DEFAULT_FILE, load_deployment, project_root
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.site import Site
 from gemelo.services.cli.errors import CommandError, ExitCode, unknown
 from gemelo.services.cli.parser import Options, Parser, positive_number
 from gemelo.services.cli.text_table import table
-from gemelo.services.runtime.deployment import DEFAULT_FILE, load_deployment, project_root
 
 if TYPE_CHECKING:
     from gemelo.services.hosts.certificates import Certificate

@@ -8,6 +8,11 @@ from pathlib import Path
 import msgspec
 
 import gemelo
+from gemelo.libraries.runtime.clock_offset import ClockOffset
+from gemelo.libraries.runtime.errors import BusError, NoAnswer, RequestRefused
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.node_clock import ask_about
+from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.roles import ROLE_OF_NODE
@@ -23,11 +28,6 @@ from gemelo.services.credentials.expiry import expiry
 from gemelo.services.hosts.certificates import Certificate, days_by_host, endings, in_days, older, renewal, shown_at
 from gemelo.services.hosts.layout import BROKER, ROUTER
 from gemelo.services.hosts.status import SeenNode, SeenRobot, ServiceState, ServiceStatus, is_well, site_status
-from gemelo.services.runtime.clock_offset import ClockOffset
-from gemelo.services.runtime.errors import BusError, NoAnswer, RequestRefused
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.node_clock import ask_about
-from gemelo.services.runtime.started import load_started
 
 HEADINGS = ("host", "robot", "service", "is", "machine", "version", "clock", "certificate", "why")
 TO_ANSWER = 2.0  # [s] of one node

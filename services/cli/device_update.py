@@ -7,6 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.firmware_update import ImageHeader, NoImage, read_header
+from gemelo.libraries.runtime.signatures import SignatureError, make_key, sign
+from gemelo.libraries.runtime.started import load_started
 from gemelo.services.cli.errors import CommandError, ExitCode, usage
 from gemelo.services.cli.parser import Options, Parser, positive_integer
 from gemelo.services.cli.provision import BAUD, open_line
@@ -14,10 +18,6 @@ from gemelo.services.cli.terminal import LiveBlock
 from gemelo.services.cli.update_transfer import SerialWire, Transfer, UpdateStatus, UpdateWire, await_status, mqtt_wire
 from gemelo.services.credentials.private_files import AccessError, require_private
 from gemelo.services.mqtt.access import gateway_access
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.firmware_update import ImageHeader, NoImage, read_header
-from gemelo.services.runtime.signatures import SignatureError, make_key, sign
-from gemelo.services.runtime.started import load_started
 
 KEY = ".gemelo/update.key"
 TO_ANSWER = 6.0  # [s] until a device that is there has said status

@@ -15,6 +15,11 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.libraries.runtime.clock_offset import ClockOffset
+from gemelo.libraries.runtime.deployment import project_root, when_silent
+from gemelo.libraries.runtime.process.priority import may_step_ahead
+from gemelo.libraries.runtime.process.unwritten import remedy_of
+from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.deployment import Deployment, MqttSection, RouterSection, Wire
 from gemelo.schemas.device import DeviceState, DeviceStatus
 from gemelo.schemas.device_faults import fault_text
@@ -30,11 +35,6 @@ from gemelo.services.cli.text_table import table
 from gemelo.services.cli.version import gemelo_version, version_text
 from gemelo.services.credentials.private_files import AccessError
 from gemelo.services.mqtt.access import gateway_access
-from gemelo.services.runtime.clock_offset import ClockOffset
-from gemelo.services.runtime.deployment import project_root, when_silent
-from gemelo.services.runtime.process.priority import may_step_ahead
-from gemelo.services.runtime.process.unwritten import remedy_of
-from gemelo.services.runtime.started import load_started
 
 BROKER_PAGE = "docs/my_broker.md has every such sentence with what to do"
 # Tuning constants: chosen.
@@ -105,7 +105,7 @@ def diagnoses() -> Iterator[Diagnosis]:
 
 def deployment_here() -> Deployment:
     """That of the robot that runs; where several do and none is chosen, that of this folder."""
-    from gemelo.services.runtime.running import SeveralRobots, find_deployment  # slow to load: the bus
+    from gemelo.libraries.runtime.running import SeveralRobots, find_deployment  # slow to load: the bus
 
     try:
         return find_deployment()
@@ -115,7 +115,7 @@ def deployment_here() -> Deployment:
 
 def runs(router: RouterSection) -> Iterator[Diagnosis]:
     """Every robot on the router, and the files that its twin was started with."""
-    from gemelo.services.runtime.running import ask_files, running_robots  # slow to load: the bus
+    from gemelo.libraries.runtime.running import ask_files, running_robots  # slow to load: the bus
 
     for robot, nodes in sorted(running_robots(router).items()):
         info = ask_files(router, robot, nodes)
@@ -265,8 +265,8 @@ def twins(borne: Mapping[str, tuple[str, ...]]) -> Iterator[Diagnosis]:
 
 def _told(session: CommandSession, nodes: Iterable[str]) -> dict[str, tuple[NodeInfo, ClockOffset | None]]:
     """What each node says of itself, and its clock."""
-    from gemelo.services.runtime.errors import NoAnswer  # 0.1 s, for a twin that runs
-    from gemelo.services.runtime.node_clock import ask_about
+    from gemelo.libraries.runtime.errors import NoAnswer  # 0.1 s, for a twin that runs
+    from gemelo.libraries.runtime.node_clock import ask_about
 
     found = {}
     for name in nodes:

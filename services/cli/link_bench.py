@@ -11,6 +11,7 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.device import EchoRequest, EchoResponse
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.topics import DEVICE_ECHO, JOINT_STATES, JOINT_TARGETS
@@ -19,7 +20,6 @@ from gemelo.services.cli.parser import Options, Parser, positive_integer, positi
 from gemelo.services.cli.session import CommandSession, connect
 from gemelo.services.cli.text_table import table
 from gemelo.services.cli.units import parse_joints
-from gemelo.services.runtime.deployment import project_root
 
 SILENCE = "nothing heard of the arm: is stepper_gateway running? `gemelo node list`"
 PATIENCE = 2.0  # [s] for one answer, the bus included

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
+from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.system import Empty, TopicInterface
 from gemelo.schemas.topics import TOPICS, Topic
@@ -14,8 +16,6 @@ from gemelo.services.cli.errors import unknown
 from gemelo.services.cli.node import TIMEOUT, living
 from gemelo.services.cli.session import CommandSession, connect
 from gemelo.services.recordings.living_topic import living_topic
-from gemelo.services.runtime.errors import NoAnswer, RequestRefused
-from gemelo.services.runtime.started import load_started
 
 KNOWN = {topic.key: topic for topic in TOPICS}
 
@@ -75,7 +75,7 @@ def other_topics(session: CommandSession) -> list[Topic[Any]]:
 
 
 def _interfaces(session: CommandSession, name: str) -> tuple[TopicInterface, ...]:
-    from gemelo.services.runtime.endpoints import interfaces_request  # slow to load: all that a node has on the bus
+    from gemelo.libraries.runtime.endpoints import interfaces_request  # slow to load: all that a node has on the bus
 
     try:
         return session.node.call(interfaces_request(name), Empty(), timeout=TIMEOUT).topics

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from gemelo.libraries.runtime.process.leaving import end_process
 from gemelo.services.cli.commands import COMMANDS, GROUPS
 from gemelo.services.cli.errors import CommandError, ExitCode, unknown, usage
 from gemelo.services.cli.output import escaped_output
 from gemelo.services.cli.parser import Options, build
-from gemelo.services.runtime.process.leaving import end_process
 
 ABOUT = "The twin's command line: move the arm, and see everything that is said about it."
 EPILOG = (
@@ -53,8 +53,8 @@ def choose_robot(name: str) -> None:
 
     Raises `CommandError` where there is no such robot.
     """
-    from gemelo.services.runtime.deployment import overriding  # slow to load, for --robot alone
-    from gemelo.services.runtime.started import deployment_of_arm
+    from gemelo.libraries.runtime.deployment import overriding  # slow to load, for --robot alone
+    from gemelo.libraries.runtime.started import deployment_of_arm
 
     file = deployment_of_arm(name)
     if file is None:
@@ -68,9 +68,9 @@ def choose_robot(name: str) -> None:
 def robot_folder(name: str) -> str:
     """The folder of an arm, of a shadow that `gemelo bag play` has made, or of a robot that runs with files elsewhere;
     raises `CommandError` for none of them."""
-    from gemelo.services.runtime.deployment import project_root  # slow to load, for --robot alone
-    from gemelo.services.runtime.running import files_of, running_robots
-    from gemelo.services.runtime.started import load_started
+    from gemelo.libraries.runtime.deployment import project_root  # slow to load, for --robot alone
+    from gemelo.libraries.runtime.running import files_of, running_robots
+    from gemelo.libraries.runtime.started import load_started
 
     root, deployment = project_root(), load_started()
     out = Path(deployment.paths.out)

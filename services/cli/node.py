@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import msgspec
 
+from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.schemas.system import Empty, NodeInfo
 from gemelo.services.cli.errors import CommandError, ExitCode, unknown
 from gemelo.services.cli.forms import print_value
@@ -14,7 +15,6 @@ from gemelo.services.cli.messages import dump
 from gemelo.services.cli.parser import Options, Parser, json_option
 from gemelo.services.cli.session import CommandSession, connect
 from gemelo.services.cli.text_table import table
-from gemelo.services.runtime.clock_offset import ClockOffset
 
 TIMEOUT = 2.0  # [s]
 
@@ -46,7 +46,7 @@ def run_info(options: Options) -> ExitCode:
 
 def information_of(session: CommandSession, name: str) -> NodeInfo:
     """The keys that a node publishes, subscribes to and serves; raises `CommandError` if no such node is alive."""
-    from gemelo.services.runtime.endpoints import info_request  # slow to load: all that a node has on the bus
+    from gemelo.libraries.runtime.endpoints import info_request  # slow to load: all that a node has on the bus
 
     require_alive(session, name)
     return session.node.call(info_request(name), Empty(), timeout=TIMEOUT)
@@ -54,7 +54,7 @@ def information_of(session: CommandSession, name: str) -> NodeInfo:
 
 def told_information_of(session: CommandSession, name: str) -> NodeInfo | None:
     """As `information_of`; None of a node that does not answer, or has just ended."""
-    from gemelo.services.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
+    from gemelo.libraries.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
 
     try:
         return information_of(session, name)
@@ -90,8 +90,8 @@ class NodeState(msgspec.Struct, frozen=True, kw_only=True):
 
 def standings(session: CommandSession) -> list[NodeState]:
     """Of every living node."""
-    from gemelo.services.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
-    from gemelo.services.runtime.node_clock import ask_about
+    from gemelo.libraries.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
+    from gemelo.libraries.runtime.node_clock import ask_about
 
     found = []
     for name in living(session):

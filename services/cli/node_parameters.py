@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
+from gemelo.libraries.runtime.saved_parameters import toml
 from gemelo.schemas.system import Parameter, ParameterValue
 from gemelo.schemas.text_file import NotUtf8, decode_text
 from gemelo.services.cli.errors import CommandError, ExitCode, usage
@@ -14,7 +15,6 @@ from gemelo.services.cli.node import living
 from gemelo.services.cli.param import change_parameter, parameter_of, parameters_of, require_in_range, value_of, written
 from gemelo.services.cli.parser import Options, Parser
 from gemelo.services.cli.session import CommandSession, connect
-from gemelo.services.runtime.saved_parameters import toml
 
 
 class NewValue(NamedTuple):

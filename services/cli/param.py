@@ -73,7 +73,7 @@ def run_set(options: Options) -> ExitCode:
 
 def parameters_of(session: CommandSession, name: str) -> tuple[Parameter, ...]:
     """The declared parameters of a node."""
-    from gemelo.services.runtime.endpoints import parameters_request  # 0.1 s, for a command that connects
+    from gemelo.libraries.runtime.endpoints import parameters_request  # 0.1 s, for a command that connects
 
     require_alive(session, name)
     return session.node.call(parameters_request(name), Empty(), timeout=TIMEOUT).parameters
@@ -128,7 +128,7 @@ def change_parameter(
     session: CommandSession, node: str, parameter: Parameter, value: ParameterValue, save: bool = False
 ) -> str:
     """Sets `parameter` of `node` to `value`, also for later starts if `save`, and returns a line about it."""
-    from gemelo.services.runtime.endpoints import parameter_request  # 0.1 s, for a command that connects
+    from gemelo.libraries.runtime.endpoints import parameter_request  # 0.1 s, for a command that connects
 
     question = SetParameter(name=parameter.name, value=value, save=save)
     after = session.node.call(parameter_request(node), question, timeout=TIMEOUT)

@@ -11,6 +11,14 @@ from typing import Protocol, TypeVar
 
 import msgspec
 
+from gemelo.libraries.runtime.serial_frames import (
+    JsonFrame,
+    PacketDecoder,
+    json_frame,
+    packet,
+    parse_json_frame,
+    sync_frame,
+)
 from gemelo.services.cli.credentials import (
     MQTT_DEVICE_PASSWORD,
     MQTT_PASSWORD,
@@ -25,14 +33,6 @@ from gemelo.services.cli.credentials import (
 from gemelo.services.cli.errors import CommandError, ExitCode, usage
 from gemelo.services.cli.parser import Options, Parser, positive_integer
 from gemelo.services.cli.terminal import confirm
-from gemelo.services.runtime.serial_frames import (
-    JsonFrame,
-    PacketDecoder,
-    json_frame,
-    packet,
-    parse_json_frame,
-    sync_frame,
-)
 
 T = TypeVar("T", bound=msgspec.Struct)
 

@@ -215,7 +215,7 @@ def pair_choices(robot: Robot | None) -> Choices:
 
 def _object_names(robot: Robot | None) -> list[str]:
     """Those that the shell can complete, from the planner's file; none if it cannot be read."""
-    from gemelo.services.runtime.deployment import project_root  # slow to load
+    from gemelo.libraries.runtime.deployment import project_root  # slow to load
 
     if robot is None:
         return []

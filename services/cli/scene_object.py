@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import gemelo
 from gemelo.libraries.arm.frames.transforms import from_rpy
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import (
     BoxShape,
@@ -22,7 +23,6 @@ from gemelo.services.cli.parser import Options
 from gemelo.services.cli.request_text import millimetres, rotation_text
 from gemelo.services.cli.text_table import table
 from gemelo.services.cli.units import LENGTH, parse_quantity, parse_rotation
-from gemelo.services.runtime.deployment import project_root
 
 
 def object_of(options: Options) -> SceneObject:

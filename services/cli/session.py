@@ -14,8 +14,8 @@ from gemelo.services.cli.errors import CommandError, ExitCode, in_commands, usag
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
     from gemelo.libraries.arm.model.description import ArmDescription
+    from gemelo.libraries.runtime.node import Node
     from gemelo.schemas.deployment import Deployment
-    from gemelo.services.runtime.node import Node
 
 
 class CommandSession(NamedTuple):
@@ -80,8 +80,8 @@ def connect(robot: Robot | None = None) -> Iterator[CommandSession]:
     robot, twin = robot or load_robot(), simulated.chosen()
     deployment, arm = robot
     require_router(deployment)
-    from gemelo.services.runtime.errors import BusError, NoAnswer, RequestRefused, ServerLost  # slow to load: the bus
-    from gemelo.services.runtime.node import Node
+    from gemelo.libraries.runtime.errors import BusError, NoAnswer, RequestRefused, ServerLost  # slow to load: the bus
+    from gemelo.libraries.runtime.node import Node
 
     try:
         if twin is None:

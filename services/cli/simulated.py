@@ -12,7 +12,7 @@ from gemelo.services.cli.errors import usage
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot, SimulatedArm
-    from gemelo.services.runtime.node import Node
+    from gemelo.libraries.runtime.node import Node
 
 OPTION = "--simulate"
 KEEPER = "cli-simulation"  # the node that keeps the twin; `gemelo node list` leaves it out

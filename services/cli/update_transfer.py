@@ -14,14 +14,8 @@ from typing import Any, Protocol
 import msgspec
 from paho.mqtt import client as paho
 
-from gemelo.schemas.device_topics import topic
-from gemelo.services.cli.errors import CommandError, ExitCode
-from gemelo.services.cli.provision import BoardLine
-from gemelo.services.mqtt.access import BrokerAccess
-from gemelo.services.mqtt.client import MqttClient, is_failure
-from gemelo.services.mqtt.failures import denial
-from gemelo.services.runtime.firmware_update import PIECE, UpdateAck, UpdateStep, begin_content, update_frame
-from gemelo.services.runtime.serial_frames import (
+from gemelo.libraries.runtime.firmware_update import PIECE, UpdateAck, UpdateStep, begin_content, update_frame
+from gemelo.libraries.runtime.serial_frames import (
     JsonFrame,
     PacketDecoder,
     build_frame,
@@ -29,6 +23,12 @@ from gemelo.services.runtime.serial_frames import (
     parse_json_frame,
     sync_frame,
 )
+from gemelo.schemas.device_topics import topic
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.provision import BoardLine
+from gemelo.services.mqtt.access import BrokerAccess
+from gemelo.services.mqtt.client import MqttClient, is_failure
+from gemelo.services.mqtt.failures import denial
 
 ANSWER_TIME = 2.0  # [s] for a piece: the flash of a board erases and writes 4 kB in a tenth of that
 CHECK_TIME = 15.0  # [s] for the first and the last step, in which a signature or the whole image is checked

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from gemelo.libraries.runtime.running import running_robots
+from gemelo.libraries.runtime.started import choose_name, chosen_name, load_started
 from gemelo.services.cli.errors import CommandError, ExitCode, unknown, usage
 from gemelo.services.cli.parser import Options, Parser
-from gemelo.services.runtime.running import running_robots
-from gemelo.services.runtime.started import choose_name, chosen_name, load_started
 
 
 def add_options(parser: Parser) -> None:

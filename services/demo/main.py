@@ -17,10 +17,10 @@ from pathlib import Path
 import msgspec
 
 import gemelo
+from gemelo.libraries.runtime.deployment import load_deployment, project_root
+from gemelo.libraries.runtime.process.ending import ended_by_signals
 from gemelo.services.demo.performance import Performance
 from gemelo.services.demo.report import complaints, report_of, text_of
-from gemelo.services.runtime.deployment import load_deployment, project_root
-from gemelo.services.runtime.process.ending import ended_by_signals
 from gemelo.services.stack.results import new_results
 from gemelo.services.stack.stack import Stack, StackError
 

@@ -15,16 +15,16 @@ from gemelo.libraries.arm.cell.cell_file import Cell, load_cell
 from gemelo.libraries.arm.frames.transforms import compose, inverse, to_message
 from gemelo.libraries.arm.kinematics.chain import link_transforms
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime.application import service
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.node_clock import NodeClock
+from gemelo.libraries.runtime.process.priority import step_behind
 from gemelo.schemas.camera import CameraImage, CameraInfo
 from gemelo.schemas.cell import OnnxThing
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import CAMERA, GATEWAY, JOINT_STATES, camera_detections, camera_image, camera_info
-from gemelo.services.runtime.application import service
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.node_clock import NodeClock
-from gemelo.services.runtime.process.priority import step_behind
 
 if TYPE_CHECKING:
     from gemelo.services.detector.core import Detector

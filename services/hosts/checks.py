@@ -10,6 +10,7 @@ from pathlib import Path, PurePosixPath
 
 from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime.deployment import is_loopback
 from gemelo.programs.toml_lines import Where
 from gemelo.schemas.deployment import DeviceKind, Wire
 from gemelo.schemas.errors import ConfigurationError
@@ -20,7 +21,6 @@ from gemelo.services.hosts.certificates import AUTHORITY_FOLDER
 from gemelo.services.hosts.deployments import HOST
 from gemelo.services.hosts.layout import BROKER, OF_A_ROBOT, ROUTER
 from gemelo.services.hosts.site_file import Problems, nearest, read_site
-from gemelo.services.runtime.deployment import is_loopback
 
 USER = re.compile(r"[a-z_][a-z0-9_-]{0,31}")  # as useradd takes it
 ZONE = re.compile(r"[A-Za-z0-9_.-]{1,15}")  # an interface's name after the % of an IPv6 address (RFC 4007)

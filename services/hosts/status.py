@@ -8,12 +8,12 @@ from enum import StrEnum
 
 import msgspec
 
+from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.schemas.device import DeviceStatus
 from gemelo.schemas.roles import SERVICES
 from gemelo.schemas.site import Site
 from gemelo.schemas.system import NodeInfo
 from gemelo.services.hosts.layout import BROKER, ROUTER, processes
-from gemelo.services.runtime.clock_offset import ClockOffset
 
 DEVICE, VIEWER, VISUALIZER, GATEWAY = "virtual_esp32", "viewer", "visualizer", "stepper_gateway"
 

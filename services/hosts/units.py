@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gemelo.libraries.runtime.process.priority import AHEAD
 from gemelo.schemas.deployment import Wire
 from gemelo.schemas.site import Site
 from gemelo.services.hosts import firewall
@@ -9,7 +10,6 @@ from gemelo.services.hosts.deployments import environment
 from gemelo.services.hosts.firewall import FILE, UNIT_NAME, ports
 from gemelo.services.hosts.layout import FILES, TASKS, Process, processes
 from gemelo.services.hosts.quoting import systemd
-from gemelo.services.runtime.process.priority import AHEAD
 
 TARGET = "gemelo.target"
 UNIT = """\

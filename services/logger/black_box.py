@@ -10,6 +10,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from gemelo.libraries.runtime.bus.wire import MAX_PAYLOAD_OF
+from gemelo.libraries.runtime.process.own_files import own_folder
 from gemelo.schemas.message import Message, encode
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.topics import Delivery, Topic
@@ -29,8 +31,6 @@ from gemelo.services.recordings.incidents import (
 from gemelo.services.recordings.mcap_file import McapFile
 from gemelo.services.recordings.reader import BadRecording, RecordingReader
 from gemelo.services.recordings.view_layout import layout_metadata, layout_of
-from gemelo.services.runtime.bus.wire import MAX_PAYLOAD_OF
-from gemelo.services.runtime.process.own_files import own_folder
 
 SECOND = 1_000_000_000  # [ns]
 AFTERWARDS = 3 * SECOND  # [ns] that are waited for what follows an incident

@@ -13,10 +13,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from gemelo.libraries.runtime.process.own_files import own_folder
 from gemelo.services.logger.core import Batch, Logger
 from gemelo.services.logger.files import is_due, prune, stem_of
 from gemelo.services.logger.recording import Recording
-from gemelo.services.runtime.process.own_files import own_folder
 
 
 class LoggerParameters(msgspec.Struct, frozen=True, kw_only=True):

@@ -10,6 +10,8 @@ import msgspec
 
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint, urdf_of
+from gemelo.libraries.runtime.actions import keys
+from gemelo.libraries.runtime.requests.exchanges import PREFIX
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceEvent, DeviceMode, DeviceState
 from gemelo.schemas.frames import RobotDescription
@@ -22,8 +24,6 @@ from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, JOIN
 from gemelo.services.logger.incident_watch import STOPPED, Trigger
 from gemelo.services.recordings.channels import Entry
 from gemelo.services.recordings.incidents import BLACK_BOX, Happening, Incident, time_of
-from gemelo.services.runtime.actions import keys
-from gemelo.services.runtime.requests.exchanges import PREFIX
 
 SECOND = 1_000_000_000  # [ns]
 BEFORE, AFTER = 20, 20  # happenings that are told at most

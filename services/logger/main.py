@@ -6,6 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from gemelo.libraries.arm.cell.cell_file import deployed_cell
+from gemelo.libraries.runtime.application import service
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.priority import step_behind
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import Topic
@@ -17,10 +21,6 @@ from gemelo.services.recordings.channels import Entry
 from gemelo.services.recordings.incidents import FOLDER, Incident
 from gemelo.services.recordings.origin import metadata_of
 from gemelo.services.recordings.subscriptions import Subscriptions
-from gemelo.services.runtime.application import service
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.priority import step_behind
 
 # With those who supervise it the logger has 5 s to end. On a busy machine it comes after all others: 2 s are too few.
 GRACE = 4.0  # [s] to end the recording, the black box and the session

@@ -15,6 +15,11 @@ from pathlib import Path
 import viser
 
 import gemelo
+from gemelo.libraries.runtime.deployment import DeploymentError, exposure, load_deployment
+from gemelo.libraries.runtime.process.logs import LEVELS, line_logger
+from gemelo.libraries.runtime.process.ports import PortTaken, require_free
+from gemelo.libraries.runtime.process.readiness import tell_alive
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
 from gemelo.schemas.deployment import Deployment
 from gemelo.services.panel.model.operator import Operator
 from gemelo.services.panel.model.readings import Readings
@@ -23,11 +28,6 @@ from gemelo.services.panel.view.broken_connections import BrokenConnections
 from gemelo.services.panel.view.own_pages import OwnServer, own_pages_only
 from gemelo.services.panel.view.page import Page
 from gemelo.services.panel.view.world import DrawnWorld
-from gemelo.services.runtime.deployment import DeploymentError, exposure, load_deployment
-from gemelo.services.runtime.process.logs import LEVELS, line_logger
-from gemelo.services.runtime.process.ports import PortTaken, require_free
-from gemelo.services.runtime.process.readiness import tell_alive
-from gemelo.services.runtime.process.shutdown import ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
 
 NAME = "panel"
 APART = 0.02  # [s] at least from the beginning of one picture to the next, however much is dragged

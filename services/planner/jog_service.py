@@ -6,6 +6,9 @@ from collections.abc import Callable
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.actions.keys import status_topic
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JogCommand, JogStatus
 from gemelo.schemas.topics import (
@@ -21,9 +24,6 @@ from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.jog.jog import NEVER, PERIOD, SILENCE, STATUS_PERIOD, Jog, signed
 from gemelo.services.planner.jog.jog_log import JogLog, digest_of
 from gemelo.services.planner.scene.standing import version_of
-from gemelo.services.runtime.actions.keys import status_topic
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.topics import Latest
 
 
 class JogService:

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import FK, IK, STATE_VALIDITY, Request
@@ -13,8 +15,6 @@ from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
 from gemelo.services.planner.scene.answer_log import AnswerLog
 from gemelo.services.planner.scene.standing import version_of
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.topics import Latest
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)

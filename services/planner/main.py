@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.application import service
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.topics import JOINT_STATES
 from gemelo.services.planner.core import Planner
@@ -15,9 +18,6 @@ from gemelo.services.planner.scene.scene_keeper import SceneKeeper
 from gemelo.services.planner.workers.in_process import PlansInProcess
 from gemelo.services.planner.workers.plan_service import PlanMaker, PlanService
 from gemelo.services.planner.workers.workers import Present, Workers
-from gemelo.services.runtime.application import service
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.node import Node
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 RATE = 10.0  # [Hz] at which it says how plans stand; chosen: smooth for a person's eye

@@ -8,14 +8,14 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from gemelo.libraries.runtime.clock_offset import ClockOffset, measured
+from gemelo.libraries.runtime.endpoints import info_request, interfaces_request, parameters_request
+from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.requests.client import PendingCall
 from gemelo.schemas.message import Message
 from gemelo.schemas.system import Empty, Interfaces, NodeInfo, NodeRecord, NodeStatistics, Parameters
 from gemelo.schemas.topics import STATISTICS, Request
-from gemelo.services.runtime.clock_offset import ClockOffset, measured
-from gemelo.services.runtime.endpoints import info_request, interfaces_request, parameters_request
-from gemelo.services.runtime.errors import NoAnswer, RequestRefused
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.requests.client import PendingCall
 
 PERIOD = 5.0  # [s] between two questions to a node: it may have got a new topic
 GONE = 3.0 * PERIOD  # [s] without a word of a node, after which its place is another's

@@ -1,5 +1,5 @@
 """Recorded inputs through the core of one service again, and its outputs beside the recorded ones."""
 
-from gemelo.services.runtime.process.arithmetic import use_one_kernel
+from gemelo.libraries.runtime.process.arithmetic import use_one_kernel
 
 use_one_kernel()  # as the planner's process does

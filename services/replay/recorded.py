@@ -14,6 +14,7 @@ from typing import Any, Generic, TypeVar, cast
 import msgspec
 
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.message import Message
 from gemelo.schemas.scene import SceneMesh
 from gemelo.schemas.text_file import read_text
@@ -23,7 +24,6 @@ from gemelo.services.recordings.foreign import METADATA
 from gemelo.services.recordings.mcap_file import DEPLOYMENT, ROBOT
 from gemelo.services.recordings.reader import RecordingReader, Row
 from gemelo.services.recordings.table import described
-from gemelo.services.runtime.deployment import project_root
 
 M = TypeVar("M", bound=Message)
 

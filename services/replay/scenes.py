@@ -6,6 +6,7 @@ from msgspec.structs import replace
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.planning import SceneVersion
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.scene_meshes import with_meshes
@@ -13,7 +14,6 @@ from gemelo.schemas.topics import SCENE
 from gemelo.services.planner.collision.scene_shapes import SceneError
 from gemelo.services.planner.collision.world import World
 from gemelo.services.replay.recorded import Heard, NotReplayable, Recorded
-from gemelo.services.runtime.deployment import project_root
 
 
 class Scenes:

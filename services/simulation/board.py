@@ -14,9 +14,9 @@ from gemelo.firmware.platform.host.virtual_esp32 import VirtualEsp32
 from gemelo.firmware.platform.host.wires import Wires
 from gemelo.libraries.arm.device.device_config import reference_steps
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.process.readiness import Readiness
+from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.robot import Motor
-from gemelo.services.runtime.process.readiness import Readiness
-from gemelo.services.runtime.process.unwritten import UnwrittenFiles
 from gemelo.services.simulation.memory_wire import MemoryWire
 from gemelo.services.simulation.virtual_clock import VirtualClock
 

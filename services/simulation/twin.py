@@ -12,13 +12,13 @@ from msgspec.structs import replace
 
 from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Deployment, PathsSection, RouterSection
 from gemelo.schemas.robot import Motor
 from gemelo.schemas.simulation import WireConditions
 from gemelo.schemas.system import ParameterValue
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from gemelo.services.simulation.board import SimulatedBoard, keep_position
 from gemelo.services.simulation.memory_wire import MemoryWire
 from gemelo.services.simulation.virtual_clock import VirtualClock

@@ -22,7 +22,7 @@ from queue import Empty, SimpleQueue
 from types import FrameType
 from typing import TypeVar
 
-from gemelo.services.runtime.clock import DrivenLoop
+from gemelo.libraries.runtime.clock import DrivenLoop
 from gemelo.services.simulation.baton import Baton, VirtualCondition
 from gemelo.services.simulation.participants import IdleTime, Participant, Wait
 
@@ -56,7 +56,7 @@ class LoopTurns:
 
 
 class VirtualClock:
-    """The clock of one simulation; see `gemelo.services.runtime.clock.Clock`."""
+    """The clock of one simulation; see `gemelo.libraries.runtime.clock.Clock`."""
 
     is_virtual = True
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import psutil
 
-from gemelo.services.runtime.process.readiness import says_ready
+from gemelo.libraries.runtime.process.readiness import says_ready
 from gemelo.services.stack.compose import ProcessState
 
 LINES = 8  # of a log that are shown

@@ -17,10 +17,10 @@ from typing import Any
 
 import yaml
 
+from gemelo.libraries.runtime.deployment import forget_arms, load_deployment, overriding, project_root
+from gemelo.libraries.runtime.started import keep_started
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.errors import ConfigurationError
-from gemelo.services.runtime.deployment import forget_arms, load_deployment, overriding, project_root
-from gemelo.services.runtime.started import keep_started
 from gemelo.services.stack.arms import SHARED, StackedArm, deployment_file, file_of, left_out, stacked_arms
 from gemelo.services.stack.start_check import say_virtual, start_problems
 

@@ -10,13 +10,13 @@ from typing import TextIO
 from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm, require_motors
 from gemelo.libraries.arm.model.virtual_drive import NO_MOTORS
+from gemelo.libraries.runtime.deployment import exposure, forget_arms, load_deployment, project_root
+from gemelo.libraries.runtime.process.ports import PortTaken, require_free
+from gemelo.libraries.runtime.started import keep_started
 from gemelo.schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.services.mqtt.access import device_access, gateway_access
 from gemelo.services.mqtt.secure_folder import require_made
-from gemelo.services.runtime.deployment import exposure, forget_arms, load_deployment, project_root
-from gemelo.services.runtime.process.ports import PortTaken, require_free
-from gemelo.services.runtime.started import keep_started
 
 
 def start_problems(deployment: Deployment) -> list[str]:

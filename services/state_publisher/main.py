@@ -7,16 +7,16 @@ from typing import Annotated
 import msgspec
 
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime.application import service
+from gemelo.libraries.runtime.bus.wire import TooLarge
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.frames import RobotDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.text_file import read_text
 from gemelo.schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
-from gemelo.services.runtime.application import service
-from gemelo.services.runtime.bus.wire import TooLarge
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.node import Node
 from gemelo.services.state_publisher.core import StatePublisher
 
 FRESH = 0.5  # [s] a joint state counts as fresh: as long as the device waits for a heartbeat

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm, require_motors
+from gemelo.libraries.runtime.application import service
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.priority import step_ahead
 from gemelo.schemas.deployment import Deployment, DeviceKind, Wire
 from gemelo.schemas.robot import Dialect
-from gemelo.services.runtime.application import service
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.priority import step_ahead
 from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.inputs import BeganInput
 from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile, read_ledger

@@ -8,6 +8,10 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from gemelo.libraries.runtime.actions.server import ActionServer, GoalDecision, accept, refuse
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.parameters import ParameterSet
+from gemelo.libraries.runtime.requests.server import Pending
 from gemelo.schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlTake
 from gemelo.schemas.device import (
     ConfigureRequest,
@@ -43,10 +47,6 @@ from gemelo.schemas.topics import (
     JOINT_TARGETS,
     SCENE,
 )
-from gemelo.services.runtime.actions.server import ActionServer, GoalDecision, accept, refuse
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.parameters import ParameterSet
-from gemelo.services.runtime.requests.server import Pending
 from gemelo.services.stepper_gateway.control.control import seal
 from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict

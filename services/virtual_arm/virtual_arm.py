@@ -16,10 +16,10 @@ from gemelo.firmware.platform.host.board import DeviceClock
 from gemelo.libraries.arm.device.device_config import device_config, reference_steps
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.arm.model.gripper import gripper_unit
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.device_config import DeviceConfig
 from gemelo.schemas.message import Message, Vector
 from gemelo.schemas.robot import Motor
-from gemelo.services.runtime.deployment import project_root
 from gemelo.services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Kind, Moment
 
 UNIX = 1_700_000_000_000_000_000  # [ns] at the start of virtual time

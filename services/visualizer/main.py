@@ -10,17 +10,17 @@ from msgspec.structs import replace
 
 from gemelo.libraries.arm.cell.cell_file import deployed_cell
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.application import service
+from gemelo.libraries.runtime.deployment import deployments_beside, project_root, robot_name
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.node_clock import NodeClock
+from gemelo.libraries.runtime.process.priority import step_behind
+from gemelo.libraries.runtime.scene_meshes import SceneMeshes
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.frames import RobotDescription
 from gemelo.schemas.scene import MeshShape
 from gemelo.schemas.text_file import read_text
 from gemelo.schemas.topics import ANY, DESCRIPTION, LOG, SCENE
-from gemelo.services.runtime.application import service
-from gemelo.services.runtime.deployment import deployments_beside, project_root, robot_name
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.node_clock import NodeClock
-from gemelo.services.runtime.process.priority import step_behind
-from gemelo.services.runtime.scene_meshes import SceneMeshes
 from gemelo.services.visualizer.core import Visualizer
 from gemelo.services.visualizer.feeds import feeds
 from gemelo.services.visualizer.model.mesh_files import missing_meshes, scene_mesh

@@ -20,6 +20,9 @@ import rerun as rr
 
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.deployment import DeploymentError, project_root
+from gemelo.libraries.runtime.process.own_files import make_own
+from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.camera import CameraImage
 from gemelo.schemas.deployment import ViewerMode
 from gemelo.schemas.frames import RobotDescription
@@ -32,9 +35,6 @@ from gemelo.services.recordings.incidents import Incident, incident_in
 from gemelo.services.recordings.reader import BadRecording, RecordingReader, Row
 from gemelo.services.recordings.shadow import recorded_robot, shadow_folder, write_shadow
 from gemelo.services.recordings.view_layout import LAYOUT, ViewLayout
-from gemelo.services.runtime.deployment import DeploymentError, project_root
-from gemelo.services.runtime.process.own_files import make_own
-from gemelo.services.runtime.started import load_started
 from gemelo.services.visualizer.core import Visualizer
 from gemelo.services.visualizer.feeds import feeds
 from gemelo.services.visualizer.model.mesh_files import scene_mesh

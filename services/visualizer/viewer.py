@@ -21,13 +21,13 @@ from urllib.parse import quote
 
 from msgspec.structs import replace
 
+from gemelo.libraries.runtime.deployment import DeploymentError, exposure, load_deployment, project_root
+from gemelo.libraries.runtime.process.own_names import own_names
+from gemelo.libraries.runtime.process.ports import PortTaken, require_free
+from gemelo.libraries.runtime.process.priority import step_behind
+from gemelo.libraries.runtime.process.readiness import Readiness
+from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.deployment import Deployment, ViewerMode, ViewerSection
-from gemelo.services.runtime.deployment import DeploymentError, exposure, load_deployment, project_root
-from gemelo.services.runtime.process.own_names import own_names
-from gemelo.services.runtime.process.ports import PortTaken, require_free
-from gemelo.services.runtime.process.priority import step_behind
-from gemelo.services.runtime.process.readiness import Readiness
-from gemelo.services.runtime.process.unwritten import UnwrittenFiles
 from gemelo.services.visualizer.program.host_check import HostCheck, unguessable_host
 from gemelo.services.visualizer.program.rerun_program import rerun_binary, start, stop
 from gemelo.services.visualizer.program.screenshot import free_port

@@ -14,6 +14,9 @@ import pytest
 from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE, write_measured
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.deployment import load_deployment
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.camera import CameraCondition, CameraImage, CameraInfo, CameraStatus
 from gemelo.schemas.cell import Calibration, MeasuredCamera
 from gemelo.schemas.deployment import Deployment
@@ -22,9 +25,6 @@ from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import JOINT_STATES, camera_image, camera_info, camera_status, camera_truth
 from gemelo.services.camera.main import run
 from gemelo.services.camera.sources.source import encoded
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.deployment import load_deployment
-from gemelo.services.runtime.node import Node
 from tests.runtime.support import hear, until
 
 CELL = """

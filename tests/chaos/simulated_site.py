@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import cast
 
 import gemelo
+from gemelo.libraries.runtime.actions.keys import goal_request
+from gemelo.libraries.runtime.requests.exchanges import exchange_topic
 from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.device import DeviceState
 from gemelo.schemas.topics import DEVICE_STATE, FOLLOW_JOINT_TRAJECTORY
 from gemelo.services.chaos.site import ChaosSite
 from gemelo.services.chaos.slots import SlotFile
-from gemelo.services.runtime.actions.keys import goal_request
-from gemelo.services.runtime.requests.exchanges import exchange_topic
 
 
 class SeenSteps:

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime.deployment import DEFAULT_FILE, load_deployment, project_root
+from gemelo.libraries.runtime.saved_parameters import SavedParameters
 from gemelo.schemas.deployment import Wire
 from gemelo.services.chaos.site import ChaosSite, processes_of, with_wire
-from gemelo.services.runtime.deployment import DEFAULT_FILE, load_deployment, project_root
-from gemelo.services.runtime.saved_parameters import SavedParameters
 from gemelo.services.stack.stack import PROCESSES
 
 

@@ -10,6 +10,9 @@ import pytest
 import gemelo
 from gemelo.api.session import Session as ArmSession
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime.actions import accept, refuse
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.device import (
@@ -40,9 +43,6 @@ from gemelo.schemas.topics import (
 )
 from gemelo.services.cli.session import CommandSession
 from gemelo.services.planner.core import Planner
-from gemelo.services.runtime.actions import accept, refuse
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.node import Node
 from tests.runtime.support import RouterProcess, spinning
 
 MOVE_TIME = 0.4  # [s] that every goal takes here

@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.device import (
     ArmCommand,
     ConfigureRequest,
@@ -38,7 +39,6 @@ from gemelo.schemas.topics import (
     DEVICE_STOP,
     SENSORS,
 )
-from gemelo.services.runtime.node import Node
 
 TO_HOME = 0.15  # [s] for every joint
 

@@ -12,6 +12,9 @@ import cv2
 import numpy as np
 import pytest
 
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.deployment import load_deployment
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.camera import CameraCondition, CameraImage, CameraInfo, CameraStatus
 from gemelo.schemas.detections import Detection, Detections
 from gemelo.schemas.topics import camera_detections, camera_image, camera_info, camera_status
@@ -19,9 +22,6 @@ from gemelo.services.cli import camera
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.cli.session import CommandSession
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.deployment import load_deployment
-from gemelo.services.runtime.node import Node
 from tests.runtime.support import free_port
 
 PICTURE = cv2.imencode(".jpg", np.full((48, 64, 3), 60, np.uint8))[1].tobytes()

@@ -12,6 +12,8 @@ import threading
 import msgspec
 import pytest
 
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.device import (
     ArmCommand,
     DeviceConfiguration,
@@ -28,8 +30,6 @@ from gemelo.services.cli.errors import CommandError, ExitCode
 from gemelo.services.cli.forms import csv_lines, json_line
 from gemelo.services.cli.home import home
 from gemelo.services.cli.main import run
-from gemelo.services.runtime.bus.memory_bus import MemoryBus
-from gemelo.services.runtime.node import Node
 from tests.cli.pretend_device import PretendDevice
 from tests.runtime.support import spinning
 

@@ -10,6 +10,8 @@ from contextlib import contextmanager
 
 import pytest
 
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import FkRequest, IkRequest, PoseGoal
 from gemelo.schemas.topics import FK, IK
@@ -18,8 +20,6 @@ from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.cli.session import load_robot, reported
 from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
-from gemelo.services.runtime.bus.memory_bus import MemoryBus
-from gemelo.services.runtime.node import Node
 
 
 @pytest.fixture

@@ -152,8 +152,8 @@ def test_only_the_writer_of_a_topic_may_publish_on_it(session):
 
 
 def test_pub_stamps_what_has_no_stamp(session, network, deployment, capsys):
-    from gemelo.services.runtime.bus.memory_bus import MemoryBus
-    from gemelo.services.runtime.node import Node
+    from gemelo.libraries.runtime.bus.memory_bus import MemoryBus
+    from gemelo.libraries.runtime.node import Node
 
     heard = []
     with Node("listener", deployment, robot="rm1", bus=MemoryBus(network)) as listener:

@@ -12,6 +12,9 @@ import pytest
 
 import gemelo
 from gemelo.api import planning
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import NamedGoal, PlanPhase, PlanProgress, PlanRequest, PlanResponse
 from gemelo.schemas.scene import SceneReplace, SceneRequest
@@ -22,9 +25,6 @@ from gemelo.services.cli.move import move
 from gemelo.services.cli.terminal import LiveBlock
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.main import run
-from gemelo.services.runtime.bus.memory_bus import MemoryBus
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.planner.walled import WALLED, past_the_wall
 from tests.runtime.support import spinning
 

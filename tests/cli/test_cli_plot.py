@@ -10,6 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.frames import FrameTransforms
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.message import Message
@@ -21,8 +23,6 @@ from gemelo.services.cli.field_path import FieldPath
 from gemelo.services.cli.main import run
 from gemelo.services.cli.plot import Field, Plot, plot
 from gemelo.services.cli.terminal import COLOUR, LiveBlock, cut
-from gemelo.services.runtime.bus.memory_bus import MemoryBus
-from gemelo.services.runtime.node import Node
 from tests.runtime.support import spinning
 
 COLUMNS, ROWS = 60, 10

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import encode
 from gemelo.schemas.scene import (
@@ -32,8 +34,6 @@ from gemelo.services.cli.scene import attach_choices, pair_choices
 from gemelo.services.cli.session import load_robot, reported
 from gemelo.services.planner.scene.answer_log import AnswerLog
 from gemelo.services.planner.scene.scene_keeper import SceneKeeper
-from gemelo.services.runtime.bus.memory_bus import MemoryBus
-from gemelo.services.runtime.node import Node
 from tests.runtime.support import until
 
 Said = Callable[[str], ExitCode]

@@ -103,7 +103,7 @@ def test_a_robot_that_cannot_be_read_still_completes_the_commands(monkeypatch, c
                 "zenoh",
                 "gemelo.libraries.arm.model.description",
                 "gemelo.services.cli.move",
-                "gemelo.services.runtime.actions",
+                "gemelo.libraries.runtime.actions",
             ),
         ),
         (["move", "--help"], ("numpy", "zenoh", "rich", "gemelo.services.cli.jog")),

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
+from gemelo.libraries.runtime.robots import robots_on
 from gemelo.services.cli import state
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
-from gemelo.services.runtime.robots import robots_on
 from tests.runtime.support import RouterProcess
 
 

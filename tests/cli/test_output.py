@@ -11,6 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from gemelo.libraries.runtime.process.logs import line_logger
 from gemelo.schemas.plain_text import escaped, escaped_but_colours
 from gemelo.schemas.system import LogLevel, LogRecord
 from gemelo.services.cli.errors import ExitCode
@@ -19,7 +20,6 @@ from gemelo.services.cli.main import run
 from gemelo.services.cli.messages import dump
 from gemelo.services.cli.output import EscapedStream, control, escaped_output, print_coloured
 from gemelo.services.cli.terminal import LiveBlock
-from gemelo.services.runtime.process.logs import line_logger
 
 CLIPBOARD = "\x1b]52;c;cm0gLXJmIH4=\x07"  # what a terminal puts into its clipboard
 ATTACKS = (

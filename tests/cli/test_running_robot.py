@@ -12,6 +12,10 @@ from msgspec.structs import replace
 
 import gemelo
 from gemelo.libraries.arm.cell.cell_file import load_cell, read_cell_texts
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
+from gemelo.libraries.runtime.started import chosen_name
 from gemelo.schemas.cell import CellTexts
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.joints import JointState
@@ -21,10 +25,6 @@ from gemelo.services.cli.cells import cell_of
 from gemelo.services.cli.errors import CommandError, ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.cli.session import load_robot
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
-from gemelo.services.runtime.started import chosen_name
 from tests.runtime.support import RouterProcess, spinning
 
 ROOT = project_root()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.runtime.deployment import project_root
+from gemelo.libraries.runtime.deployment import project_root
 
 COMMON = """bash sh cat chmod cut dirname env find flock grep head ln mkdir mktemp mv
     rm sed sha256sum sleep sort touch tr uname"""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.runtime.deployment import project_root
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.stack.several_arms import words
 from gemelo.services.stack.stack import free_ports
 from tests.deploy.test_paths_in_words import tracked

@@ -10,8 +10,8 @@ from importlib.metadata import PackageNotFoundError, packages_distributions, req
 
 import pytest
 
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.hosts.layout import BROKER, SERVICES, extras
-from gemelo.services.runtime.deployment import project_root
 from tests.hosts.sites import EXAMPLE, site
 
 ROOT = project_root()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.runtime.deployment import project_root
+from gemelo.libraries.runtime.deployment import project_root
 from tests.optional import need
 
 FIRMWARE = project_root() / "firmware"

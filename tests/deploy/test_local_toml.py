@@ -6,8 +6,8 @@ import tomllib
 
 import msgspec
 
+from gemelo.libraries.runtime.deployment import load_deployment, project_root
 from gemelo.services.logger.disk import LoggerParameters
-from gemelo.services.runtime.deployment import load_deployment, project_root
 
 
 def test_the_example_of_a_parameter_is_one_that_the_logger_has(tmp_path):

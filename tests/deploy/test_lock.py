@@ -7,7 +7,7 @@ import tomllib
 
 import pytest
 
-from gemelo.services.runtime.deployment import project_root
+from gemelo.libraries.runtime.deployment import project_root
 
 ROOT = project_root()
 LOCKS = [ROOT / "requirements.lock", ROOT / "deploy/tools/uv.lock", ROOT / "deploy/tools/go.lock"]

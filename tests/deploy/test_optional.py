@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.runtime.deployment import project_root
+from gemelo.libraries.runtime.deployment import project_root
 from tests import optional
 
 ROOT = project_root()

@@ -11,7 +11,7 @@ from pathlib import PurePosixPath
 
 import pytest
 
-from gemelo.services.runtime.deployment import project_root
+from gemelo.libraries.runtime.deployment import project_root
 from tests.optional import need
 
 ROOT = project_root()

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.process.readiness import Readiness
-from gemelo.services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.process.readiness import Readiness
+from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from tests.runtime.support import until
 
 ROOT = project_root()
@@ -63,8 +63,8 @@ def test_the_local_deployment_has_the_default_folder(tmp_path):
 BEATS = """
 import sys, time
 from pathlib import Path
-from gemelo.services.runtime.process.readiness import Readiness
-from gemelo.services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.libraries.runtime.process.readiness import Readiness
+from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 readiness = Readiness(Path(sys.argv[1]), "gateway", UnwrittenFiles(print))
 while True:
     readiness.beat()

@@ -7,8 +7,8 @@ import tomllib
 
 import yaml
 
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.topics import ACTIONS, REQUESTS, TOPICS
-from gemelo.services.runtime.deployment import project_root
 from gemelo.services.stack.stack import PROCESSES
 
 ROOT = project_root()

@@ -15,15 +15,15 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.schemas.deployment import Deployment, DeviceKind, MqttSection, PanelSection, PathsSection, ViewerMode, Wire
-from gemelo.schemas.errors import ConfigurationError
-from gemelo.services.runtime.deployment import (
+from gemelo.libraries.runtime.deployment import (
     deployments_beside,
     load_deployment,
     project_root,
     robot_name,
 )
-from gemelo.services.runtime.started import deployment_of_arm
+from gemelo.libraries.runtime.started import deployment_of_arm
+from gemelo.schemas.deployment import Deployment, DeviceKind, MqttSection, PanelSection, PathsSection, ViewerMode, Wire
+from gemelo.schemas.errors import ConfigurationError
 from gemelo.services.stack.arms import deployment_file, file_of, stacked_arms
 from gemelo.services.stack.several_arms import compose_of, main, write
 from gemelo.services.stack.start_check import main as start_check

@@ -16,6 +16,9 @@ from gemelo.libraries.arm.cell.cell_file import Cell, load_cell
 from gemelo.libraries.arm.frames.transforms import compose, from_message, from_rpy, inverse, to_message
 from gemelo.libraries.arm.kinematics.chain import link_transforms
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.deployment import load_deployment
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.camera import CameraImage, CameraInfo
 from gemelo.schemas.cell import VirtualSource
 from gemelo.schemas.deployment import Deployment
@@ -28,9 +31,6 @@ from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
 from gemelo.services.camera.virtual.world import CameraWorld
 from gemelo.services.detector.images import NoPicture, decoded
 from gemelo.services.detector.main import Places, run
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.deployment import load_deployment
-from gemelo.services.runtime.node import Node
 from tests.runtime.support import hear, spinning
 from tests.runtime.test_clock_offset import Skewed
 

@@ -10,14 +10,14 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.actions import ActionServer, GoalDecision, accept
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
 from gemelo.schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, PLAN, STATIC_FRAMES
-from gemelo.services.runtime.actions import ActionServer, GoalDecision, accept
-from gemelo.services.runtime.node import Node
 from tests.runtime.support import ROOT, RouterProcess, programs, spinning, until
 from tests.table import table
 

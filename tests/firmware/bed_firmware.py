@@ -20,8 +20,8 @@ from bench_firmware import FIRST, LAST, Row, command, heartbeat, smooth, traj
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
+from gemelo.libraries.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 from gemelo.schemas.device import DeviceCommandKind, InjectKind
-from gemelo.services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 from tests.optional import need
 
 ROOT = Path(__file__).resolve().parents[2]

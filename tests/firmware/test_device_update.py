@@ -11,13 +11,7 @@ from bench_firmware import command
 from update_bed import NEWER, LossyWire, UpdateBed, an_image, silent_core
 
 from gemelo.firmware.platform.host.image import source_version, virtual_image
-from gemelo.schemas.device import DeviceCommandKind
-from gemelo.services.cli import device_update, update_transfer
-from gemelo.services.cli.errors import CommandError, ExitCode
-from gemelo.services.cli.main import run
-from gemelo.services.cli.provision import BAUD, open_line
-from gemelo.services.cli.update_transfer import SerialWire, Transfer, await_status
-from gemelo.services.runtime.firmware_update import (
+from gemelo.libraries.runtime.firmware_update import (
     HEADER,
     PIECE,
     VIRTUAL_CHIP,
@@ -28,7 +22,13 @@ from gemelo.services.runtime.firmware_update import (
     read_header,
     update_frame,
 )
-from gemelo.services.runtime.signatures import is_signed, make_key, sign
+from gemelo.libraries.runtime.signatures import is_signed, make_key, sign
+from gemelo.schemas.device import DeviceCommandKind
+from gemelo.services.cli import device_update, update_transfer
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.main import run
+from gemelo.services.cli.provision import BAUD, open_line
+from gemelo.services.cli.update_transfer import SerialWire, Transfer, await_status
 
 WHOLE: Callable[[int, bytes], list[bytes]] = lambda _, frame: [frame]  # noqa: E731
 

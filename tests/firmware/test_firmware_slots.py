@@ -14,7 +14,7 @@ from update_bed import NAME, ROOT, an_image, newer_core
 
 from gemelo.firmware.bindings.library import LIBRARY, LibraryMissing
 from gemelo.firmware.platform.host.firmware_slots import FirmwareSlots
-from gemelo.services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from tests.disks import WAYS, refusing_disk
 
 GONE = "replaced by a file"  # what was in the folder cannot be read either

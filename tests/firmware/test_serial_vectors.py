@@ -11,8 +11,8 @@ import pytest
 
 from gemelo.firmware.bindings.device import CoreDevice
 from gemelo.firmware.bindings.parsers import ConfigTextRefused, read_config
+from gemelo.libraries.runtime.serial_frames import PacketDecoder
 from gemelo.schemas.device_config import DeviceConfig
-from gemelo.services.runtime.serial_frames import PacketDecoder
 
 FOLDER = Path(__file__).resolve().parents[2] / "firmware/tests/vectors/serial"
 LINES = json.loads((FOLDER / "lines.json").read_text())

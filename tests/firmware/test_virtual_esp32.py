@@ -14,7 +14,7 @@ import pytest
 from bed_firmware import Bed, wait_for
 from bench_firmware import FIRST, LAST, seal, traj
 
-from gemelo.services.runtime.process.readiness import ALIVE
+from gemelo.libraries.runtime.process.readiness import ALIVE
 
 
 def test_the_device_answers_moves_and_leaves_in_order(bed: Bed):

@@ -18,9 +18,9 @@ from bench_firmware import BOOT, FIRST, LAST, command, heartbeat, seal, smooth, 
 from gemelo.firmware.bindings.device import CoreDevice
 from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode, InjectKind
 from gemelo.schemas.device_config import DeviceConfig, config_text
-from gemelo.services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 
 ACK, CMD_ACK, SYNC_R, STATE = 2, 4, 7, 8
 OK = 0

@@ -10,11 +10,11 @@ from bed_firmware import Bed, wait_for
 from update_bed import NEWER, an_image
 
 from gemelo.firmware.platform.host.flash import Flash, NetworkCredentials
+from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
+from gemelo.libraries.runtime.signatures import make_key
 from gemelo.schemas.device import DeviceCommandKind
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.runtime.process.unwritten import UnwrittenFiles
-from gemelo.services.runtime.signatures import make_key
 
 pytestmark = pytest.mark.full
 

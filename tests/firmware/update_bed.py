@@ -24,17 +24,17 @@ from gemelo.firmware.platform.host.pty import SerialLine
 from gemelo.firmware.platform.host.virtual_esp32 import VirtualEsp32
 from gemelo.firmware.platform.host.wires import Wires
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.firmware_update import UpdateAck
+from gemelo.libraries.runtime.process.readiness import Readiness
+from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
+from gemelo.libraries.runtime.serial_frames import packet
+from gemelo.libraries.runtime.signatures import make_key
 from gemelo.schemas.device import DeviceCommandKind
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.cli.provision import BAUD, open_line
 from gemelo.services.cli.update_transfer import SerialWire, UpdateStatus, UpdateWire, await_status
 from gemelo.services.mqtt.access import BrokerAccess
-from gemelo.services.runtime.firmware_update import UpdateAck
-from gemelo.services.runtime.process.readiness import Readiness
-from gemelo.services.runtime.process.unwritten import UnwrittenFiles
-from gemelo.services.runtime.serial_frames import packet
-from gemelo.services.runtime.signatures import make_key
 
 ROOT = Path(__file__).resolve().parents[2]
 NEWER = "1.0.9"  # as long as the version that it replaces in the library's bytes

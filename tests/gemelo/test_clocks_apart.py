@@ -15,14 +15,14 @@ from gemelo.api.scene import Scene
 from gemelo.api.seeing import Eyes
 from gemelo.api.session import Session
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.camera import CameraCondition, CameraStatus
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.detections import Detection, DetectionKind, Detections
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import JOINT_STATES, camera_detections, camera_status
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.node import Node
 from tests.runtime.support import spinning
 from tests.runtime.test_clock_offset import Skewed
 

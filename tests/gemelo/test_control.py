@@ -17,6 +17,13 @@ from gemelo.api import control_file
 from gemelo.api.control import Hold
 from gemelo.api.session import Session
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.actions.keys import goal_request, result_request
+from gemelo.libraries.runtime.bus.interface import BusReply
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.client_watch import RETURN, Absence
+from gemelo.libraries.runtime.errors import GoalRefused
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.actions import GoalRequest, GoalResponse, ResultRequest
 from gemelo.schemas.control import ControlAnswer, ControlState, ControlTake
 from gemelo.schemas.deployment import Deployment, PathsSection
@@ -26,13 +33,6 @@ from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from gemelo.schemas.system import Failure
 from gemelo.schemas.topics import CONTROL, CONTROL_TAKE, DEVICE_EVENTS, FOLLOW_JOINT_TRAJECTORY, GATEWAY_INPUTS, LOG
 from gemelo.services.cli.control import describe
-from gemelo.services.runtime.actions.keys import goal_request, result_request
-from gemelo.services.runtime.bus.interface import BusReply
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.client_watch import RETURN, Absence
-from gemelo.services.runtime.errors import GoalRefused
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.inputs import BeganInput, unpacked
 from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile

@@ -14,10 +14,10 @@ import gemelo
 from gemelo.firmware.bindings.device import CoreDevice
 from gemelo.libraries.arm.device.device_config import device_config, reference_steps
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.errors import GoalRefused
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from gemelo.schemas.topics import DEVICE_STATUS, FOLLOW_JOINT_TRAJECTORY
-from gemelo.services.runtime.errors import GoalRefused
 from gemelo.services.stepper_gateway.links.link import Kind, Received
 from tests.gemelo.test_control import Lab, refusal
 from tests.runtime.support import until

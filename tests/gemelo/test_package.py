@@ -107,7 +107,7 @@ def test_using_every_public_name_loads_no_slow_library(root: Path) -> None:
 def test_a_name_loads_its_own_part_alone(root: Path) -> None:
     loaded = loaded_by("assert gemelo.mm(250) == 0.25", root)
     assert "gemelo.api.units" in loaded
-    assert not {"gemelo.api.arm", "gemelo.services.runtime.node"} & loaded
+    assert not {"gemelo.api.arm", "gemelo.libraries.runtime.node"} & loaded
 
 
 def test_a_name_that_there_is_not_is_an_attribute_error() -> None:

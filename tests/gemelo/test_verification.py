@@ -12,8 +12,8 @@ import gemelo
 from gemelo.api.ledger import Requirement, read_ledger
 from gemelo.api.verification import far_side, is_passable, trip_of
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.ledger import StepLedger, VerifiedBy
-from gemelo.services.runtime.deployment import project_root
 
 RM1, PAROL6 = (load_arm(project_root() / "urdf" / name) for name in ("rm1", "parol6"))
 

@@ -6,13 +6,13 @@ import json
 import shutil
 from pathlib import Path
 
+from gemelo.libraries.runtime.bus.zenoh_config import locked_router
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.permissions import access_control
 from gemelo.schemas.deployment import RouterSection
 from gemelo.services.hosts.checks import load_site
 from gemelo.services.hosts.keys import make_keys
 from gemelo.services.hosts.layout import principals
-from gemelo.services.runtime.bus.zenoh_config import locked_router
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.permissions import access_control
 from tests.runtime.locks import HOST
 from tests.runtime.support import RouterProcess, free_port
 

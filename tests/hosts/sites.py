@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.site import Site
 from gemelo.services.hosts.checks import load_site
-from gemelo.services.runtime.deployment import project_root
 
 EXAMPLE = project_root() / "deploy/hosts/example.toml"
 

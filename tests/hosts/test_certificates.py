@@ -10,6 +10,8 @@ from contextlib import ExitStack
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Broker, MqttSection
 from gemelo.schemas.device import DeviceStatus
 from gemelo.schemas.topics import DEVICE_STATUS
@@ -18,8 +20,6 @@ from gemelo.services.credentials.authority import Authority
 from gemelo.services.credentials.expiry import DAY, expiry
 from gemelo.services.hosts.certificates import Certificate, days_by_host, endings, older, shown_at
 from gemelo.services.mqtt import secure_folder
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.hosts.site_router import SiteRouter
 from tests.runtime.locks import HOST, Lock, LockedRouter
 from tests.runtime.support import free_port, spinning

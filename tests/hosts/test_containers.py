@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.hosts.layout import extras
 from gemelo.services.hosts.render import rendered
-from gemelo.services.runtime.deployment import project_root
 from tests.hosts.sites import site
 
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.hosts.checks import load_site
 from gemelo.services.hosts.keys import make_keys
 from gemelo.services.hosts.render import write
-from gemelo.services.runtime.deployment import project_root
 from tests.runtime.support import free_port, until
 
 SITE = """

@@ -14,6 +14,8 @@ import zenoh
 from hypothesis import HealthCheck, example, given
 from hypothesis import strategies as st
 
+from gemelo.libraries.runtime.deployment import load_deployment, project_root
+from gemelo.libraries.runtime.process.readiness import GOES_ON
 from gemelo.schemas.site import Site
 from gemelo.services.hosts import install
 from gemelo.services.hosts.checks import load_site
@@ -22,8 +24,6 @@ from gemelo.services.hosts.firewall import UNIT_NAME, ports
 from gemelo.services.hosts.layout import Process, processes, robots
 from gemelo.services.hosts.render import rendered, write
 from gemelo.services.hosts.site_file import SiteError
-from gemelo.services.runtime.deployment import load_deployment, project_root
-from gemelo.services.runtime.process.readiness import GOES_ON
 from tests.hosts.sites import EXAMPLE, changed, escaped, site
 from tests.profiles import examples
 

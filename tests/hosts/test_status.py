@@ -8,6 +8,10 @@ from contextlib import ExitStack
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.runtime.clock_offset import ClockOffset
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.device import DeviceStatus
 from gemelo.schemas.roles import SERVICES
 from gemelo.schemas.system import NodeInfo
@@ -16,10 +20,6 @@ from gemelo.services.cli.deploy_status import summary
 from gemelo.services.cli.main import run
 from gemelo.services.hosts.checks import load_site
 from gemelo.services.hosts.status import SeenNode, SeenRobot, ServiceState, is_well, site_status
-from gemelo.services.runtime.clock_offset import ClockOffset
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.hosts.sites import EXAMPLE
 from tests.runtime.support import RouterProcess, spinning
 

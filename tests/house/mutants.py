@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[2]
 ROOMS = {  # what is mutated: the tests that can see it, those that run first before the others
     "services/stepper_gateway": ("tests/stepper_gateway", "tests/simulation", "tests/replay"),
     "services/planner": ("tests/planner", "tests/simulation", "tests/replay"),
-    "services/runtime": ("tests/runtime", "tests/simulation", "tests/stepper_gateway"),
+    "libraries/runtime": ("tests/runtime", "tests/simulation", "tests/stepper_gateway"),
     "firmware/core": ("tests/firmware", "tests/stepper_gateway", "tests/simulation"),
 }
 NOT_COPIED = (".git", ".venv", ".gemelo", "out", ".mypy_cache", ".ruff_cache", ".pytest_cache", "__pycache__")

@@ -26,7 +26,7 @@ from tests.house.counts import (
 KEPT = {
     "gemelo.services.planner.parameters": "as the parameters of every service",
     "gemelo.services.panel.view.pick_box": "a part of the page, as all its boxes",
-    "gemelo.services.runtime.process.freed_memory": "the C library's heap, apart from the main of services",
+    "gemelo.libraries.runtime.process.freed_memory": "the C library's heap, apart from the main of services",
     "gemelo.services.stepper_gateway.ledger.reasons": "the sentences, apart from the arithmetic",
 }
 LOOKERS = ("tests/", "services/bench/", "services/chaos/", "services/demo/", "docs/", "examples/")

@@ -34,5 +34,5 @@ def test_a_mutation_of_another_text_is_refused():
 
 
 def test_the_tests_that_name_a_module_run_first():
-    [mutation] = [each for each in draw(400, 7) if each.path == "services/runtime/client_watch.py"][:1]
+    [mutation] = [each for each in draw(400, 7) if each.path == "libraries/runtime/client_watch.py"][:1]
     assert "tests/runtime/test_client_watch.py" in near(mutation)

@@ -14,6 +14,9 @@ from mcap.records import Chunk
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader, breakup_chunk
 
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.errors import NodeNameTaken
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.frames import RobotDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import decode, encode
@@ -30,9 +33,6 @@ from gemelo.services.recordings.reader import BadRecording, RecordingReader
 from gemelo.services.recordings.repair import repair
 from gemelo.services.recordings.shadow import recorded_robot, write_shadow
 from gemelo.services.recordings.table import exchanges_of, recorded_topics
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.errors import NodeNameTaken
-from gemelo.services.runtime.node import Node
 from gemelo.services.visualizer.program.rerun_program import rerun_binary
 from tests.schemas.samples import sample
 from tests.table import table

@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.topics import Publisher
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.system import NodeInfo, NodeRecord, NodeStatistics, Parameter
 from gemelo.schemas.topics import STATISTICS
@@ -18,9 +21,6 @@ from gemelo.services.recordings.contents import contents_of
 from gemelo.services.recordings.mcap_file import CLOCKS, McapFile
 from gemelo.services.recordings.reader import RecordingReader
 from gemelo.services.recordings.table import NODES
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.topics import Publisher
 from tests.runtime.support import hear, spinning
 from tests.runtime.test_clock_offset import Skewed
 

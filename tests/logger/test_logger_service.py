@@ -22,6 +22,12 @@ from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.actions import accept
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.deployment import load_deployment
+from gemelo.libraries.runtime.endpoints import parameter_request
+from gemelo.libraries.runtime.errors import RequestRefused
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import (
     DeviceCommandRequest,
@@ -57,12 +63,6 @@ from gemelo.schemas.topics import (
 )
 from gemelo.services.logger.main import run
 from gemelo.services.planner.scene.scene_store import SceneStore
-from gemelo.services.runtime.actions import accept
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.deployment import load_deployment
-from gemelo.services.runtime.endpoints import parameter_request
-from gemelo.services.runtime.errors import RequestRefused
-from gemelo.services.runtime.node import Node
 from gemelo.services.visualizer.render.outputs import VisualizerParameters
 
 ROOT = Path(__file__).parents[2]
@@ -349,7 +349,7 @@ def process(module, environment, *arguments):
 def test_kill_9_of_the_service_leaves_a_file_that_can_be_read(environment, deployment, tmp_path):
     run_folder = tmp_path / "run"
     with (
-        process("gemelo.services.runtime.router", environment),
+        process("gemelo.libraries.runtime.router", environment),
         process("gemelo.services.logger.main", environment) as logger,
     ):
         wait_for(lambda: (run_folder / "logger.ready").exists())
@@ -382,7 +382,7 @@ def recorded_events(records):
 
 def test_sigterm_ends_it_with_a_finished_file(environment, deployment, tmp_path):
     with (
-        process("gemelo.services.runtime.router", environment),
+        process("gemelo.libraries.runtime.router", environment),
         process("gemelo.services.logger.main", environment) as logger,
     ):
         wait_for(lambda: (tmp_path / "run" / "logger.ready").exists(), HANGS)

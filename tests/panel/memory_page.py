@@ -15,6 +15,10 @@ from unittest import mock
 import gemelo
 from gemelo.api.session import Session
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime import topics
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.deployment import load_deployment
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.device import (
     DeviceCommandResponse,
     DeviceMode,
@@ -29,10 +33,6 @@ from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS, DEVICE_STOP, FK, JOINT_STATES, SCENE, STEP_ERRORS
 from gemelo.services.bench.bare_browser import BareBrowser, Said, bare_browser
 from gemelo.services.panel.main import TEXTS, Panel
-from gemelo.services.runtime import topics
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.deployment import load_deployment
-from gemelo.services.runtime.node import Node
 from tests.runtime.support import free_port, spinning, until
 
 ROOT = Path(__file__).parents[2]

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import gemelo
+from gemelo.libraries.runtime.deployment import load_deployment
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.joints import JointState
 from gemelo.services.bench.bare_browser import BareBrowser, Said, bare_browser
 from gemelo.services.panel.main import Panel
@@ -15,8 +17,6 @@ from gemelo.services.panel.view.browser import STOP_SIGN
 from gemelo.services.panel.view.page import Page
 from gemelo.services.panel.view.world import DrawnWorld
 from gemelo.services.panel.words.en import ENGLISH
-from gemelo.services.runtime.deployment import load_deployment
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.panel.person import until
 
 HELD_RATE = 20.0  # [Hz]

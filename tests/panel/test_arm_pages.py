@@ -9,10 +9,10 @@ import pytest
 import viser
 from playwright.sync_api import Browser, expect
 
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.deployment import Deployment, PanelSection, PathsSection
 from gemelo.services.panel.view.arm_pages import ArmPage, arm_pages, arms_line
 from gemelo.services.panel.words.words import Words
-from gemelo.services.runtime.deployment import project_root
 from gemelo.services.stack.arms import stacked_arms
 from gemelo.services.stack.several_arms import write
 from gemelo.services.stack.stack import free_ports

@@ -12,13 +12,13 @@ import viser
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from gemelo.libraries.runtime.process.logs import line_logger
+from gemelo.libraries.runtime.process.own_names import own_names
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Deployment, PanelSection
 from gemelo.services.panel.main import run
 from gemelo.services.panel.view.broken_connections import BrokenConnections
 from gemelo.services.panel.view.own_pages import OwnServer, objection, own_pages_only
-from gemelo.services.runtime.process.logs import line_logger
-from gemelo.services.runtime.process.own_names import own_names
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.panel.person import until
 
 PROTOCOL = [f"viser-v{viser.__version__}"]

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.services.panel.words.words import NAMES, TABLES
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.panel.memory_page import MemoryPage, memory_page
 from tests.panel.person import PATIENCE, Person, until
 

@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import expect
 
 import gemelo
-from gemelo.services.runtime.deployment import project_root
+from gemelo.libraries.runtime.deployment import project_root
 from tests.panel.person import BLUE, Person, until
 
 ARM = "brazo_joint"

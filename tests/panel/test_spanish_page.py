@@ -93,7 +93,7 @@ PARTS = [
     *(f"services/stepper_gateway/{room}" for room in ("goals", "device", "control", "gripper", "motion", "core.py")),
     *(f"services/planner/{room}" for room in ("jog", "jog_service.py", "scene")),
     *("services/planner/collision/scene_shapes.py", "services/planner/collision/arm_geometry.py"),
-    *("services/runtime/requests/client.py", "services/runtime/requests/limits.py", "libraries/arm/stl.py"),
+    *("libraries/runtime/requests/client.py", "libraries/runtime/requests/limits.py", "libraries/arm/stl.py"),
     *("services/panel/model", "gemelo"),
 ]
 WITHIN_OTHERS = {  # parts of sentences, which are tested as a whole below

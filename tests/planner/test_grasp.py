@@ -16,6 +16,7 @@ from gemelo.libraries.arm.frames.transforms import Rigid, compose, from_message,
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.arm.model.gripper import JAWS, jaw_objects, jaws_apart
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.joints import JointState
@@ -42,7 +43,6 @@ from gemelo.services.planner.collision.scene_shapes import shape_of
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.scene.grasp import width_of
 from gemelo.services.planner.scene.scene_store import SceneStore
-from gemelo.services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner
 from tests.planner.test_scene_node import edit
 from tests.profiles import examples

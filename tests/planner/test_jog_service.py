@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JogCommand, NamedGoal, PlanCode, PlanRequest, PlanResponse
 from gemelo.schemas.topics import JOG, JOG_STATUS, JOINT_STATES, JOINT_TARGETS, PLAN
-from gemelo.services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner
 
 TURN = JogCommand(name=("brazo_joint",), velocity=(0.3,))

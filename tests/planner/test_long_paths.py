@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.bus.wire import encoded
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.motion import MOST_POINTS
 from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, Refusal, WaypointGoal
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.workers.plan_service import sendable
-from gemelo.services.runtime.bus.wire import encoded
 
 LIMIT = 60.0  # [s] of the processor; twenty times what it takes
 

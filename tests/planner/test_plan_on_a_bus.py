@@ -12,15 +12,15 @@ from queue import SimpleQueue
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.errors import NoAnswer
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.planning import NamedGoal, PlanCancel, PlanCode, PlanPhase, PlanProgress, PlanRequest, PlanResponse
 from gemelo.schemas.scene import SceneClear, SceneReplace, SceneRequest
 from gemelo.schemas.topics import PLAN, PLAN_CANCEL, PLAN_PROGRESS, SCENE_EDIT
 from gemelo.services.planner.main import run
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.errors import NoAnswer
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.planner.walled import WALLED, past_the_wall
 
 PATIENCE = 60.0  # [s]

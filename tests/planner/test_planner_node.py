@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import FkRequest, IkRequest, NamedGoal, PlanCode, PlanRequest, PoseGoal
 from gemelo.schemas.topics import FK, IK, JOINT_STATES, PLAN, PLANNED_PATH
-from gemelo.services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint
@@ -30,7 +31,6 @@ from gemelo.schemas.scene import (
 )
 from gemelo.schemas.topics import CONTACTS, JOINT_STATES, PLAN, SCENE, SCENE_EDIT
 from gemelo.services.planner.scene.scene_file import load_scene, save_scene
-from gemelo.services.runtime.node import Node
 from tests.planner.planning_node import beside_a_planner
 
 WAIT = 5.0  # [s]

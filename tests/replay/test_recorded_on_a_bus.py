@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.joints import JointState
@@ -13,7 +14,6 @@ from gemelo.schemas.scene import SceneAdd, SceneClear, SceneObject, SceneRequest
 from gemelo.schemas.topics import GRIPPER_STATE, PLAN, SCENE_EDIT
 from gemelo.services.replay.main import replay, text_of
 from gemelo.services.replay.planner import PLANS, UNPLANNED
-from gemelo.services.runtime.node import Node
 from tests.replay.recorded_bus import PATIENCE, Recorder
 
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
 from gemelo.schemas.deployment import Deployment, PathsSection
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
 from tests.runtime.support import Buses, RouterProcess
 
 

@@ -9,10 +9,10 @@ import json
 import sys
 import time
 
+from gemelo.libraries.runtime.bus.interface import Arrival
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.deployment import load_deployment
 from gemelo.schemas.topics import Delivery
-from gemelo.services.runtime.bus.interface import Arrival
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.deployment import load_deployment
 
 KEYS, PAYLOAD = 12, 900  # [bytes]: more in a second than the socket of a link takes
 PERIOD = 0.02  # [s]

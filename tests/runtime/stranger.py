@@ -13,8 +13,8 @@ import time
 
 import zenoh
 
-from gemelo.services.runtime.bus.zenoh_config import client_config
-from gemelo.services.runtime.deployment import load_deployment
+from gemelo.libraries.runtime.bus.zenoh_config import client_config
+from gemelo.libraries.runtime.deployment import load_deployment
 
 GARBAGE = b"GET / HTTP/1.1\r\n\r\n"
 JOIN_PERIOD = 0.3  # [s]

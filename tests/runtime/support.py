@@ -13,11 +13,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from gemelo.libraries.runtime.bus.interface import Bus
+from gemelo.libraries.runtime.bus.zenoh_bus import router_answers
+from gemelo.libraries.runtime.bus.zenoh_config import router_config
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.deployment import Deployment, PathsSection, RouterSection
-from gemelo.services.runtime.bus.interface import Bus
-from gemelo.services.runtime.bus.zenoh_bus import router_answers
-from gemelo.services.runtime.bus.zenoh_config import router_config
-from gemelo.services.runtime.node import Node
 
 ROOT = Path(__file__).parents[2]
 ZENOHD = "GEMELO_TEST_ZENOHD"  # the path of a zenohd that takes the router's place; see deploy/try_zenohd
@@ -72,7 +72,7 @@ class RouterProcess:
         self.start()
 
     def start(self) -> None:
-        command = [sys.executable, "-m", "gemelo.services.runtime.router"]
+        command = [sys.executable, "-m", "gemelo.libraries.runtime.router"]
         if os.environ.get(ZENOHD):
             command = zenohd(self.port, self.folder, self.environ.get("GEMELO_ROUTER_CONFIGURATION", ""))
         self.process = subprocess.Popen(command, cwd=ROOT, env=self.environ, stderr=subprocess.PIPE, text=True)

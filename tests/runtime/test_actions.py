@@ -9,6 +9,10 @@ from contextlib import contextmanager
 import msgspec
 import pytest
 
+from gemelo.libraries.runtime.actions import ActionServer, GoalDecision, accept, refuse
+from gemelo.libraries.runtime.actions import keys as keys
+from gemelo.libraries.runtime.errors import GoalRefused, NoAnswer, RequestRefused, ServerLost
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.actions import GoalStatusCode, ResultRequest
 from gemelo.schemas.message import encode
 from gemelo.schemas.motion import (
@@ -19,10 +23,6 @@ from gemelo.schemas.motion import (
     JointTrajectory,
 )
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from gemelo.services.runtime.actions import ActionServer, GoalDecision, accept, refuse
-from gemelo.services.runtime.actions import keys as keys
-from gemelo.services.runtime.errors import GoalRefused, NoAnswer, RequestRefused, ServerLost
-from gemelo.services.runtime.node import Node
 from tests.runtime.support import Buses, hear, spinning, until
 
 Result = FollowJointTrajectoryResult
@@ -228,7 +228,7 @@ def test_a_restarted_server_does_not_know_the_goal(buses: Buses) -> None:
 
 
 def test_a_client_that_was_busy_itself_does_not_give_up(buses: Buses, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gemelo.services.runtime.actions.goal_handle.SERVER_TIMEOUT", 0.8)
+    monkeypatch.setattr("gemelo.libraries.runtime.actions.goal_handle.SERVER_TIMEOUT", 0.8)
     with moving(buses):
         node = buses.node("client")
         handle = node.action(FOLLOW).send(goal_of(110))

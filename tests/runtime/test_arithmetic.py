@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from gemelo.services.runtime.process.arithmetic import KERNEL, VARIABLE
+from gemelo.libraries.runtime.process.arithmetic import KERNEL, VARIABLE
 
 CHOSEN = f"""
 import ctypes, os

@@ -16,19 +16,19 @@ import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.runtime.bus import branches, identity
+from gemelo.libraries.runtime.bus.branches import address_of, branch_of, name_in, read_under, served_under, writer_at
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.bus.zenoh_declarations import encoding_of
+from gemelo.libraries.runtime.endpoints import info_request
+from gemelo.libraries.runtime.errors import NoAnswer, NodeNameTaken
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.deployment import Deployment, PathsSection, RouterSection
 from gemelo.schemas.message import encode
 from gemelo.schemas.roles import ROLE_OF_NODE, ROLES, SERVICES
 from gemelo.schemas.system import Empty, NodeInfo, NodeStatistics
 from gemelo.schemas.topics import JOG, JOINT_TARGETS, STATISTICS, Topic
-from gemelo.services.runtime.bus import branches, identity
-from gemelo.services.runtime.bus.branches import address_of, branch_of, name_in, read_under, served_under, writer_at
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.bus.zenoh_declarations import encoding_of
-from gemelo.services.runtime.endpoints import info_request
-from gemelo.services.runtime.errors import NoAnswer, NodeNameTaken
-from gemelo.services.runtime.node import Node
 from tests.runtime.locks import Lock, LockedRouter, sessions
 from tests.runtime.support import RouterProcess, hear, spinning, until
 

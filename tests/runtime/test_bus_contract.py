@@ -6,9 +6,9 @@ import threading
 import time
 from queue import SimpleQueue
 
+from gemelo.libraries.runtime.bus.interface import UNREAD, Arrival, BusReply, Query
+from gemelo.libraries.runtime.bus.zenoh_bus import HEARTBEAT
 from gemelo.schemas.topics import EVERY, LATCHED, LATEST
-from gemelo.services.runtime.bus.interface import UNREAD, Arrival, BusReply, Query
-from gemelo.services.runtime.bus.zenoh_bus import HEARTBEAT
 from tests.runtime.support import Buses, until
 
 

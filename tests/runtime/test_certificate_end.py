@@ -15,21 +15,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from gemelo.libraries.runtime.certificate_watch import CertificateWatch
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.topics import LOG
 from gemelo.services.credentials.authority import Authority, openssl
 from gemelo.services.credentials.expiry import CERTIFICATE, DAY, expiries, expiry, not_after
 from gemelo.services.credentials.private_files import AccessError
 from gemelo.services.mqtt import secure_folder
-from gemelo.services.runtime.certificate_watch import CertificateWatch
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.optional import need
 from tests.runtime.locks import Lock, LockedRouter
 from tests.runtime.support import ROOT, free_port, hear, spinning, until
 
 TOLD = "ends in 12 days, and every link with it"
 A_SHORT_DAY = """
-from gemelo.services.runtime import certificate_watch
+from gemelo.libraries.runtime import certificate_watch
 certificate_watch.PERIOD = 0.1
 from {module} import main
 raise SystemExit(main())
@@ -125,7 +125,7 @@ def lock(tmp_path_factory: pytest.TempPathFactory) -> Lock:
 def test_a_node_that_runs_says_it_again_on_the_bus_and_in_its_info(
     lock: Lock, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gemelo.services.runtime.certificate_watch.PERIOD", 0.1)
+    monkeypatch.setattr("gemelo.libraries.runtime.certificate_watch.PERIOD", 0.1)
     router = LockedRouter(tmp_path / "router", lock)
     nodes = [
         Node(name, replace(router.deployment, router=router.section(name)), robot="rm1", stop=ShutdownRequest())
@@ -160,7 +160,7 @@ def a_day_is_short(module: str, log: Path, **environ: str) -> Iterator[Path]:
 def test_a_router_that_runs_says_it_again(lock: Lock, tmp_path: Path) -> None:
     port = free_port()
     settings = {"GEMELO_ROUTER_CONFIGURATION": str(lock.write_router(port)), "GEMELO_PATHS_RUN": str(tmp_path / "run")}
-    with a_day_is_short("gemelo.services.runtime.router", tmp_path / "log", **settings) as log:
+    with a_day_is_short("gemelo.libraries.runtime.router", tmp_path / "log", **settings) as log:
         assert until(lambda: log.read_text().count(f"router.pem {TOLD}") >= 2, 20.0), log.read_text()
 
 

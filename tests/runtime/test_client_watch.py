@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from gemelo.services.runtime.client_watch import FIRST_SIGHT, LINGER, MAX_IDLE, RETURN, SETTLE, Absence, ClientWatch
+from gemelo.libraries.runtime.client_watch import FIRST_SIGHT, LINGER, MAX_IDLE, RETURN, SETTLE, Absence, ClientWatch
 
 
 class Tokens:

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.clock_offset import DRIFT, ClockOffset, best, measured
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.node_clock import NodeClock, ask_about
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.system import NodeInfo
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.clock_offset import DRIFT, ClockOffset, best, measured
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.node_clock import NodeClock, ask_about
 from tests.runtime.support import hear, spinning, until
 
 SECOND = 1_000_000_000

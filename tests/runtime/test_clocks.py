@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
 from gemelo.schemas.topics import Delivery
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
 from tests.runtime.support import ROOT, until
 
 SHIFTED_CLOCK = r"""
@@ -33,8 +33,8 @@ import sys, time
 import zenoh
 from gemelo.schemas.deployment import RouterSection
 from gemelo.schemas.topics import Delivery
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.bus.zenoh_config import client_config
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.bus.zenoh_config import client_config
 section = RouterSection(port=int(sys.argv[1]))
 bus, beside = ZenohBus(section, "rm1"), zenoh.open(client_config(section, "rm1"))
 say = lambda arrival: print(arrival.payload.decode(), flush=True)

@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 import msgspec
 import pytest
 
+from gemelo.libraries.runtime.actions import GoalDecision, accept, keys
+from gemelo.libraries.runtime.actions.coming_goals import MOST_BYTES
+from gemelo.libraries.runtime.bus.interface import Bus, BusReply
+from gemelo.libraries.runtime.errors import RequestRefused
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.requests.server import Pending
 from gemelo.schemas.actions import CancelRequest, GoalRequest
 from gemelo.schemas.device import DeviceCommandResponse, DeviceStopRequest
 from gemelo.schemas.message import BadMessage, decode, encode
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory
 from gemelo.schemas.topics import DEVICE_STOP
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from gemelo.services.runtime.actions import GoalDecision, accept, keys
-from gemelo.services.runtime.actions.coming_goals import MOST_BYTES
-from gemelo.services.runtime.bus.interface import Bus, BusReply
-from gemelo.services.runtime.errors import RequestRefused
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.requests.server import Pending
 from tests.runtime.support import Buses, spinning, until
 
 GOAL, CANCEL = keys.goal_request(FOLLOW).key, keys.cancel_request(FOLLOW).key
@@ -144,7 +144,7 @@ def test_more_bytes_than_may_wait_behind_a_long_goal_are_refused_with_the_limit(
     buses: Buses, reader: Reader, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert MOST_BYTES > 1000
-    monkeypatch.setattr("gemelo.services.runtime.actions.coming_goals.MOST_BYTES", 1000)
+    monkeypatch.setattr("gemelo.libraries.runtime.actions.coming_goals.MOST_BYTES", 1000)
     client, node = buses.open(), buses.node("client")
     with spinning(reader.node, reader.step, rate=200.0):
         assert client.wait_served(GOAL, 5.0)

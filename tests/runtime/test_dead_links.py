@@ -15,10 +15,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from gemelo.services.runtime.bus import dead_links
-from gemelo.services.runtime.bus.dead_links import UNACKNOWLEDGED_MS
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.bus.zenoh_config import locked_router
+from gemelo.libraries.runtime.bus import dead_links
+from gemelo.libraries.runtime.bus.dead_links import UNACKNOWLEDGED_MS
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.bus.zenoh_config import locked_router
 from tests.optional import need_root
 from tests.runtime.locks import Lock
 from tests.runtime.support import ROOT, RouterProcess, until
@@ -112,7 +112,7 @@ def far(tmp_path_factory) -> Iterator[tuple[Ethernet, dict[str, Far]]]:
     with ExitStack() as closing:
         hosts = closing.enter_context(Hosts(SITE, ethernet))
         server = closing.enter_context(subprocess.Popen(
-            hosts.command("router", sys.executable, "-m", "gemelo.services.runtime.router"), cwd=ROOT,
+            hosts.command("router", sys.executable, "-m", "gemelo.libraries.runtime.router"), cwd=ROOT,
             env=os.environ | paths | {f"GEMELO_ROUTER_{name}": value for name, value in own.items()},
         ))  # fmt: skip
         closing.callback(server.kill)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime.deployment import DeploymentError, load_deployment, project_root, robot_name, when_silent
 from gemelo.schemas.deployment import Broker, MqttSection
-from gemelo.services.runtime.deployment import DeploymentError, load_deployment, project_root, robot_name, when_silent
 
 
 @pytest.fixture

@@ -3,6 +3,13 @@
 import msgspec
 import pytest
 
+from gemelo.libraries.runtime.actions import accept, keys
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.bus.wire import MAX_PAYLOAD, MAX_PAYLOAD_OF
+from gemelo.libraries.runtime.endpoints import info_request
+from gemelo.libraries.runtime.errors import RequestRefused
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.requests.exchanges import exchange_topic
 from gemelo.schemas.actions import GoalEnd, GoalStatusCode
 from gemelo.schemas.device import DeviceCommandRequest, DeviceCommandResponse, DeviceStopRequest
 from gemelo.schemas.message import decode
@@ -17,13 +24,6 @@ from gemelo.schemas.topics import (
     REQUESTS,
     TOPICS,
 )
-from gemelo.services.runtime.actions import accept, keys
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.bus.wire import MAX_PAYLOAD, MAX_PAYLOAD_OF
-from gemelo.services.runtime.endpoints import info_request
-from gemelo.services.runtime.errors import RequestRefused
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.requests.exchanges import exchange_topic
 from tests.runtime.support import spinning, until
 
 

@@ -9,7 +9,7 @@ import pytest
 
 HOLES = """
 import resource, time
-from gemelo.services.runtime.process.freed_memory import give_back_freed_memory
+from gemelo.libraries.runtime.process.freed_memory import give_back_freed_memory
 
 def resident():
     with open("/proc/self/statm") as file:
@@ -33,7 +33,7 @@ def test_holes_of_the_heap_are_given_back_while_the_process_goes_on() -> None:
 
 CIRCLES = """
 import gc, time, weakref
-from gemelo.services.runtime.process.freed_memory import give_back_freed_memory
+from gemelo.libraries.runtime.process.freed_memory import give_back_freed_memory
 
 class Circle:
     def __init__(self):
@@ -56,7 +56,7 @@ def test_circles_that_nobody_holds_are_freed_while_the_process_goes_on() -> None
 
 HEAPS = """
 import ctypes, sys, threading
-from gemelo.services.runtime.process.freed_memory import give_back_freed_memory
+from gemelo.libraries.runtime.process.freed_memory import give_back_freed_memory
 
 if "shared" in sys.argv:
     give_back_freed_memory()

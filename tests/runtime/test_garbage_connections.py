@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.runtime.bus.interface import BusReply
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.bus.interface import BusReply
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
 from tests.runtime.locks import HOST, Lock, LockedRouter
 from tests.runtime.support import ROOT, until
 

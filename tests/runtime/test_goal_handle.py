@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
+from gemelo.libraries.runtime.actions import keys as keys
+from gemelo.libraries.runtime.actions.goal_handle import GoalHandle
+from gemelo.libraries.runtime.bus.interface import Query
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.bus.wire import schema_of, to_payload
+from gemelo.libraries.runtime.loop.loop import Loop
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.actions import CancelResponse, GoalStatus, GoalStatusCode, GoalStatuses
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from gemelo.services.runtime.actions import keys as keys
-from gemelo.services.runtime.actions.goal_handle import GoalHandle
-from gemelo.services.runtime.bus.interface import Query
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.bus.wire import schema_of, to_payload
-from gemelo.services.runtime.loop.loop import Loop
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 
 GOES_ON = GoalStatuses(stamp=200, goals=(GoalStatus(goal_id="goal", status=GoalStatusCode.EXECUTING),))
 ENDED = GoalStatuses(stamp=200, goals=(GoalStatus(goal_id="goal", status=GoalStatusCode.SUCCEEDED),))

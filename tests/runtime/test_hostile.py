@@ -10,17 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.runtime.actions import accept
+from gemelo.libraries.runtime.bus.interface import BusReply
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.endpoints import info_request, parameter_request, parameters_request
+from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.requests.client import response_in
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.message import decode
 from gemelo.schemas.system import Failure
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, PLAN, TOPICS
-from gemelo.services.runtime.actions import accept
-from gemelo.services.runtime.bus.interface import BusReply
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.endpoints import info_request, parameter_request, parameters_request
-from gemelo.services.runtime.errors import NoAnswer, RequestRefused
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.requests.client import response_in
 from tests.runtime.support import hear
 
 KEYS = st.sampled_from([topic.key for topic in TOPICS])

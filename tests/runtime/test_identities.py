@@ -10,15 +10,15 @@ import msgspec
 import pytest
 import zenoh
 
+from gemelo.libraries.runtime.bus.connection import connect, refusal, require_certificate
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.bus.zenoh_config import client_config
+from gemelo.libraries.runtime.errors import BusError
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import RouterSection
 from gemelo.schemas.topics import PLAN
 from gemelo.services.credentials.authority import Authority
 from gemelo.services.credentials.private_files import AccessError
-from gemelo.services.runtime.bus.connection import connect, refusal, require_certificate
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.bus.zenoh_config import client_config
-from gemelo.services.runtime.errors import BusError
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from tests.runtime.locks import Lock, LockedRouter
 from tests.runtime.support import RouterProcess, until
 

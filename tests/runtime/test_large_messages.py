@@ -7,6 +7,15 @@ import pytest
 from _pytest.mark.structures import ParameterSet
 
 from gemelo.libraries.arm.stl import MAX_TRIANGLES
+from gemelo.libraries.runtime.actions import accept, refuse
+from gemelo.libraries.runtime.actions.keys import goal_request, status_topic
+from gemelo.libraries.runtime.bus.wire import LARGEST, MAX_PAYLOAD, MAX_PAYLOAD_OF, TooLarge, encoded, limit_of
+from gemelo.libraries.runtime.bus.zenoh_config import MAX_MESSAGE_BYTES
+from gemelo.libraries.runtime.errors import GoalRefused, RequestRefused
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
+from gemelo.libraries.runtime.requests.exchanges import exchange_topic
+from gemelo.libraries.runtime.requests.limits import MAX_WAITING_BYTES, MAX_WAITING_BYTES_OF_A_CLIENT, WaitingRequests
+from gemelo.libraries.runtime.requests.server import MAX_REASON
 from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.message import Message, encode
 from gemelo.schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
@@ -14,15 +23,6 @@ from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanRespon
 from gemelo.schemas.scene import MeshShape, SceneAdd, SceneObject, SceneRequest, SceneResponse
 from gemelo.schemas.system import Exchange, LogRecord
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, LOG, PLAN, SCENE_EDIT
-from gemelo.services.runtime.actions import accept, refuse
-from gemelo.services.runtime.actions.keys import goal_request, status_topic
-from gemelo.services.runtime.bus.wire import LARGEST, MAX_PAYLOAD, MAX_PAYLOAD_OF, TooLarge, encoded, limit_of
-from gemelo.services.runtime.bus.zenoh_config import MAX_MESSAGE_BYTES
-from gemelo.services.runtime.errors import GoalRefused, RequestRefused
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
-from gemelo.services.runtime.requests.exchanges import exchange_topic
-from gemelo.services.runtime.requests.limits import MAX_WAITING_BYTES, MAX_WAITING_BYTES_OF_A_CLIENT, WaitingRequests
-from gemelo.services.runtime.requests.server import MAX_REASON
 from tests.runtime.conftest import Buses
 from tests.runtime.support import hear, spinning
 

@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.runtime import endpoints
-from gemelo.services.runtime.bus.identity import identify
-from gemelo.services.runtime.clock import SystemClock
-from gemelo.services.runtime.loop import loop as loop_module
-from gemelo.services.runtime.loop.loop import Loop, LoopFigures, Schedule
-from gemelo.services.runtime.loop.task_queue import Task, TaskQueue
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
+from gemelo.libraries.runtime import endpoints
+from gemelo.libraries.runtime.bus.identity import identify
+from gemelo.libraries.runtime.clock import SystemClock
+from gemelo.libraries.runtime.loop import loop as loop_module
+from gemelo.libraries.runtime.loop.loop import Loop, LoopFigures, Schedule
+from gemelo.libraries.runtime.loop.task_queue import Task, TaskQueue
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 
 RATES = st.sampled_from([1.0, 2.0, 10.0, 25.0, 50.0, 100.0, 1000.0])
 DURATIONS = st.lists(st.floats(0.0, 0.2), min_size=1, max_size=50)

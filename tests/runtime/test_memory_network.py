@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from gemelo.libraries.runtime.bus.interface import UNREAD, Arrival
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.schemas.topics import EVERY, LATCHED, LATEST
-from gemelo.services.runtime.bus.interface import UNREAD, Arrival
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 
 
 def test_a_network_that_is_away_loses_the_latest_and_keeps_the_rest() -> None:

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime.bus.identity import Identity, identify
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.bus.name_holder import AGAIN, BACK, STAYS, STOPPED, NameHolder, StopWatch
+from gemelo.libraries.runtime.errors import NodeNameTaken
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Deployment, PathsSection
-from gemelo.services.runtime.bus.identity import Identity, identify
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.bus.name_holder import AGAIN, BACK, STAYS, STOPPED, NameHolder, StopWatch
-from gemelo.services.runtime.errors import NodeNameTaken
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 
 OLDER, OWN, NEWER = (Identity("planner", started, "desk", 7) for started in (1, 2, 3))
 

@@ -11,6 +11,15 @@ import msgspec
 import pytest
 from msgspec import Meta
 
+from gemelo.libraries.runtime import topics
+from gemelo.libraries.runtime.bus.interface import BusReply
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.endpoints import info_request, parameter_request, parameters_request
+from gemelo.libraries.runtime.errors import NoAnswer, NodeNameTaken, RequestRefused
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.requests.client import call
+from gemelo.libraries.runtime.requests.server import Pending
 from gemelo.schemas.frames import RobotDescription
 from gemelo.schemas.joints import JointState, JointTargets
 from gemelo.schemas.message import BadMessage, encode
@@ -18,15 +27,6 @@ from gemelo.schemas.planning import PlanCode, PlanRequest, PlanResponse
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.system import Empty, LogRecord, NodeStatistics, SetParameter, TopicStatistics
 from gemelo.schemas.topics import COMMAND_ACKS, DESCRIPTION, JOINT_STATES, LOG, PLAN, SCENE, STATISTICS, Request
-from gemelo.services.runtime import topics
-from gemelo.services.runtime.bus.interface import BusReply
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.endpoints import info_request, parameter_request, parameters_request
-from gemelo.services.runtime.errors import NoAnswer, NodeNameTaken, RequestRefused
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.requests.client import call
-from gemelo.services.runtime.requests.server import Pending
 from tests.runtime.support import Buses, hear, spinning, until
 
 

@@ -9,6 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.runtime.actions import keys
+from gemelo.libraries.runtime.actions.server import accept
+from gemelo.libraries.runtime.bus.interface import Bus, BusReply
+from gemelo.libraries.runtime.bus.zenoh_declarations import CLIENT_BYTES, MAX_SECRET, asked_by, asker
+from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.requests.limits import RequestRates
+from gemelo.libraries.runtime.requests.overtaken import MOST_CLIENTS, MOST_JUMP, OvertakenRequests
+from gemelo.libraries.runtime.requests.server import Pending
 from gemelo.schemas.actions import GoalRequest, GoalResponse
 from gemelo.schemas.device import DeviceCommandResponse, DeviceStopRequest
 from gemelo.schemas.message import decode, encode
@@ -16,15 +25,6 @@ from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.system import Failure, TopicStatistics
 from gemelo.schemas.topics import DEVICE_STOP
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from gemelo.services.runtime.actions import keys
-from gemelo.services.runtime.actions.server import accept
-from gemelo.services.runtime.bus.interface import Bus, BusReply
-from gemelo.services.runtime.bus.zenoh_declarations import CLIENT_BYTES, MAX_SECRET, asked_by, asker
-from gemelo.services.runtime.errors import NoAnswer, RequestRefused
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.requests.limits import RequestRates
-from gemelo.services.runtime.requests.overtaken import MOST_CLIENTS, MOST_JUMP, OvertakenRequests
-from gemelo.services.runtime.requests.server import Pending
 from tests.runtime.support import Buses, spinning, until
 
 GOAL = keys.goal_request(FOLLOW).key

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.runtime.bus.pace import OF_ALL_REQUESTS, Pace, Rate, TokenBucket
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.requests.limits import DEBT, OF_A_CLIENT
+from gemelo.libraries.runtime.bus.pace import OF_ALL_REQUESTS, Pace, Rate, TokenBucket
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.requests.limits import DEBT, OF_A_CLIENT
 from tests.runtime.support import RouterProcess, until
 
 HELD_UP = 1.0  # [s] that a request may take on its way

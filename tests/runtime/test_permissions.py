@@ -16,20 +16,20 @@ import msgspec
 import pytest
 import zenoh
 
+from gemelo.libraries.runtime.bus.branches import asked_under, read_under, served_under, written_under
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.bus.zenoh_config import client_config
+from gemelo.libraries.runtime.endpoints import parameter_request
+from gemelo.libraries.runtime.errors import NoAnswer
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.permissions import ABOUT, SET, Permissions, permissions
+from gemelo.libraries.runtime.requests import client as requests
+from gemelo.libraries.runtime.robots import robots_on
 from gemelo.schemas.deployment import Deployment, PathsSection, RouterSection
 from gemelo.schemas.message import Message
 from gemelo.schemas.roles import ROLES, role
 from gemelo.schemas.system import SetParameter
 from gemelo.schemas.topics import DEVICE_EVENTS, DEVICE_STATUS, TOPICS, Delivery, Topic
-from gemelo.services.runtime.bus.branches import asked_under, read_under, served_under, written_under
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.bus.zenoh_config import client_config
-from gemelo.services.runtime.endpoints import parameter_request
-from gemelo.services.runtime.errors import NoAnswer
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.permissions import ABOUT, SET, Permissions, permissions
-from gemelo.services.runtime.requests import client as requests
-from gemelo.services.runtime.robots import robots_on
 from tests.runtime.locks import Lock, LockedRouter, sessions
 from tests.runtime.support import ROOT, RouterProcess, spinning, until
 from tests.stack import hostile

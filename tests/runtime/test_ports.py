@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.runtime.process.ports import PortTaken, require_free
+from gemelo.libraries.runtime.process.ports import PortTaken, require_free
 from tests.runtime.support import free_port
 
 

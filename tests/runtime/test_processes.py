@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.priority import BEHIND
 from gemelo.schemas.topics import JOINT_STATES
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.priority import BEHIND
 from tests.real_time import may_run_in_real_time
 from tests.runtime.support import ROOT, RouterProcess, programs, until
 
@@ -26,8 +26,8 @@ HEAD = """
 import sys, time
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import JOINT_STATES, LOG
-from gemelo.services.runtime.application import service
-from gemelo.services.runtime.node import Node
+from gemelo.libraries.runtime.application import service
+from gemelo.libraries.runtime.node import Node
 """
 
 Start = Callable[..., subprocess.Popen[str]]
@@ -358,7 +358,7 @@ def test_the_router_stops_cleanly_and_says_when_its_port_is_taken(tmp_path: Path
     own = RouterProcess(tmp_path)
     ready = tmp_path / "run" / "router.ready"
     assert until(ready.exists)
-    command = [sys.executable, "-m", "gemelo.services.runtime.router"]
+    command = [sys.executable, "-m", "gemelo.libraries.runtime.router"]
     second = subprocess.run(command, cwd=ROOT, env=own.environ, capture_output=True, text=True, timeout=5.0)
     assert second.returncode == 1
     assert f"port {own.port} on 127.0.0.1 is taken by " in second.stderr
@@ -383,7 +383,7 @@ def test_an_idle_node_at_50_hz_needs_little(start: Start) -> None:
 
 
 def test_importing_the_node_is_fast_and_light() -> None:
-    program = "import gemelo.services.runtime.node, sys; print('zenoh' in sys.modules, 'numpy' in sys.modules)"
+    program = "import gemelo.libraries.runtime.node, sys; print('zenoh' in sys.modules, 'numpy' in sys.modules)"
     begin = time.monotonic()
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=10.0)
     assert done.stdout == "False False\n", done.stderr
@@ -394,7 +394,7 @@ def test_importing_the_node_is_fast_and_light() -> None:
 def test_what_may_wait_steps_behind_and_never_ahead(before: int, after: int) -> None:
     asked = max(0, before - os.nice(0))
     code = (
-        "import os; from gemelo.services.runtime.process.priority import step_behind; step_behind(); print(os.nice(0))"
+        "import os; from gemelo.libraries.runtime.process.priority import step_behind; step_behind(); print(os.nice(0))"
     )
     command = [sys.executable, "-c", f"import os; os.nice({asked}); {code}"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
@@ -404,7 +404,7 @@ def test_what_may_wait_steps_behind_and_never_ahead(before: int, after: int) -> 
 def test_every_thread_of_what_steps_ahead_has_a_real_time_priority_where_the_system_allows_it() -> None:
     program = """
 import os, threading
-from gemelo.services.runtime.process.priority import AHEAD, step_ahead
+from gemelo.libraries.runtime.process.priority import AHEAD, step_ahead
 before = threading.Thread(target=threading.Event().wait, daemon=True)
 before.start()
 has = step_ahead()

@@ -13,13 +13,13 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.runtime.bus import zenoh_bus
+from gemelo.libraries.runtime.bus.recognition import Recognition
+from gemelo.libraries.runtime.errors import BusError
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.device import DeviceCommandResponse
 from gemelo.schemas.topics import DEVICE_STOP
 from gemelo.services.chaos.proxy import ProxyThread
-from gemelo.services.runtime.bus import zenoh_bus
-from gemelo.services.runtime.bus.recognition import Recognition
-from gemelo.services.runtime.errors import BusError
-from gemelo.services.runtime.node import Node
 from gemelo.services.stack.stack import free_ports
 from tests.runtime.support import RouterProcess, until
 

@@ -6,12 +6,12 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.runtime.actions import keys
+from gemelo.libraries.runtime.actions.goal_registry import GoalRecord, GoalRegistry
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.actions import CancelRequest, GoalRequest, GoalResponse, GoalStatusCode, GoalStatuses, ResultRequest
 from gemelo.schemas.message import encode
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from gemelo.services.runtime.actions import keys
-from gemelo.services.runtime.actions.goal_registry import GoalRecord, GoalRegistry
-from gemelo.services.runtime.node import Node
 from tests.runtime.support import Buses, until
 from tests.runtime.test_actions import Arm, goal_of, moving
 
@@ -54,7 +54,7 @@ def test_a_goal_that_is_forgotten_and_sent_again_is_refused_and_a_new_one_is_not
         assert send(owner, request_of("g", arm)).accepted
         assert has_ended(owner, "g")
         moved = arm.moved
-        monkeypatch.setattr("gemelo.services.runtime.actions.goal_registry.KEPT", -1.0)
+        monkeypatch.setattr("gemelo.libraries.runtime.actions.goal_registry.KEPT", -1.0)
         assert until(lambda: is_forgotten(owner, "g"))
         again = send(other, request_of("g", arm))
         assert not again.accepted
@@ -123,7 +123,7 @@ def test_a_goal_that_names_no_epoch_is_taken_and_one_of_another_is_not(buses: Bu
 
 
 def test_the_ids_that_are_remembered_are_bounded_and_the_oldest_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gemelo.services.runtime.actions.goal_registry.MAX_DECIDED", 3)
+    monkeypatch.setattr("gemelo.libraries.runtime.actions.goal_registry.MAX_DECIDED", 3)
     goals = GoalRegistry()
     for number in range(5):
         goals.add(GoalRecord(str(number), "c", GoalResponse(accepted=True)))

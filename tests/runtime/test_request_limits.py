@@ -8,21 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
-from gemelo.schemas.message import Message, decode, encode
-from gemelo.schemas.motion import FollowJointTrajectoryGoal
-from gemelo.schemas.planning import PlanRequest, PlanResponse
-from gemelo.schemas.topics import DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, PLAN
-from gemelo.services.runtime.actions.client import PAUSE
-from gemelo.services.runtime.actions.server import accept
-from gemelo.services.runtime.bus.interface import UNREAD, Bus, BusReply, Query
-from gemelo.services.runtime.bus.pace import Pace, Rate
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.bus.zenoh_declarations import QUERIES
-from gemelo.services.runtime.clock import SystemClock
-from gemelo.services.runtime.errors import NoAnswer
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.requests.limits import (
+from gemelo.libraries.runtime.actions.client import PAUSE
+from gemelo.libraries.runtime.actions.server import accept
+from gemelo.libraries.runtime.bus.interface import UNREAD, Bus, BusReply, Query
+from gemelo.libraries.runtime.bus.pace import Pace, Rate
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.bus.zenoh_declarations import QUERIES
+from gemelo.libraries.runtime.clock import SystemClock
+from gemelo.libraries.runtime.errors import NoAnswer
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.requests.limits import (
     KNOWN_AFTER,
     MAX_CLIENTS,
     MAX_PRINCIPALS,
@@ -36,7 +31,12 @@ from gemelo.services.runtime.requests.limits import (
     RequestRates,
     WaitingRequests,
 )
-from gemelo.services.runtime.requests.server import REPEAT
+from gemelo.libraries.runtime.requests.server import REPEAT
+from gemelo.schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
+from gemelo.schemas.message import Message, decode, encode
+from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.planning import PlanRequest, PlanResponse
+from gemelo.schemas.topics import DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, PLAN
 from tests.runtime.support import Buses, RouterProcess, hear, spinning, until
 
 Answers = list[BusReply | None]

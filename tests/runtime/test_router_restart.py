@@ -10,16 +10,16 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.client_watch import RETURN
+from gemelo.libraries.runtime.errors import BusError, NoAnswer, ServerLost
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.frames import RobotDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import PlanCode, PlanRequest, PlanResponse
 from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import DESCRIPTION, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, LOG, PLAN, Delivery
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.client_watch import RETURN
-from gemelo.services.runtime.errors import BusError, NoAnswer, ServerLost
-from gemelo.services.runtime.node import Node
 from tests.runtime.support import RouterProcess, hear, spinning, until
 from tests.runtime.test_actions import Arm, goal_of
 
@@ -128,7 +128,7 @@ def _call_in_vain(client: Node) -> None:
 
 
 def test_a_router_that_stays_away_ends_the_waiting(own_router: RouterProcess, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gemelo.services.runtime.actions.goal_handle.ROUTER_TIMEOUT", 1.0)
+    monkeypatch.setattr("gemelo.libraries.runtime.actions.goal_handle.ROUTER_TIMEOUT", 1.0)
     with open_node(own_router, "stepper_gateway") as gateway, open_node(own_router, "client") as client:
         arm = Arm(gateway)
         with spinning(gateway, arm.step, rate=100.0):
@@ -158,8 +158,8 @@ def test_a_frozen_router_blocks_a_publisher_for_a_bounded_time(own_router: Route
 def test_a_node_that_does_not_find_back_ends_so_that_it_is_started_anew(
     own_router: RouterProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gemelo.services.runtime.bus.zenoh_bus.RECONNECTION_TIMEOUT", 0.5)
-    monkeypatch.setattr("gemelo.services.runtime.bus.zenoh_bus.ZenohBus.is_connected", False)
+    monkeypatch.setattr("gemelo.libraries.runtime.bus.zenoh_bus.RECONNECTION_TIMEOUT", 0.5)
+    monkeypatch.setattr("gemelo.libraries.runtime.bus.zenoh_bus.ZenohBus.is_connected", False)
     with open_node(own_router, "astray") as node, pytest.raises(BusError, match="did not take this session back"):
         node.spin()
 

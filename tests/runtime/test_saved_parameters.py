@@ -13,17 +13,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.libraries.runtime.errors import RequestRefused
+from gemelo.libraries.runtime.saved_parameters import SavedParameters, toml
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.runtime.errors import RequestRefused
-from gemelo.services.runtime.saved_parameters import SavedParameters, toml
 from tests.runtime.support import RouterProcess, programs
 
 PROGRAM = """
 from typing import Annotated
 import msgspec
 from msgspec import Meta
-from gemelo.services.runtime.application import service
+from gemelo.libraries.runtime.application import service
 
 class Own(msgspec.Struct, frozen=True):
     lead: Annotated[float, Meta(gt=0, le=1)] = 0.3

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.runtime.serial_frames import (
+from gemelo.libraries.runtime.serial_frames import (
     LARGEST,
     BadPacket,
     JsonFrame,

@@ -18,10 +18,10 @@ from operator import sub
 
 import pytest
 
+from gemelo.libraries.runtime.bus.interface import Arrival
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.bus.zenoh_config import LONGEST_BLOCK_US
 from gemelo.schemas.topics import JOINT_STATES, LOG, STATISTICS
-from gemelo.services.runtime.bus.interface import Arrival
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.bus.zenoh_config import LONGEST_BLOCK_US
 from tests.runtime.support import ROOT, RouterProcess, until
 
 LONGEST = LONGEST_BLOCK_US * 1e-6  # [s] that one message waits for who does not read

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.started import (
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.started import (
     choose_name,
     chosen_name,
     keep_started,

@@ -15,16 +15,16 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime import endpoints
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.errors import BusError
+from gemelo.libraries.runtime.process.beat_socket import newest_beat
+from gemelo.libraries.runtime.process.readiness import Readiness, is_fresh, says_ready
+from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.deployment import MqttSection, RouterSection
 from gemelo.services.broker.replacement import OwnClient
 from gemelo.services.chaos.descriptors import give_descriptors, take_descriptors
-from gemelo.services.runtime import endpoints
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.errors import BusError
-from gemelo.services.runtime.process.beat_socket import newest_beat
-from gemelo.services.runtime.process.readiness import Readiness, is_fresh, says_ready
-from gemelo.services.runtime.process.unwritten import UnwrittenFiles
 from tests.descriptors import few_descriptors
 from tests.disks import WAYS, Disk, refusing_disk
 from tests.optional import need
@@ -156,7 +156,7 @@ def started(process: str, folder: Path) -> Iterator[tuple[subprocess.Popen[bytes
         "GEMELO_MQTT_BROKER": broker or "embedded",
         "GEMELO_PATHS_RUN": str(folder),
     }
-    module = "gemelo.services.runtime.router" if name == "router" else "gemelo.services.broker.main"
+    module = "gemelo.libraries.runtime.router" if name == "router" else "gemelo.services.broker.main"
     running = subprocess.Popen([sys.executable, "-m", module], cwd=project_root(), env=environ)
     try:
         yield running, name, port

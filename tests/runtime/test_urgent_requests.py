@@ -9,6 +9,15 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from gemelo.libraries.runtime.actions import keys as keys
+from gemelo.libraries.runtime.actions.server import accept
+from gemelo.libraries.runtime.bus.interface import Bus, BusReply, Query
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.bus.zenoh_declarations import QUERIES
+from gemelo.libraries.runtime.errors import NoAnswer
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.requests.limits import MAX_WAITING_OF_A_CLIENT, RequestRates
+from gemelo.libraries.runtime.requests.server import MAX_UNANSWERED, Pending
 from gemelo.schemas.actions import CancelRequest, CancelResponse, GoalRequest, GoalResponse
 from gemelo.schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
 from gemelo.schemas.message import Message, decode, encode
@@ -17,15 +26,6 @@ from gemelo.schemas.planning import PlanCode, PlanRequest, PlanResponse
 from gemelo.schemas.system import Failure
 from gemelo.schemas.topics import DEVICE_STOP, PLAN
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from gemelo.services.runtime.actions import keys as keys
-from gemelo.services.runtime.actions.server import accept
-from gemelo.services.runtime.bus.interface import Bus, BusReply, Query
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.bus.zenoh_declarations import QUERIES
-from gemelo.services.runtime.errors import NoAnswer
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.requests.limits import MAX_WAITING_OF_A_CLIENT, RequestRates
-from gemelo.services.runtime.requests.server import MAX_UNANSWERED, Pending
 from tests.runtime.support import Buses, RouterProcess, hear, spinning, until
 
 FROZEN = 1.5  # [s] of the router: longer than the lease of its links

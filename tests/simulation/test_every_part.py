@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 import gemelo
+from gemelo.libraries.runtime.bus.pace import OF_ALL_REQUESTS
 from gemelo.programs import Points, ProgramRun, Programs, RunStatus
 from gemelo.schemas.ledger import VerifiedBy
-from gemelo.services.runtime.bus.pace import OF_ALL_REQUESTS
 
 ROOT = Path(__file__).parents[2]
 

@@ -15,6 +15,10 @@ import pytest
 
 import gemelo
 from gemelo.api.simulation import SimulatedArm
+from gemelo.libraries.runtime.actions.keys import result_request
+from gemelo.libraries.runtime.bus import wire
+from gemelo.libraries.runtime.endpoints import info_request, parameter_request, parameters_request
+from gemelo.libraries.runtime.errors import RequestRefused
 from gemelo.schemas.device import DeviceCommandRequest, DeviceStopRequest, InjectRequest, StopKind
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointTargets
@@ -36,10 +40,6 @@ from gemelo.schemas.topics import (
     SCENE_EDIT,
     Request,
 )
-from gemelo.services.runtime.actions.keys import result_request
-from gemelo.services.runtime.bus import wire
-from gemelo.services.runtime.endpoints import info_request, parameter_request, parameters_request
-from gemelo.services.runtime.errors import RequestRefused
 from gemelo.services.simulation import twin
 from gemelo.services.simulation.twin import ServiceNode
 

@@ -13,6 +13,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import gemelo
+from gemelo.libraries.runtime.bus.wire import MAX_PAYLOAD_OF
+from gemelo.libraries.runtime.requests.exchanges import exchange_topic
+from gemelo.libraries.runtime.scene_meshes import SceneMeshes
 from gemelo.schemas.message import encode
 from gemelo.schemas.scene import BoxShape, MeshShape, PlanningScene, SceneMove, SceneObject, SceneRequest
 from gemelo.schemas.scene_meshes import by_digest, mesh_digest, with_meshes
@@ -22,9 +25,6 @@ from gemelo.services.panel.model.readings import BusReadings
 from gemelo.services.planner import main as planner_main
 from gemelo.services.planner.scene.scene_keeper import SceneKeeper
 from gemelo.services.recordings.subscriptions import Subscriptions
-from gemelo.services.runtime.bus.wire import MAX_PAYLOAD_OF
-from gemelo.services.runtime.requests.exchanges import exchange_topic
-from gemelo.services.runtime.scene_meshes import SceneMeshes
 
 KEEPERS: list[SceneKeeper] = []
 FAR = (3.0, 0.0, 0.0)  # [m] from where no arm is in its way

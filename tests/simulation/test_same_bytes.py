@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from gemelo.services.runtime.bus.memory_network import MemoryPublication
+from gemelo.libraries.runtime.bus.memory_network import MemoryPublication
 
 ROOT = Path(__file__).parents[2]
 

@@ -15,9 +15,9 @@ import time
 from itertools import pairwise
 from types import SimpleNamespace
 
+from gemelo.libraries.runtime.errors import NoAnswer, ServerLost
 from gemelo.schemas.device import DeviceStopRequest
 from gemelo.schemas.topics import DEVICE_STOP
-from gemelo.services.runtime.errors import NoAnswer, ServerLost
 from tests.stack.person import Operator, jumps
 
 SPEED = 0.4

@@ -15,6 +15,8 @@ import tempfile
 from pathlib import Path
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.deployment import load_deployment, project_root
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.device import DeviceEvent
 from gemelo.schemas.frames import FrameTransforms
 from gemelo.schemas.topics import DEVICE_EVENTS, FRAMES, JOINT_STATES
@@ -24,8 +26,6 @@ from gemelo.services.bench.latency import follow, sharp_start
 from gemelo.services.bench.stack import Running, has_mosquitto
 from gemelo.services.cli.text_table import table
 from gemelo.services.hosts.checks import load_site
-from gemelo.services.runtime.deployment import load_deployment, project_root
-from gemelo.services.runtime.node import Node
 from gemelo.services.stack.stack import Stack
 from tests.stack.links import SITE
 from tests.stack.namespaces import Hosts, Lab

@@ -15,14 +15,14 @@ from itertools import cycle
 
 import zenoh
 
+from gemelo.libraries.runtime.actions.keys import goal_request
+from gemelo.libraries.runtime.bus.branches import asked_under, read_under, written_under
+from gemelo.libraries.runtime.bus.zenoh_config import client_config
+from gemelo.libraries.runtime.deployment import load_deployment
+from gemelo.libraries.runtime.permissions import permissions
 from gemelo.schemas.roles import role
 from gemelo.schemas.topics import FK, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, JOINT_TARGETS, LOG, PLAN, TOPICS
 from gemelo.services.bench.traffic import GOAL
-from gemelo.services.runtime.actions.keys import goal_request
-from gemelo.services.runtime.bus.branches import asked_under, read_under, written_under
-from gemelo.services.runtime.bus.zenoh_config import client_config
-from gemelo.services.runtime.deployment import load_deployment
-from gemelo.services.runtime.permissions import permissions
 
 RATE = 10_000  # [1/s]
 BURST = 0.005  # [s]

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from gemelo.services.runtime.deployment import project_root
+from gemelo.libraries.runtime.deployment import project_root
 from tests.optional import need, need_root
 from tests.runtime.support import free_port, until
 

@@ -6,6 +6,10 @@ import time
 from itertools import pairwise
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.deployment import load_deployment, project_root
+from gemelo.libraries.runtime.errors import GoalRefused, NoAnswer, RequestRefused
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.device import DeviceCommandRequest, DeviceMode, DeviceStopRequest, ReferenceCommand, StopKind
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
@@ -19,10 +23,6 @@ from gemelo.schemas.topics import (
     JOINT_STATES,
     PLAN,
 )
-from gemelo.services.runtime.deployment import load_deployment, project_root
-from gemelo.services.runtime.errors import GoalRefused, NoAnswer, RequestRefused
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 
 HERE_OR_THERE = (0.45, -0.35)  # of the way from a joint's middle to its limits: two poses to go between
 SETTLE = 10.0  # [s] for a stack to accept a goal again

@@ -9,6 +9,15 @@ import msgspec
 import paho.mqtt.client as paho
 import pytest
 
+from gemelo.libraries.runtime.actions.keys import (
+    cancel_request,
+    feedback_topic,
+    goal_request,
+    result_request,
+    status_topic,
+)
+from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
+from gemelo.libraries.runtime.errors import GoalRefused
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.deployment import RouterSection
 from gemelo.schemas.device import DeviceState, DeviceStatus
@@ -27,15 +36,6 @@ from gemelo.schemas.topics import (
     TOPICS,
     Delivery,
 )
-from gemelo.services.runtime.actions.keys import (
-    cancel_request,
-    feedback_topic,
-    goal_request,
-    result_request,
-    status_topic,
-)
-from gemelo.services.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.services.runtime.errors import GoalRefused
 from gemelo.services.stepper_gateway.links.frames import Chunk, ChunkFlag, CommandFrame, Heartbeat
 from gemelo.services.stepper_gateway.links.frames import encode as to_frame
 from tests.schemas.samples import sample

@@ -12,10 +12,10 @@ from gemelo.libraries.arm.cell.camera_model import exact_info
 from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.libraries.arm.frames.transforms import to_message
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.bench.vision.mount_images import FIRST
 from gemelo.services.bench.vision.mounting import tool_error
 from gemelo.services.cli.errors import ExitCode
-from gemelo.services.runtime.deployment import project_root
 from gemelo.services.stack.stack import Stack
 from gemelo.services.vision.boards import TagBoard
 from gemelo.services.vision.calibration.reprojection import Carrier

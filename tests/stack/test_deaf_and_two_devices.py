@@ -12,7 +12,7 @@ import pytest
 
 import gemelo
 from gemelo.firmware.platform.host.flash import Flash, NetworkCredentials
-from gemelo.services.runtime.process.unwritten import UnwrittenFiles
+from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.services.stack.stack import Stack
 from tests.mqtt.packet_proxy import PacketProxy
 from tests.stack.gemelo import COMMAND

@@ -12,7 +12,7 @@ from statistics import median
 
 import pytest
 
-from gemelo.services.runtime.deployment import project_root
+from gemelo.libraries.runtime.deployment import project_root
 from tests.optional import need, need_root
 from tests.stack.hostile import RATE, SIZE
 from tests.stack.links import Links

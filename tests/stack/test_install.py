@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.hosts.checks import load_site
 from gemelo.services.hosts.layout import processes
 from gemelo.services.hosts.render import rendered
-from gemelo.services.runtime.deployment import project_root
 from gemelo.services.stack.stack import free_ports
 from tests.optional import need
 from tests.runtime.support import until

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 import gemelo
+from gemelo.libraries.runtime.endpoints import info_request
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.schemas.scene import MeshShape, SceneMesh
 from gemelo.schemas.system import Empty
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, scene_mesh
-from gemelo.services.runtime.endpoints import info_request
 from gemelo.services.stack.stack import Stack
 from tests.simulation.test_large_scenes import tube
 from tests.stack import gemelo as command

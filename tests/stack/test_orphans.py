@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.runtime.deployment import project_root
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.stack.guard import Guard
 
 LAST = 40.0  # [s] that a busy machine may need to end two processes

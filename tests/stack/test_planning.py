@@ -10,12 +10,12 @@ import time
 import psutil
 import pytest
 
+from gemelo.libraries.runtime.errors import GoalRefused, NoAnswer
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.planning import PlanCancel, PlanPhase, PlanProgress
 from gemelo.schemas.scene import PlanningScene, SceneAdd, SceneObject, SceneReplace, SceneRequest, SphereShape
 from gemelo.schemas.topics import PLAN, PLAN_CANCEL, PLAN_PROGRESS, SCENE_EDIT
-from gemelo.services.runtime.errors import GoalRefused, NoAnswer
 from tests.planner.walled import NAMES, WALLED, past_the_wall
 
 

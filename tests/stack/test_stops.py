@@ -9,8 +9,8 @@ import time
 import psutil
 import pytest
 
+from gemelo.libraries.runtime.errors import ServerLost
 from gemelo.schemas.actions import GoalStatusCode
-from gemelo.services.runtime.errors import ServerLost
 from tests.stack.person import jumps
 
 pytestmark = pytest.mark.alone

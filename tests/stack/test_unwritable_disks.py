@@ -8,13 +8,13 @@ from contextlib import ExitStack, contextmanager, suppress
 
 import pytest
 
+from gemelo.libraries.runtime.errors import NoAnswer, ServerLost
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceStopRequest
 from gemelo.schemas.topics import DEVICE_STOP
 from gemelo.services.chaos.descriptors import give_descriptors, take_descriptors
 from gemelo.services.chaos.small_disk import SmallDisk
 from gemelo.services.cli.errors import ExitCode
-from gemelo.services.runtime.errors import NoAnswer, ServerLost
 from gemelo.services.stack.stack import Stack
 from tests.optional import need_mounts
 from tests.stack.gemelo import gemelo

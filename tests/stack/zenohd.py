@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 import gemelo
-from gemelo.services.runtime.bus.zenoh_bus import router_answers
+from gemelo.libraries.runtime.bus.zenoh_bus import router_answers
 from gemelo.services.stack.stack import PROCESSES, Stack, free_ports
 from tests.runtime.support import until, zenohd
 

@@ -13,9 +13,9 @@ import psutil
 import pytest
 
 import gemelo
+from gemelo.libraries.runtime.endpoints import parameter_request, parameters_request
 from gemelo.schemas import system
 from gemelo.schemas.topics import DEVICE_SHAFT, camera_truth
-from gemelo.services.runtime.endpoints import parameter_request, parameters_request
 from gemelo.services.stack.stack import Stack
 from tests.simulated import put_right, where_it_stands
 

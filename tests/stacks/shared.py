@@ -11,7 +11,7 @@ from typing import NamedTuple
 import pytest
 
 import gemelo
-from gemelo.services.runtime.deployment import project_root
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.stack.stack import PROCESSES, Stack
 from tests.optional import need
 from tests.stacks.reset import Reset

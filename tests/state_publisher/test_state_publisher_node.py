@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from gemelo.services.state_publisher.main import run
 
 

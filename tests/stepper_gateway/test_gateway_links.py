@@ -16,7 +16,7 @@ import pytest
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
-from gemelo.services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
+from gemelo.libraries.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 from gemelo.services.stepper_gateway.links.frames import (
     Ack,
     CommandFrame,

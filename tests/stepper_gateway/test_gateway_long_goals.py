@@ -6,9 +6,9 @@ import math
 
 import pytest
 
+from gemelo.libraries.runtime.bus.wire import encoded
 from gemelo.schemas.device import GatewayInputs
 from gemelo.schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from gemelo.services.runtime.bus.wire import encoded
 from gemelo.services.stepper_gateway.input_log import InputLog
 from gemelo.services.stepper_gateway.inputs import BeganInput, GoalInput, unpacked
 from gemelo.services.stepper_gateway.parameters import GatewayParameters

@@ -10,6 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.errors import GoalRefused
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import (
     ConfigureRequest,
@@ -33,10 +37,6 @@ from gemelo.schemas.topics import (
     JOINT_TARGETS,
     SCENE,
 )
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.errors import GoalRefused
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from gemelo.services.stepper_gateway.main import run
 from tests.stepper_gateway.harness import move
 from tests.stepper_gateway.processes import DEVICE, Processes

@@ -7,10 +7,10 @@ from msgspec.structs import replace
 
 from gemelo.firmware.bindings.device import CoreDevice
 from gemelo.libraries.arm.device.device_config import device_config
+from gemelo.libraries.runtime.serial_frames import packet
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode
 from gemelo.schemas.topics import JOINT_STATES
-from gemelo.services.runtime.serial_frames import packet
 from gemelo.services.stepper_gateway.links.frames import (
     Ack,
     Code,

@@ -193,10 +193,10 @@ def test_whatever_the_targets_the_tracker_keeps_every_limit(
 
 ENDS = """
 from gemelo.libraries.arm.model.description import load_arm
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.motion.knots import Knot
 from gemelo.services.stepper_gateway.motion.knots import Limits

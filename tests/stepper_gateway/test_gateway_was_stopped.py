@@ -15,15 +15,15 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.bus.identity import identify
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.bus.name_holder import AGAIN, STOPPED
+from gemelo.libraries.runtime.errors import NodeNameTaken
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.device import DeviceStopRequest, StopKind
 from gemelo.schemas.topics import DEVICE_STOP
-from gemelo.services.runtime.bus.identity import identify
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.bus.name_holder import AGAIN, STOPPED
-from gemelo.services.runtime.errors import NodeNameTaken
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.inputs import BeganInput
 from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile

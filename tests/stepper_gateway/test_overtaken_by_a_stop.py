@@ -10,6 +10,12 @@ import msgspec
 import pytest
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.actions.keys import goal_request, result_request
+from gemelo.libraries.runtime.bus.interface import BusReply
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.endpoints import info_request
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.actions import GoalRequest, ResultRequest, ResultResponse
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.device import DeviceCommandRequest, DeviceStopRequest, SpeedCommand, StopKind
@@ -25,12 +31,6 @@ from gemelo.schemas.topics import (
     GATEWAY,
     GRIPPER_COMMAND,
 )
-from gemelo.services.runtime.actions.keys import goal_request, result_request
-from gemelo.services.runtime.bus.interface import BusReply
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.endpoints import info_request
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.shutdown import ShutdownRequest
 from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.inputs import BeganInput
 from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile

@@ -10,11 +10,11 @@ import pytest
 from msgspec.structs import replace
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode
 from gemelo.schemas.ledger import StepLedger, VerifiedBy
 from gemelo.schemas.topics import STEP_LEDGER
 from gemelo.services.bench.stopping import smooth_move
-from gemelo.services.runtime.process.unwritten import UnwrittenFiles
 from gemelo.services.stepper_gateway.ledger.confidence import REBOOT
 from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile, read_ledger, write_ledger
 from gemelo.services.stepper_gateway.ledger.record import LedgerRecord

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.bench.vision.mounting import (
     MountingTrial,
     closed_form,
@@ -17,7 +18,6 @@ from gemelo.services.bench.vision.mounting import (
     six_joint_trial,
     tool_error,
 )
-from gemelo.services.runtime.deployment import project_root
 from gemelo.services.vision.boards import Sighting, TagBoard
 from gemelo.services.vision.calibration.mount import fit_mount
 from gemelo.services.vision.calibration.reprojection import Carrier

@@ -11,6 +11,7 @@ import pytest
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.bench.vision.mount_images import (
     Setup,
     Sight,
@@ -23,7 +24,6 @@ from gemelo.services.bench.vision.mount_images import (
     take,
 )
 from gemelo.services.bench.vision.mounting import looking, tool_error
-from gemelo.services.runtime.deployment import project_root
 from gemelo.services.vision.boards import Sighting, TagBoard
 from gemelo.services.vision.calibration.link_pose import LinkAt, link_pose
 from gemelo.services.vision.calibration.mount import fit_mount

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.joints import JointState
-from gemelo.services.runtime.deployment import project_root
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.core import Visualizer
 from gemelo.services.visualizer.model.urdf import parse_urdf

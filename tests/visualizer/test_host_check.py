@@ -10,8 +10,8 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
-from gemelo.services.runtime.process.own_names import own_names
-from gemelo.services.runtime.process.ports import PortTaken
+from gemelo.libraries.runtime.process.own_names import own_names
+from gemelo.libraries.runtime.process.ports import PortTaken
 from gemelo.services.visualizer.program.host_check import (
     HTTP2_PREFACE,
     MOST_CONNECTIONS,

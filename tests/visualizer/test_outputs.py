@@ -9,9 +9,9 @@ from contextlib import contextmanager
 import pytest
 from rerun.experimental import ViewerClient
 
+from gemelo.libraries.runtime.process.unwritten import RETRY
 from gemelo.schemas.deployment import ViewerMode, ViewerSection
 from gemelo.schemas.joints import JointState
-from gemelo.services.runtime.process.unwritten import RETRY
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.core import Visualizer
 from gemelo.services.visualizer.program.rerun_program import environment, rerun_binary

@@ -6,12 +6,12 @@ import time
 
 import pytest
 
+from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.deployment import load_deployment
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.frames import RobotDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DESCRIPTION, JOINT_STATES
-from gemelo.services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
-from gemelo.services.runtime.deployment import load_deployment
-from gemelo.services.runtime.node import Node
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.main import run
 from gemelo.services.visualizer.program.rerun_program import rerun_binary

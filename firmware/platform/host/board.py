@@ -17,10 +17,10 @@ from gemelo.firmware.platform.host.memory import BootState, PositionStore, Store
 from gemelo.libraries.arm.device.device_config import device_config, reference_steps
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.model.gripper import gripper_unit
+from gemelo.libraries.runtime.clock import SYSTEM, Clock
+from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles, remedy_of
 from gemelo.schemas.device_config import config_text
 from gemelo.schemas.robot import Motor
-from gemelo.services.runtime.clock import SYSTEM, Clock
-from gemelo.services.runtime.process.unwritten import UnwrittenFiles, remedy_of
 
 
 class DeviceClock:

@@ -20,9 +20,9 @@ import msgspec
 
 from gemelo.firmware.bindings.firmware_slot import SlotRefused
 from gemelo.firmware.bindings.library import LIBRARY, LibraryMissing, load_library
-from gemelo.services.runtime.firmware_update import HEADER, NoImage, read_header
-from gemelo.services.runtime.process.unwritten import Attempts, UnwrittenFiles
-from gemelo.services.runtime.signatures import SignatureError, is_signed
+from gemelo.libraries.runtime.firmware_update import HEADER, NoImage, read_header
+from gemelo.libraries.runtime.process.unwritten import Attempts, UnwrittenFiles
+from gemelo.libraries.runtime.signatures import SignatureError, is_signed
 
 log = logging.getLogger("virtual_esp32")
 

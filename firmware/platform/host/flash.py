@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from gemelo.services.runtime.process.unwritten import Attempts, UnwrittenFiles
+from gemelo.libraries.runtime.process.unwritten import Attempts, UnwrittenFiles
 
 
 class NetworkCredentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from gemelo.firmware.bindings.library import LIBRARY
-from gemelo.services.runtime.firmware_update import VIRTUAL_CHIP, ImageHeader, build_header
+from gemelo.libraries.runtime.firmware_update import VIRTUAL_CHIP, ImageHeader, build_header
 
 VERSION = re.compile(r'kFirmwareVersion = "([^"]+)"')
 REPORT = Path(__file__).parents[2] / "core" / "report.h"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import msgspec
 
-from gemelo.services.runtime.process.unwritten import Attempts, UnwrittenFiles
+from gemelo.libraries.runtime.process.unwritten import Attempts, UnwrittenFiles
 
 SIZE = 1024  # [bytes] of the file, with blanks before its text: always as many, so it can be written in its own place
 

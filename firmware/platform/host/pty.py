@@ -12,7 +12,7 @@ import tty
 from pathlib import Path
 
 from gemelo.firmware.platform.host.link import Item, SerialBytes
-from gemelo.services.runtime.process.unwritten import Attempts, UnwrittenFiles
+from gemelo.libraries.runtime.process.unwritten import Attempts, UnwrittenFiles
 
 MAX_READ = 4096  # [bytes] read at once
 

@@ -23,11 +23,11 @@ from gemelo.firmware.platform.host.link import (
 )
 from gemelo.firmware.platform.host.slot_record import SlotRecord
 from gemelo.firmware.platform.host.wires import Wires, say_event
+from gemelo.libraries.runtime.clock import SYSTEM, Clock
+from gemelo.libraries.runtime.process.readiness import Readiness
+from gemelo.libraries.runtime.process.unwritten import remedy_of
+from gemelo.libraries.runtime.serial_frames import JsonFrame
 from gemelo.schemas.device import InjectKind, InjectRequest
-from gemelo.services.runtime.clock import SYSTEM, Clock
-from gemelo.services.runtime.process.readiness import Readiness
-from gemelo.services.runtime.process.unwritten import remedy_of
-from gemelo.services.runtime.serial_frames import JsonFrame
 
 log = logging.getLogger("virtual_esp32")
 

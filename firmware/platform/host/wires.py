@@ -10,7 +10,7 @@ from gemelo.firmware.bindings.device import CoreDevice
 from gemelo.firmware.bindings.frames import OutFrame
 from gemelo.firmware.platform.host.flash import NetworkCredentials
 from gemelo.firmware.platform.host.pty import SerialLine
-from gemelo.services.runtime.serial_frames import JsonFrame
+from gemelo.libraries.runtime.serial_frames import JsonFrame
 
 log = logging.getLogger("virtual_esp32")
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanRequest, PlanResponse
@@ -29,7 +30,6 @@ from gemelo.services.bench.scenes import TABLE, parol6
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
-from gemelo.services.runtime.deployment import project_root
 
 Array = NDArray[np.float64]
 

@@ -19,6 +19,9 @@ from msgspec.structs import replace
 
 from gemelo.libraries.arm.cell.camera_model import exact_info
 from gemelo.libraries.arm.cell.cell_file import load_cell
+from gemelo.libraries.runtime.deployment import load_deployment
+from gemelo.libraries.runtime.endpoints import parameter_request
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.camera import CameraImage
 from gemelo.schemas.cell import VirtualSource
 from gemelo.schemas.joints import JointState
@@ -29,9 +32,6 @@ from gemelo.services.bench.scenes import rm1
 from gemelo.services.bench.stack import Stacks, cpu_seconds, families
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
 from gemelo.services.camera.virtual.world import CameraWorld
-from gemelo.services.runtime.deployment import load_deployment
-from gemelo.services.runtime.endpoints import parameter_request
-from gemelo.services.runtime.node import Node
 from gemelo.services.stack.stack import Stack
 
 SET_RATE = parameter_request("detector")

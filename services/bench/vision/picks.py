@@ -15,12 +15,12 @@ from pathlib import Path
 
 import gemelo
 from gemelo.libraries.arm.cell.cell_file import load_cell
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.cell import PosePlace
 from gemelo.schemas.detections import Detections
 from gemelo.schemas.topics import camera_truth
 from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.topics import Latest
 from gemelo.services.stack.stack import Stack
 
 PROCESSES = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner", "camera", "detector")

@@ -7,10 +7,10 @@ from typing import Any
 
 import cv2
 
+from gemelo.libraries.runtime.clock import SYSTEM, Clock
 from gemelo.schemas.camera import CameraCondition
 from gemelo.schemas.cell import CameraRecord
 from gemelo.services.camera.sources.source import CameraFault, EncodedImage, encoded
-from gemelo.services.runtime.clock import SYSTEM, Clock
 
 PICTURES = {".jpg", ".jpeg", ".png"}
 

@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 
 from gemelo.libraries.arm.frames.transforms import Rigid, compose, from_message, inverse, rotate, to_message
+from gemelo.libraries.runtime.clock import SYSTEM, Clock
 from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import CameraRecord, TagThing, Thing, VirtualSource
 from gemelo.schemas.detections import Detection, DetectionKind, Detections
 from gemelo.services.camera.sources.source import EncodedImage, encoded
 from gemelo.services.camera.virtual.render import Image, Optics, expose, render
 from gemelo.services.camera.virtual.world import WorldSnapshot
-from gemelo.services.runtime.clock import SYSTEM, Clock
 
 FRESH = 500_000_000  # [ns] a joint state that is older says nothing of the time of an image
 

@@ -11,6 +11,8 @@ from typing import TypeVar
 import gemelo
 from gemelo.api.device import fault_of
 from gemelo.libraries.arm.model.gripper import jaw_objects, jaws_apart
+from gemelo.libraries.runtime.scene_meshes import SceneMeshes
+from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.control import ControlState
 from gemelo.schemas.device import DeviceState, DeviceStatus
 from gemelo.schemas.gripper import GripperState
@@ -22,8 +24,6 @@ from gemelo.schemas.scene import Contacts, PlanningScene, SceneObject
 from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import Topic
 from gemelo.services.panel.model.pace import DrawPace
-from gemelo.services.runtime.scene_meshes import SceneMeshes
-from gemelo.services.runtime.topics import Latest
 
 M = TypeVar("M", bound=Message)
 

@@ -8,11 +8,11 @@ from functools import partial
 from queue import SimpleQueue
 
 import gemelo
+from gemelo.libraries.runtime.errors import NoAnswer
+from gemelo.libraries.runtime.requests.client import PendingCall
 from gemelo.schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
 from gemelo.schemas.topics import DEVICE_STOP
 from gemelo.services.panel.model.problems import Problem, problem_of
-from gemelo.services.runtime.errors import NoAnswer
-from gemelo.services.runtime.requests.client import PendingCall
 
 Call = PendingCall[DeviceStopRequest, DeviceCommandResponse]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gemelo.libraries.runtime.deployment import deployments_beside, robot_name
 from gemelo.schemas.deployment import Deployment
 from gemelo.services.panel.view.kit import esc
 from gemelo.services.panel.words.words import Words
-from gemelo.services.runtime.deployment import deployments_beside, robot_name
 
 # By the name that this page was opened with: through a tunnel that is not the one which the other listens on.
 THERE = "this.hostname = location.hostname"

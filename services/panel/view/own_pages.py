@@ -18,9 +18,9 @@ from websockets.asyncio import server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
+from gemelo.libraries.runtime.process.own_names import host_objection, own_names
 from gemelo.services.panel.view.broken_connections import BrokenConnections
 from gemelo.services.panel.view.own_pace import PacedConnection
-from gemelo.services.runtime.process.own_names import host_objection, own_names
 
 Handler = Callable[[ServerConnection, Request], Response | None]
 

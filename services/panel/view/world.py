@@ -11,12 +11,12 @@ import numpy as np
 import viser
 
 import gemelo
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.panel.model.goal import GoalState
 from gemelo.services.panel.model.operator import Operator
 from gemelo.services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, ToolTurns
 from gemelo.services.panel.view.arms import Array, DrawnArm
 from gemelo.services.panel.view.obstacles import DrawnObstacles
-from gemelo.services.runtime.deployment import project_root
 
 GOAL, BAD_GOAL, GHOST = (1.0, 0.62, 0.1, 0.45), (0.9, 0.2, 0.15, 0.5), (0.25, 0.55, 1.0, 0.35)
 PLANNED, EXECUTED = (40, 110, 230), (30, 150, 70)

@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
+from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import AnswerInputs, SceneVersion
 from gemelo.schemas.topics import ANSWER_INPUTS, Request
-from gemelo.services.runtime.node import Node
 
 
 class AnswerLog:

@@ -12,6 +12,11 @@ import msgspec
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.model.gripper import jaw_objects, jaws_apart
+from gemelo.libraries.runtime.bus.wire import Encoded, encoded
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.unwritten import RETRY
+from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import Vector
@@ -34,11 +39,6 @@ from gemelo.services.planner.scene.scene_check import usable_part
 from gemelo.services.planner.scene.scene_file import FILE, DamagedScene, load_scene, put_aside, save_scene
 from gemelo.services.planner.scene.scene_store import SceneStore, changed, drawn_epoch
 from gemelo.services.planner.scene.standing import link_poses, standing, version_of
-from gemelo.services.runtime.bus.wire import Encoded, encoded
-from gemelo.services.runtime.deployment import project_root
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.process.unwritten import RETRY
-from gemelo.services.runtime.topics import Latest
 
 SETTLING = 0.003  # [m] chosen: by less the jaws settle, and plans stay those of the present scene
 PUBLISH_AGAIN = 0.5  # [s] between two answers to the scenes of others; chosen: two planners do not flood each other

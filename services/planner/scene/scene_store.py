@@ -11,14 +11,14 @@ from typing import TypeVar
 import msgspec
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.runtime.bus.wire import TooLarge, encoded
+from gemelo.libraries.runtime.clock import SYSTEM, Clock
 from gemelo.schemas.scene import PlanningScene, SceneGrip, SceneRelease, SceneRequest, SceneResponse
 from gemelo.schemas.scene_meshes import by_digest, edit_with_meshes, meshes_in
 from gemelo.services.planner.collision.scene_shapes import Folders, SceneError
 from gemelo.services.planner.scene.grasp import find_grasp
 from gemelo.services.planner.scene.scene_check import require_scene
 from gemelo.services.planner.scene.scene_edit import LinkPoses, edited
-from gemelo.services.runtime.bus.wire import TooLarge, encoded
-from gemelo.services.runtime.clock import SYSTEM, Clock
 
 W = TypeVar("W")
 

@@ -9,6 +9,7 @@ import itertools
 from contextlib import suppress
 from functools import partial
 
+from gemelo.libraries.runtime.clock import Clock
 from gemelo.schemas.planning import PlanCancelResult, PlanCode, PlanProgress, PlanRequest, PlanResponse, Timing
 from gemelo.services.planner.collision.sphere_check import counted_time
 from gemelo.services.planner.collision.world import World
@@ -33,7 +34,6 @@ from gemelo.services.planner.workers.workers import (
     objection_to,
     progress_of,
 )
-from gemelo.services.runtime.clock import Clock
 
 # Measured: the time of a long native search between two questions whether its time is over, and how many times as long
 # it is in Python, where a question stands before whole checks.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
+from gemelo.libraries.runtime.clock import SYSTEM, Clock
 from gemelo.schemas.planning import PlanCode, PlanInputs, PlanPhase, PlanProgress, PlanRequest, PlanResponse, Refusal
-from gemelo.services.runtime.clock import SYSTEM, Clock
 
 WORDS = {
     PlanPhase.WAITING: "waiting",

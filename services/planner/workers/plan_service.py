@@ -7,6 +7,9 @@ from typing import Protocol
 
 from msgspec.structs import replace
 
+from gemelo.libraries.runtime.bus.wire import TooLarge, encoded
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.requests.server import Pending
 from gemelo.schemas.planning import (
     PlanCancel,
     PlanCancelResult,
@@ -21,9 +24,6 @@ from gemelo.services.planner.core import Planner
 from gemelo.services.planner.request.refusals import too_large
 from gemelo.services.planner.scene.scene_keeper import SceneKeeper
 from gemelo.services.planner.workers.pending_plan import Answer, OnInputs
-from gemelo.services.runtime.bus.wire import TooLarge, encoded
-from gemelo.services.runtime.node import Node
-from gemelo.services.runtime.requests.server import Pending
 
 
 class PlanMaker(Protocol):

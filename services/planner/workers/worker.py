@@ -16,6 +16,7 @@ from queue import SimpleQueue
 from typing import IO
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.runtime.process.priority import step_behind
 from gemelo.schemas.planning import PlanPhase, PlanResponse, Refusal, Timing
 from gemelo.services.planner.collision.sphere_check import cancel_flag
 from gemelo.services.planner.collision.world import World
@@ -37,7 +38,6 @@ from gemelo.services.planner.workers.jobs import (
     receive,
     send,
 )
-from gemelo.services.runtime.process.priority import step_behind
 
 
 class AtHand:

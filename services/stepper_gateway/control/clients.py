@@ -11,7 +11,7 @@ from gemelo.services.stepper_gateway.goals.rejections import invalid
 
 LOCAL = "local"  # the principal of a node without a certificate
 
-# `@id/<principal>/<node>/<start [ns]>.<pid>.<host>` (services/runtime/bus/identity.py); nothing that a key
+# `@id/<principal>/<node>/<start [ns]>.<pid>.<host>` (libraries/runtime/bus/identity.py); nothing that a key
 # gives a meaning. Recordings of before have no principal.
 TOKEN = re.compile(
     r"@id/(?:([a-z0-9][a-z0-9_.-]{0,95})/)?([a-z0-9][a-z0-9_-]{0,63})/[0-9]{20}\.[0-9]{1,10}\.([A-Za-z0-9_-]{1,64})"
@@ -34,7 +34,7 @@ class ControlClient:
     node: str
     host: str
     session: str
-    address: str  # of the node (services/runtime/bus/branches.py)
+    address: str  # of the node (libraries/runtime/bus/branches.py)
 
     def is_caller(self, caller: MotionCaller) -> bool:
         """True if `caller` names this node."""

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import msgspec
 
-from gemelo.services.runtime.clock import SYSTEM, Clock
-from gemelo.services.runtime.process.own_files import own_file
-from gemelo.services.runtime.process.unwritten import RETRY, UnwrittenFiles
+from gemelo.libraries.runtime.clock import SYSTEM, Clock
+from gemelo.libraries.runtime.process.own_files import own_file
+from gemelo.libraries.runtime.process.unwritten import RETRY, UnwrittenFiles
 from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
 
 LAST_WRITE = 2.0  # [s] that the end of the process waits for the disk; chosen: process-compose waits longer

@@ -12,8 +12,8 @@ from enum import IntEnum, IntFlag
 
 import msgspec
 
+from gemelo.libraries.runtime.serial_frames import MAGIC, VERSION, build_frame
 from gemelo.schemas.message import Vector
-from gemelo.services.runtime.serial_frames import MAGIC, VERSION, build_frame
 
 UNITY = 32768.0  # of a time scale; standard: Q1.15 of firmware/PROTOCOL.md
 Q8 = 256.0  # of a velocity; standard: Q24.8 of firmware/PROTOCOL.md

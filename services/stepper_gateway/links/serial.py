@@ -11,7 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from gemelo.services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
+from gemelo.libraries.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 from gemelo.services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
 from gemelo.services.stepper_gateway.links.frames import FrameType
 from gemelo.services.stepper_gateway.links.link import Kind, Received

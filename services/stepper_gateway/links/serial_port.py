@@ -11,7 +11,7 @@ from typing import Protocol
 import serial
 from serial.tools import list_ports
 
-from gemelo.services.runtime.process.unwritten import remedy_of
+from gemelo.libraries.runtime.process.unwritten import remedy_of
 
 READ_TIMEOUT = 0.1  # [s] after which the reader looks whether it is to end; chosen: a stop of the process is not felt
 WRITE_TIMEOUT = 0.5  # [s] after which a line that takes nothing is given up; chosen: as a heartbeat's silence

@@ -19,8 +19,8 @@ from functools import partial
 from types import TracebackType
 from typing import Self
 
-from gemelo.services.runtime.process.own_names import host_objection
-from gemelo.services.runtime.process.ports import PortTaken
+from gemelo.libraries.runtime.process.own_names import host_objection
+from gemelo.libraries.runtime.process.ports import PortTaken
 
 Address = tuple[str, int]
 

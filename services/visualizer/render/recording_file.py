@@ -14,8 +14,8 @@ from pathlib import Path
 
 import rerun as rr
 
-from gemelo.services.runtime.process.own_files import make_own
-from gemelo.services.runtime.process.unwritten import RETRY
+from gemelo.libraries.runtime.process.own_files import make_own
+from gemelo.libraries.runtime.process.unwritten import RETRY
 from gemelo.services.visualizer.render.sink import APPLICATION, Sink
 
 TO_FLUSH = 1.0  # [s] for the disk to take what waits; chosen: one that is slower has failed

@@ -10,10 +10,10 @@ import pytest
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.planner.kinematics.centring import Centring
 from gemelo.services.planner.kinematics.descent import Descent
 from gemelo.services.planner.kinematics.targets import ToolTarget
-from gemelo.services.runtime.deployment import project_root
 
 ARMS = Path(__file__).parents[1] / "arms"
 FOLDERS = [project_root() / "urdf/rm1", project_root() / "urdf/parol6", *sorted(ARMS.iterdir())]

@@ -1,0 +1,72 @@
+"""Parameters that a node keeps for its later starts: a TOML file of its own, `<paths.run>/parameters/<node>.toml`."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+from gemelo.libraries.runtime.errors import RequestRefused
+from gemelo.schemas.system import ParameterValue
+from gemelo.schemas.text_file import NotUtf8, read_text
+
+FOLDER = "parameters"
+HEAD = "# As `gemelo param set --save` has left them; without this file the node starts as its deployment says.\n"
+_LINE = re.compile(r"at line (\d+)")
+
+
+class SavedParameters:
+    """The file of one node."""
+
+    def __init__(self, run_dir: Path, node: str) -> None:
+        self.path = run_dir / FOLDER / f"{node}.toml"
+
+    def read(self) -> dict[str, ParameterValue]:
+        """The values by name, none where there is no file; raises `RequestRefused` with the line that is wrong."""
+        try:
+            text = read_text(self.path)
+        except FileNotFoundError:
+            return {}
+        except (OSError, NotUtf8) as error:
+            raise RequestRefused(f"{self.path} cannot be read: {error}") from error
+        try:
+            values = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            found = _LINE.search(str(error))
+            where = f", line {found[1]}" if found else ""
+            raise RequestRefused(f"{self.path}{where}: {error}") from error
+        for name, value in values.items():
+            if not isinstance(value, bool | int | float | str):
+                raise RequestRefused(
+                    f"{self.path}{self.line(name)}: {name} is {value!r}, not one number, word or truth"
+                )
+        return values
+
+    def line(self, name: str) -> str:
+        """`, line 3`: where the file has the parameter; empty where it cannot be said."""
+        begin = re.compile(rf"\s*[\"']?{re.escape(name)}[\"']?\s*[=.\]]")
+        try:
+            lines = read_text(self.path).splitlines()
+        except (OSError, NotUtf8):
+            return ""
+        return next((f", line {number}" for number, each in enumerate(lines, 1) if begin.match(each)), "")
+
+    def keep(self, values: Mapping[str, ParameterValue]) -> None:
+        """Writes the file anew; raises `RequestRefused` where it cannot."""
+        beside = self.path.with_suffix(".tmp")
+        text = HEAD + "".join(f"{toml(name)} = {toml(value)}\n" for name, value in values.items())
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            beside.write_text(text, encoding="utf-8")
+            os.replace(beside, self.path)
+        except OSError as error:
+            raise RequestRefused(f"{self.path} cannot be written: {error.strerror or error}") from error
+
+
+def toml(value: ParameterValue) -> str:
+    """A value, or a name in quotes, as TOML has it."""
+    # JSON's escapes are TOML's, except that of DEL, which JSON leaves as it is.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
