@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from gemelo.libraries.vision.boards import ChessBoard, Scale, TagBoard
+from gemelo.libraries.vision.pages import PAGES, page_of
 from gemelo.services.cli.errors import ExitCode, require_folder, usage
 from gemelo.services.cli.parser import Options, Parser
 from gemelo.services.cli.units import LENGTH, parse_quantity
-from gemelo.services.vision.boards import ChessBoard, Scale, TagBoard
-from gemelo.services.vision.pages import PAGES, page_of
 
 CHESS, TAGS = "chess", "tags"
 FIRST_TAG = 200  # of the board with tags: above those that a cell has on things and places

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
+from gemelo.libraries.vision.boards import ChessBoard, Sighting
+from gemelo.libraries.vision.calibration.lens import FEWEST_SHOTS, LensFit, fit_lens
+from gemelo.libraries.vision.other_boards import other_board, remedy
+from gemelo.libraries.vision.tags import GreyImage
 from gemelo.schemas.cell import Calibration
 from gemelo.services.cli.camera_boards import bar_option, chess_board
 from gemelo.services.cli.camera_images import from_bus, from_folder, subject
 from gemelo.services.cli.errors import CommandError, ExitCode
 from gemelo.services.cli.parser import Options, Parser, positive_integer
 from gemelo.services.cli.session import connect, load_robot
-from gemelo.services.vision.boards import ChessBoard, Sighting
-from gemelo.services.vision.calibration.lens import FEWEST_SHOTS, LensFit, fit_lens
-from gemelo.services.vision.other_boards import other_board, remedy
-from gemelo.services.vision.tags import GreyImage
 
 MOST_SHOTS = 40
 ANOTHER = 0.06  # of the image's width: how far the board's points must be from where every other shot has them

@@ -10,13 +10,13 @@ import numpy as np
 
 import gemelo
 from gemelo.api.targets import FULL
+from gemelo.libraries.vision.calibration.accuracy import Accuracy, Budget, Cause, judge
 from gemelo.services.cli.camera_images import Subject, subject
 from gemelo.services.cli.camera_tip import ask_offset, step_floor, tip_length, tip_option
 from gemelo.services.cli.errors import CommandError, ExitCode, in_commands, usage
 from gemelo.services.cli.parser import Options, Parser, positive_integer
 from gemelo.services.cli.session import connect_arm, load_robot
 from gemelo.services.cli.units import LENGTH, parse_quantity
-from gemelo.services.vision.calibration.accuracy import Accuracy, Budget, Cause, judge
 
 if TYPE_CHECKING:
     from gemelo import Arm, Seen

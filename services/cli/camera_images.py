@@ -15,14 +15,14 @@ import numpy as np
 
 from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE, write_measured
 from gemelo.libraries.arm.cell.cell_file import Cell
+from gemelo.libraries.vision.rigid import Array, to_transform
+from gemelo.libraries.vision.tags import GreyImage
 from gemelo.schemas.camera import CameraImage, CameraInfo
 from gemelo.schemas.cell import CameraRecord, MeasuredCamera, Mount
 from gemelo.schemas.topics import JOINT_STATES, camera_image, camera_info
 from gemelo.services.cli.cells import cell_of
 from gemelo.services.cli.errors import CommandError, require_folder, unknown, usage
 from gemelo.services.cli.session import CommandSession, load_robot
-from gemelo.services.vision.rigid import Array, to_transform
-from gemelo.services.vision.tags import GreyImage
 
 if TYPE_CHECKING:
     from gemelo import Arm

@@ -13,6 +13,12 @@ import numpy as np
 
 import gemelo
 from gemelo.libraries.arm.frames.transforms import compose
+from gemelo.libraries.vision.boards import Sighting
+from gemelo.libraries.vision.calibration.shots import one_of
+from gemelo.libraries.vision.calibration.touches import FEWEST_TOUCHES, TouchFit, fit_touches, spread_points
+from gemelo.libraries.vision.camera_model import CameraModel, model_of
+from gemelo.libraries.vision.other_boards import other_board, remedy
+from gemelo.libraries.vision.rigid import Array
 from gemelo.services.cli import camera_poses
 from gemelo.services.cli.camera_boards import bar_option, tag_board
 from gemelo.services.cli.camera_images import from_bus, info_of, subject
@@ -20,12 +26,6 @@ from gemelo.services.cli.camera_tip import ask_offset, step_floor, tip_length, t
 from gemelo.services.cli.errors import CommandError, ExitCode, in_commands, usage
 from gemelo.services.cli.parser import Options, Parser, positive_integer
 from gemelo.services.cli.session import connect, connect_arm, load_robot
-from gemelo.services.vision.boards import Sighting
-from gemelo.services.vision.calibration.shots import one_of
-from gemelo.services.vision.calibration.touches import FEWEST_TOUCHES, TouchFit, fit_touches, spread_points
-from gemelo.services.vision.camera_model import CameraModel, model_of
-from gemelo.services.vision.other_boards import other_board, remedy
-from gemelo.services.vision.rigid import Array
 
 if TYPE_CHECKING:
     from gemelo import Arm

@@ -15,6 +15,15 @@ import numpy as np
 import gemelo
 from gemelo.libraries.arm.cell.camera_file import MOUNT_BOARD
 from gemelo.libraries.arm.model.urdf import JointKind
+from gemelo.libraries.vision.boards import Sighting, TagBoard
+from gemelo.libraries.vision.calibration.link_pose import link_pose
+from gemelo.libraries.vision.calibration.mount import FEWEST_POSES, MountFit, fit_mount
+from gemelo.libraries.vision.calibration.poses import Belief, Chosen, choose_poses
+from gemelo.libraries.vision.calibration.reprojection import BoardView, Carrier
+from gemelo.libraries.vision.calibration.shots import one_of, without_hidden
+from gemelo.libraries.vision.camera_model import model_of
+from gemelo.libraries.vision.other_boards import other_board, remedy
+from gemelo.libraries.vision.rigid import Array, from_transform, rigid, to_transform
 from gemelo.schemas.camera import CameraInfo
 from gemelo.services.cli.camera_boards import tag_board
 from gemelo.services.cli.camera_images import Eye, Subject
@@ -24,15 +33,6 @@ from gemelo.services.cli.request_text import joints_text
 from gemelo.services.cli.session import connect_arm, load_robot
 from gemelo.services.cli.terminal import confirm
 from gemelo.services.cli.units import LENGTH, parse_quantity
-from gemelo.services.vision.boards import Sighting, TagBoard
-from gemelo.services.vision.calibration.link_pose import link_pose
-from gemelo.services.vision.calibration.mount import FEWEST_POSES, MountFit, fit_mount
-from gemelo.services.vision.calibration.poses import Belief, Chosen, choose_poses
-from gemelo.services.vision.calibration.reprojection import BoardView, Carrier
-from gemelo.services.vision.calibration.shots import one_of, without_hidden
-from gemelo.services.vision.camera_model import model_of
-from gemelo.services.vision.other_boards import other_board, remedy
-from gemelo.services.vision.rigid import Array, from_transform, rigid, to_transform
 
 if TYPE_CHECKING:
     from gemelo import Arm

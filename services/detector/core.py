@@ -12,6 +12,19 @@ import numpy as np
 from gemelo.libraries.arm.cell.cell_file import Cell, Tagged, height_of_frame
 from gemelo.libraries.arm.cell.colours import RGB, nearest_colour
 from gemelo.libraries.arm.frames.transforms import from_rpy
+from gemelo.libraries.vision.boxes import (
+    BoxFit,
+    ColourImage,
+    colour_strength,
+    coloured_regions,
+    coloured_windows,
+    fit_box,
+)
+from gemelo.libraries.vision.camera_model import model_of
+from gemelo.libraries.vision.rigid import Array, from_transform, inverse, to_transform
+from gemelo.libraries.vision.tag_pose import plane_pose, tag_pose
+from gemelo.libraries.vision.tags import Tag, find_tags
+from gemelo.libraries.vision.windows import Mask, Window, regions_of, windows_around
 from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import BoxThing, Colour, ColourThing, OnnxThing, TagRecord, TagThing
 from gemelo.schemas.detections import Detection, DetectionKind, Detections, Unclear
@@ -27,19 +40,6 @@ from gemelo.services.detector.regions import (
     unclear_region,
 )
 from gemelo.services.detector.user_models import BadModel, Found, PlacedThing, UserModel, standing
-from gemelo.services.vision.boxes import (
-    BoxFit,
-    ColourImage,
-    colour_strength,
-    coloured_regions,
-    coloured_windows,
-    fit_box,
-)
-from gemelo.services.vision.camera_model import model_of
-from gemelo.services.vision.rigid import Array, from_transform, inverse, to_transform
-from gemelo.services.vision.tag_pose import plane_pose, tag_pose
-from gemelo.services.vision.tags import Tag, find_tags
-from gemelo.services.vision.windows import Mask, Window, regions_of, windows_around
 
 # Tuning constants: chosen, where a line does not say measured.
 FLAT = 0.003  # [m] a tag so near to the height at which it would lie is taken to lie there

@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from gemelo.libraries.vision.boxes import ColourImage
 from gemelo.schemas.camera import CameraImage
-from gemelo.services.vision.boxes import ColourImage
 
 
 class NoPicture(ValueError):

@@ -27,9 +27,9 @@ from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import CAMERA, GATEWAY, JOINT_STATES, camera_detections, camera_image, camera_info
 
 if TYPE_CHECKING:
+    from gemelo.libraries.vision.rigid import Array
     from gemelo.services.detector.core import Detector
     from gemelo.services.detector.user_models import UserModel
-    from gemelo.services.vision.rigid import Array
 
 RATE = 1.0  # [Hz] of its own step, which does nothing: images wake it
 SLACK = 0.02  # [s] that an image may come too early
@@ -110,7 +110,7 @@ class Places:
 
         `stamp` is None where the camera's clock is not known: then only for a camera that the arm does not carry.
         """
-        from gemelo.services.vision.rigid import from_transform  # slow to load: OpenCV
+        from gemelo.libraries.vision.rigid import from_transform  # slow to load: OpenCV
 
         if not info.is_mounted:
             return None

@@ -9,13 +9,13 @@ from functools import cached_property
 import cv2
 import numpy as np
 
+from gemelo.libraries.vision.boxes import BoxFit, ColourImage, raised
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array, inverse, to_transform
+from gemelo.libraries.vision.windows import Mask, Window, halved
 from gemelo.schemas.cell import ColourThing
 from gemelo.schemas.detections import Detection, Unclear
 from gemelo.schemas.frames import Transform
-from gemelo.services.vision.boxes import BoxFit, ColourImage, raised
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array, inverse, to_transform
-from gemelo.services.vision.windows import Mask, Window, halved
 
 # Tuning constants: chosen, where a line does not say measured.
 LARGEST_ERROR = 0.7  # [px] RMS of an outline that is a box; measured: 0.1 to 0.3 for boxes, above 1 for what is none

@@ -14,11 +14,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from gemelo.libraries.vision.boxes import ColourImage, project_box, raised
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array
+from gemelo.libraries.vision.tag_pose import flat, on_plane
 from gemelo.services.detector.onnx_header import Header, NotOnnx, read_header
-from gemelo.services.vision.boxes import ColourImage, project_box, raised
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array
-from gemelo.services.vision.tag_pose import flat, on_plane
 
 GREY = 114  # of the border around an image that is not square, as YOLO is trained
 SAME = 0.45  # overlap from which on two boxes of a class are one

@@ -16,6 +16,8 @@ from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE, MOUNT_BOARD
 from gemelo.libraries.arm.cell.camera_model import believed_info
 from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.vision.rigid import from_transform, step, to_transform
+from gemelo.libraries.vision.tags import GreyImage
 from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import TagRecord
 from gemelo.services.bench.vision.mount_images import (
@@ -33,8 +35,6 @@ from gemelo.services.cli import camera_poses
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.cli.session import reported
-from gemelo.services.vision.rigid import from_transform, step, to_transform
-from gemelo.services.vision.tags import GreyImage
 
 ROOT = Path(__file__).parents[2]
 

@@ -19,6 +19,13 @@ from gemelo.libraries.arm.cell.camera_model import believed_info, exact_info
 from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.vision.boards import TagBoard, picture
+from gemelo.libraries.vision.calibration.lens import fit_lens
+from gemelo.libraries.vision.calibration.touches import spread_points
+from gemelo.libraries.vision.camera_model import model_of
+from gemelo.libraries.vision.pages import BAR, POINT, page_of
+from gemelo.libraries.vision.rigid import apply, from_transform, inverse, rigid, turn
+from gemelo.libraries.vision.tags import GreyImage
 from gemelo.schemas.cell import VirtualSource
 from gemelo.schemas.joints import JointState
 from gemelo.services.bench.vision import images
@@ -30,13 +37,6 @@ from gemelo.services.cli.camera_boards import CHESS_BOARD, TAG_BOARD, tag_board
 from gemelo.services.cli.camera_calibrate import take
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.vision.boards import TagBoard, picture
-from gemelo.services.vision.calibration.lens import fit_lens
-from gemelo.services.vision.calibration.touches import spread_points
-from gemelo.services.vision.camera_model import model_of
-from gemelo.services.vision.pages import BAR, POINT, page_of
-from gemelo.services.vision.rigid import apply, from_transform, inverse, rigid, turn
-from gemelo.services.vision.tags import GreyImage
 
 BOARD_AT = np.array([0.28, -0.02, 0.0])  # [m] of the board with tags on the table
 CELL = """

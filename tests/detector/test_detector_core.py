@@ -14,6 +14,7 @@ from gemelo.libraries.arm.cell.cell_file import Cell, load_cell
 from gemelo.libraries.arm.cell.colours import RGB, nearest_colour
 from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.vision.rigid import Array, from_transform
 from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import BoxThing, Colour, ColourThing, VirtualSource
 from gemelo.schemas.detections import Detection, Detections
@@ -21,7 +22,6 @@ from gemelo.schemas.joints import JointState
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera, true_detections
 from gemelo.services.camera.virtual.world import CameraWorld
 from gemelo.services.detector.core import Detector
-from gemelo.services.vision.rigid import Array, from_transform
 
 ON_PLANE, OF_BOX = 0.1e-3, 0.5e-3  # [m]
 

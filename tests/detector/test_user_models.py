@@ -10,13 +10,13 @@ import pytest
 from msgspec.structs import replace
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.vision.camera_model import model_of
+from gemelo.libraries.vision.rigid import from_transform, inverse
 from gemelo.schemas.cell import ColourThing, OnnxThing
 from gemelo.schemas.detections import DetectionKind
 from gemelo.services.detector.core import Detector
 from gemelo.services.detector.main import read_models
 from gemelo.services.detector.user_models import BadModel, Found, UserModel, projected_box, standing, without_doubles
-from gemelo.services.vision.camera_model import model_of
-from gemelo.services.vision.rigid import from_transform, inverse
 from tests.detector.onnx_file import red_finder
 from tests.detector.test_detector_core import Table, changed, names, off
 

@@ -13,13 +13,13 @@ from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.libraries.arm.frames.transforms import to_message
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.vision.boards import TagBoard
+from gemelo.libraries.vision.calibration.reprojection import Carrier
+from gemelo.libraries.vision.rigid import from_transform
 from gemelo.services.bench.vision.mount_images import FIRST
 from gemelo.services.bench.vision.mounting import tool_error
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.stack.stack import Stack
-from gemelo.services.vision.boards import TagBoard
-from gemelo.services.vision.calibration.reprojection import Carrier
-from gemelo.services.vision.rigid import from_transform
 from tests.stack.gemelo import gemelo
 
 ENOUGH = 1.5  # [mm] with 8 poses, of which some see nothing; with 15 `mount_images_mm` of the bench asks for 0.5

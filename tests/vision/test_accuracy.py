@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gemelo.services.vision.calibration.accuracy import Budget, Cause, judge
+from gemelo.libraries.vision.calibration.accuracy import Budget, Cause, judge
 
 BUDGET = Budget(camera=0.0001, mount=0.0004, arm=0.0008)
 TAGS = np.array([[0.26, 0.16], [0.30, -0.12], [0.22, -0.2], [0.14, -0.32], [0.4, 0.02], [0.2, 0.3]])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gemelo.libraries.vision.boards import ChessBoard, Sighting, picture
+from gemelo.libraries.vision.calibration.lens import fit_lens, tilts
+from gemelo.libraries.vision.rigid import Array, apply, rigid, turn
 from gemelo.services.bench.vision.images import Surface, render
-from gemelo.services.vision.boards import ChessBoard, Sighting, picture
-from gemelo.services.vision.calibration.lens import fit_lens, tilts
-from gemelo.services.vision.rigid import Array, apply, rigid, turn
 from tests.vision.tag_views import BARREL
 
 BOARD = ChessBoard()

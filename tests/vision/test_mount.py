@@ -10,6 +10,12 @@ import pytest
 
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.vision.boards import Sighting, TagBoard
+from gemelo.libraries.vision.calibration.mount import fit_mount
+from gemelo.libraries.vision.calibration.reprojection import Carrier
+from gemelo.libraries.vision.calibration.touches import fit_touches, spread_points
+from gemelo.libraries.vision.camera_model import of_field_of_view
+from gemelo.libraries.vision.rigid import apply, inverse, rigid
 from gemelo.services.bench.vision.mounting import (
     MountingTrial,
     closed_form,
@@ -18,12 +24,6 @@ from gemelo.services.bench.vision.mounting import (
     six_joint_trial,
     tool_error,
 )
-from gemelo.services.vision.boards import Sighting, TagBoard
-from gemelo.services.vision.calibration.mount import fit_mount
-from gemelo.services.vision.calibration.reprojection import Carrier
-from gemelo.services.vision.calibration.touches import fit_touches, spread_points
-from gemelo.services.vision.camera_model import of_field_of_view
-from gemelo.services.vision.rigid import apply, inverse, rigid
 
 MODEL = of_field_of_view(np.radians(60.0), 640, 480)
 NINE, ONE = TagBoard(), TagBoard(columns=1, rows=1)

@@ -12,6 +12,15 @@ import pytest
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.vision.boards import Sighting, TagBoard
+from gemelo.libraries.vision.calibration.link_pose import LinkAt, link_pose
+from gemelo.libraries.vision.calibration.mount import fit_mount
+from gemelo.libraries.vision.calibration.poses import Belief, Chosen, choose_poses
+from gemelo.libraries.vision.calibration.reprojection import BoardView, Carrier
+from gemelo.libraries.vision.calibration.shots import one_of, without_hidden
+from gemelo.libraries.vision.camera_model import of_field_of_view
+from gemelo.libraries.vision.rigid import Array, from_transform, inverse, rigid, turn
+from gemelo.libraries.vision.tag_pose import square
 from gemelo.services.bench.vision.mount_images import (
     Setup,
     Sight,
@@ -24,15 +33,6 @@ from gemelo.services.bench.vision.mount_images import (
     take,
 )
 from gemelo.services.bench.vision.mounting import looking, tool_error
-from gemelo.services.vision.boards import Sighting, TagBoard
-from gemelo.services.vision.calibration.link_pose import LinkAt, link_pose
-from gemelo.services.vision.calibration.mount import fit_mount
-from gemelo.services.vision.calibration.poses import Belief, Chosen, choose_poses
-from gemelo.services.vision.calibration.reprojection import BoardView, Carrier
-from gemelo.services.vision.calibration.shots import one_of, without_hidden
-from gemelo.services.vision.camera_model import of_field_of_view
-from gemelo.services.vision.rigid import Array, from_transform, inverse, rigid, turn
-from gemelo.services.vision.tag_pose import square
 
 MODEL = of_field_of_view(np.radians(66.0), 640, 480)
 WAYS = {

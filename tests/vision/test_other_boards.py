@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
+from gemelo.libraries.vision.boards import picture
+from gemelo.libraries.vision.other_boards import other_board, remedy
 from gemelo.services.cli.camera_boards import CHESS_BOARD, TAG_BOARD
-from gemelo.services.vision.boards import picture
-from gemelo.services.vision.other_boards import other_board, remedy
 
 PAPER = 255
 

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.windows import MARGIN, Window, halved, regions_of, windows_around
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.windows import MARGIN, Window, halved, regions_of, windows_around
 from tests.profiles import examples
 from tests.vision.tag_views import BARREL
 

@@ -11,6 +11,14 @@ import cv2
 import numpy as np
 from msgspec.structs import replace
 
+from gemelo.libraries.vision.boards import TagBoard
+from gemelo.libraries.vision.boxes import colour_strength, coloured_regions, fit_box, region_centre
+from gemelo.libraries.vision.calibration.mount import fit_mount
+from gemelo.libraries.vision.calibration.reprojection import Carrier
+from gemelo.libraries.vision.camera_model import of_field_of_view
+from gemelo.libraries.vision.rigid import Array, angle_between, rigid
+from gemelo.libraries.vision.tag_pose import flat, plane_pose, tag_pose
+from gemelo.libraries.vision.tags import find_tags
 from gemelo.services.bench.figures import Figure, NotMeasured, of_samples, quantile
 from gemelo.services.bench.scenes import parol6, rm1
 from gemelo.services.bench.vision.images import (
@@ -31,14 +39,6 @@ from gemelo.services.bench.vision.mount_images import (
 )
 from gemelo.services.bench.vision.mounting import MountingTrial, closed_form, level_trial, six_joint_trial, tool_error
 from gemelo.services.bench.vision.naive import APRILTAG_SHIFT, METHODS, opencv_corners, opencv_pose
-from gemelo.services.vision.boards import TagBoard
-from gemelo.services.vision.boxes import colour_strength, coloured_regions, fit_box, region_centre
-from gemelo.services.vision.calibration.mount import fit_mount
-from gemelo.services.vision.calibration.reprojection import Carrier
-from gemelo.services.vision.camera_model import of_field_of_view
-from gemelo.services.vision.rigid import Array, angle_between, rigid
-from gemelo.services.vision.tag_pose import flat, plane_pose, tag_pose
-from gemelo.services.vision.tags import find_tags
 
 MODEL = of_field_of_view(np.radians(60.0), 640, 480)
 SIZE, DISTANCE = 0.03, 0.5  # [m]

@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array, apply, rigid
+from gemelo.libraries.vision.tags import DEFAULT_FAMILY, tag_modules
 from gemelo.schemas.cell import TagFamily
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array, apply, rigid
-from gemelo.services.vision.tags import DEFAULT_FAMILY, tag_modules
 
 Image = NDArray[np.uint8]
 

@@ -17,18 +17,18 @@ from gemelo.libraries.arm.cell.cell_file import Cell
 from gemelo.libraries.arm.frames.transforms import from_rpy, to_message
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.vision.boards import Sighting, TagBoard
+from gemelo.libraries.vision.calibration.link_pose import link_pose
+from gemelo.libraries.vision.calibration.poses import Belief, Chosen, choose_poses
+from gemelo.libraries.vision.calibration.reprojection import BoardView, Carrier
+from gemelo.libraries.vision.calibration.shots import one_of, without_hidden
+from gemelo.libraries.vision.camera_model import CameraModel, model_of
+from gemelo.libraries.vision.rigid import Array, from_transform, step
+from gemelo.libraries.vision.tags import GreyImage
 from gemelo.schemas.cell import CameraRecord, TagRecord, VirtualSource
 from gemelo.schemas.joints import JointState
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
 from gemelo.services.camera.virtual.world import CameraWorld
-from gemelo.services.vision.boards import Sighting, TagBoard
-from gemelo.services.vision.calibration.link_pose import link_pose
-from gemelo.services.vision.calibration.poses import Belief, Chosen, choose_poses
-from gemelo.services.vision.calibration.reprojection import BoardView, Carrier
-from gemelo.services.vision.calibration.shots import one_of, without_hidden
-from gemelo.services.vision.camera_model import CameraModel, model_of
-from gemelo.services.vision.rigid import Array, from_transform, step
-from gemelo.services.vision.tags import GreyImage
 
 FIRST = 200  # id of the board's first tag
 OFF = np.array([0.06, -0.05, 0.04, 0.015, -0.02, 0.01])  # [rad], [m] of what is believed of the camera at first

@@ -9,10 +9,10 @@ import numpy as np
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.services.vision.boards import Sighting, TagBoard
-from gemelo.services.vision.calibration.reprojection import BoardView, Carrier
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array, apply, inverse, rigid, step, turn
+from gemelo.libraries.vision.boards import Sighting, TagBoard
+from gemelo.libraries.vision.calibration.reprojection import BoardView, Carrier
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array, apply, inverse, rigid, step, turn
 
 
 @dataclass(frozen=True)

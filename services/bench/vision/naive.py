@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array, from_opencv
-from gemelo.services.vision.tag_pose import square
-from gemelo.services.vision.tags import DEFAULT_FAMILY, FAMILIES
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array, from_opencv
+from gemelo.libraries.vision.tag_pose import square
+from gemelo.libraries.vision.tags import DEFAULT_FAMILY, FAMILIES
 
 METHODS = {"SUBPIX": cv2.aruco.CORNER_REFINE_SUBPIX, "APRILTAG": cv2.aruco.CORNER_REFINE_APRILTAG}
 APRILTAG_SHIFT = 0.5  # [px] by which APRILTAG's corners are off along both axes

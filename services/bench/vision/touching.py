@@ -14,6 +14,12 @@ from gemelo.libraries.arm.cell.camera_model import exact_info
 from gemelo.libraries.arm.cell.cell_file import Cell
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.vision.boards import Sighting, TagBoard
+from gemelo.libraries.vision.calibration.reprojection import Carrier
+from gemelo.libraries.vision.calibration.shots import one_of
+from gemelo.libraries.vision.calibration.touches import TOUCH_SIGMA, fit_touches, spread_points
+from gemelo.libraries.vision.camera_model import CameraModel, model_of
+from gemelo.libraries.vision.rigid import Array, apply, from_transform, rigid
 from gemelo.schemas.cell import CameraRecord, TagRecord, VirtualSource
 from gemelo.schemas.joints import JointState
 from gemelo.services.bench.figures import Figure, of_samples, quantile
@@ -22,12 +28,6 @@ from gemelo.services.bench.vision.mounting import tool_error
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
 from gemelo.services.camera.virtual.world import CameraWorld
 from gemelo.services.cli.camera_mount import ENOUGH_TAGS, IMAGES, TOUCHES
-from gemelo.services.vision.boards import Sighting, TagBoard
-from gemelo.services.vision.calibration.reprojection import Carrier
-from gemelo.services.vision.calibration.shots import one_of
-from gemelo.services.vision.calibration.touches import TOUCH_SIGMA, fit_touches, spread_points
-from gemelo.services.vision.camera_model import CameraModel, model_of
-from gemelo.services.vision.rigid import Array, apply, from_transform, rigid
 
 # Four samples a side: with two the edges of a board that lies along the rows of the image are drawn 0.3 px off.
 CAMERA = CameraRecord(

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from gemelo.services.vision.boards import Sighting
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array, apply, from_opencv, inverse, rigid
+from gemelo.libraries.vision.boards import Sighting
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array, apply, from_opencv, inverse, rigid
 
 FEWEST_TOUCHES = 4
 TOUCH_SIGMA = 0.0005  # [m] of a touch that a person has aimed

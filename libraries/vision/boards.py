@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array
+from gemelo.libraries.vision.tag_pose import square
+from gemelo.libraries.vision.tags import FAMILIES, GreyImage, doubled, find_tags, tag_modules
 from gemelo.schemas.cell import TagFamily
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array
-from gemelo.services.vision.tag_pose import square
-from gemelo.services.vision.tags import FAMILIES, GreyImage, doubled, find_tags, tag_modules
 
 BOARD_FAMILY = TagFamily.ARUCO_5X5_100  # of the markers between the chessboard's squares
 EVEN = 0.87  # of its clearest edge's contrast the faintest edge of a tag has, or it is partly hidden

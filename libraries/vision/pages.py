@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gemelo.services.vision.boards import Square
+from gemelo.libraries.vision.boards import Square
 
 POINT = 0.0254 / 72.0  # [m] the unit of a page
 PAGES = {"a4": (0.210, 0.297), "letter": (0.2159, 0.2794), "a3": (0.297, 0.420)}  # [m] width and height, upright

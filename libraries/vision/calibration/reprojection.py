@@ -13,10 +13,10 @@ from enum import Enum
 
 import numpy as np
 
-from gemelo.services.vision.boards import Sighting
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array, apply, inverse
-from gemelo.services.vision.tag_pose import moved
+from gemelo.libraries.vision.boards import Sighting
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array, apply, inverse
+from gemelo.libraries.vision.tag_pose import moved
 
 ROUNDS = 60
 ARM_SIGMA = np.array([0.002] * 3 + [0.0005] * 3)  # [rad], [m] prior of the arm's error in a pose

@@ -10,7 +10,7 @@ from gemelo.libraries.arm.frames.transforms import inverse, to_message
 from gemelo.libraries.arm.kinematics.chain import complete, joint_transform, link_transforms
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
-from gemelo.services.vision.rigid import Array, from_transform
+from gemelo.libraries.vision.rigid import Array, from_transform
 
 LinkAt = Callable[[Array], Array]  # base_from_link (4, 4) at joint values (n,) [rad] or [m] in the arm's order
 

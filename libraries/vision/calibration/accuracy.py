@@ -13,7 +13,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from gemelo.services.vision.rigid import Array
+from gemelo.libraries.vision.rigid import Array
 
 FEWEST_TO_TELL = 2  # tags: one shows how large the error is, not where it comes from
 SURE = 2.0  # standard deviations that an error may have

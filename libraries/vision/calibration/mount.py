@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from gemelo.services.vision.calibration.board_scale import wrong_scale
-from gemelo.services.vision.calibration.determined import determined
-from gemelo.services.vision.calibration.reprojection import (
+from gemelo.libraries.vision.calibration.board_scale import wrong_scale
+from gemelo.libraries.vision.calibration.determined import determined
+from gemelo.libraries.vision.calibration.reprojection import (
     BoardView,
     CalibrationState,
     Carrier,
@@ -25,8 +25,8 @@ from gemelo.services.vision.calibration.reprojection import (
     problem_of,
     solve,
 )
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array, from_opencv, inverse, rigid
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array, from_opencv, inverse, rigid
 
 FEWEST_POSES = 5
 SUSPECT_AT, OUTLIER_AT = 2.5, 4.0  # times the median error: a view to try without, one that does not agree

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from gemelo.services.vision.boards import Sighting
-from gemelo.services.vision.calibration.touches import board_in_camera
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array
-from gemelo.services.vision.tag_pose import residuals
+from gemelo.libraries.vision.boards import Sighting
+from gemelo.libraries.vision.calibration.touches import board_in_camera
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array
+from gemelo.libraries.vision.tag_pose import residuals
 
 STEADY = 0.7  # [px] that a point may be elsewhere in another image
 BLURRED = 0.2  # [px] standard deviation of a corner in an image that is out of focus or smeared

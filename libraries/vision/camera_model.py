@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.vision.windows import Window
 from gemelo.schemas.camera import CameraInfo
-from gemelo.services.vision.windows import Window
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gemelo.services.vision.calibration.reprojection import (
+from gemelo.libraries.vision.calibration.reprojection import (
     ARM_SIGMA,
     CalibrationState,
     Reprojection,
@@ -16,7 +16,7 @@ from gemelo.services.vision.calibration.reprojection import (
     solve,
     view_slopes,
 )
-from gemelo.services.vision.rigid import Array
+from gemelo.libraries.vision.rigid import Array
 
 ROUNDS = 3
 LEAST_OFF = 0.01  # a share that a board may be larger or smaller than said

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from gemelo.services.vision.boards import Sighting
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array, from_opencv
+from gemelo.libraries.vision.boards import Sighting
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array, from_opencv
 
 FEWEST_SHOTS = 8
 LARGEST_FOCAL_SIGMA = 0.004  # of the focal length

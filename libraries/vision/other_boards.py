@@ -7,8 +7,8 @@ from functools import cache
 import cv2
 import numpy as np
 
-from gemelo.services.vision.boards import ChessBoard, TagBoard
-from gemelo.services.vision.tags import FAMILIES, GreyImage
+from gemelo.libraries.vision.boards import ChessBoard, TagBoard
+from gemelo.libraries.vision.tags import FAMILIES, GreyImage
 
 # Of each kind of tag the smallest dictionary first: its tags are in the larger ones too. Those with few bits find tags
 # where there are none, so they count from FEWEST_OF_WEAK on.

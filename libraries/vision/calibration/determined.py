@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gemelo.services.vision.calibration.reprojection import (
+from gemelo.libraries.vision.calibration.reprojection import (
     ARM_SIGMA,
     KNOWN,
     CalibrationState,
@@ -13,7 +13,7 @@ from gemelo.services.vision.calibration.reprojection import (
     prior_slopes,
     view_slopes,
 )
-from gemelo.services.vision.rigid import Array
+from gemelo.libraries.vision.rigid import Array
 
 LENGTH = 0.2  # [m] at which a turn counts as much as a step
 SCALE = np.tile([1.0 / LENGTH] * 3 + [1.0] * 3, 2)

@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array, angle_between, apply, from_opencv, rigid, solved, step
-from gemelo.services.vision.tags import Tag
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array, angle_between, apply, from_opencv, rigid, solved, step
+from gemelo.libraries.vision.tags import Tag
 
 ROUNDS = 10
 SETTLING = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 1e-9)

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.edges import LEAST_NOISE, Index, Measure, find_steps, measure_steps, middles
-from gemelo.services.vision.rigid import Array, apply, rigid, solved
-from gemelo.services.vision.tag_pose import flat, on_plane
-from gemelo.services.vision.windows import Mask, Window, regions_of, windows_around
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.edges import LEAST_NOISE, Index, Measure, find_steps, measure_steps, middles
+from gemelo.libraries.vision.rigid import Array, apply, rigid, solved
+from gemelo.libraries.vision.tag_pose import flat, on_plane
+from gemelo.libraries.vision.windows import Mask, Window, regions_of, windows_around
 
 ColourImage = NDArray[np.uint8]
 

@@ -14,9 +14,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.edges import (
+    LEAST_NOISE,
+    Index,
+    Lines,
+    Measure,
+    Steps,
+    find_steps,
+    fit_lines,
+    measure_steps,
+)
 from gemelo.schemas.cell import TagFamily
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.edges import LEAST_NOISE, Index, Lines, Measure, Steps, find_steps, fit_lines, measure_steps
 
 Array = NDArray[np.float64]
 GreyImage = NDArray[np.uint8]

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gemelo.services.vision.boards import Sighting
-from gemelo.services.vision.calibration.determined import determined, information, prior_information
-from gemelo.services.vision.calibration.link_pose import LinkAt
-from gemelo.services.vision.calibration.reprojection import BoardView, Carrier, Reprojection, exact_arm, problem_of
-from gemelo.services.vision.calibration.touches import board_in_camera
-from gemelo.services.vision.camera_model import CameraModel
-from gemelo.services.vision.rigid import Array, apply, inverse, rigid, turn, turn_vector
+from gemelo.libraries.vision.boards import Sighting
+from gemelo.libraries.vision.calibration.determined import determined, information, prior_information
+from gemelo.libraries.vision.calibration.link_pose import LinkAt
+from gemelo.libraries.vision.calibration.reprojection import BoardView, Carrier, Reprojection, exact_arm, problem_of
+from gemelo.libraries.vision.calibration.touches import board_in_camera
+from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.rigid import Array, apply, inverse, rigid, turn, turn_vector
 
 DRAWN = 160  # poses of the board
 MOST_TILT = np.radians(40.0)  # of the board from facing the camera
