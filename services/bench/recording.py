@@ -8,6 +8,10 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.incidents import Incident
+from gemelo.libraries.recordings.reader import RecordingReader
+from gemelo.libraries.recordings.table import recorded_topics
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.device import DeviceFault, DeviceMode, DeviceState
 from gemelo.schemas.topics import DEVICE_STATE
@@ -15,10 +19,6 @@ from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_sa
 from gemelo.services.bench.latency import swing
 from gemelo.services.bench.stack import Running, Stacks, cpu_seconds, families
 from gemelo.services.logger.black_box import BlackBox, write_black_box
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.incidents import Incident
-from gemelo.services.recordings.reader import RecordingReader
-from gemelo.services.recordings.table import recorded_topics
 from gemelo.services.replay.main import SERVICES, replay, text_of
 from gemelo.services.replay.make_recordings import FOLDER
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.libraries.recordings.contents import Contents, WriterClock, contents_of
+from gemelo.libraries.recordings.export import FORMS, NothingToExport, export
+from gemelo.libraries.recordings.reader import BadRecording
+from gemelo.libraries.recordings.repair import repair
 from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.services.cli.errors import CommandError, ExitCode, unknown, usage
 from gemelo.services.cli.parser import Options, Parser, json_option
 from gemelo.services.cli.text_table import table
-from gemelo.services.recordings.contents import Contents, WriterClock, contents_of
-from gemelo.services.recordings.export import FORMS, NothingToExport, export
-from gemelo.services.recordings.reader import BadRecording
-from gemelo.services.recordings.repair import repair
 
 
 def file_option(parser: Parser) -> None:

@@ -13,6 +13,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from gemelo.libraries.recordings.export import chosen, topics_in
+from gemelo.libraries.recordings.player import NODE, Player, Roles
+from gemelo.libraries.recordings.reader import RecordingReader
+from gemelo.libraries.recordings.shadow import NAME, recorded_robot, shadow_folder, write_shadow
 from gemelo.libraries.runtime.bus.connection import connect
 from gemelo.libraries.runtime.bus.interface import Bus
 from gemelo.libraries.runtime.deployment import project_root
@@ -25,10 +29,6 @@ from gemelo.services.cli.errors import CommandError, ExitCode, usage
 from gemelo.services.cli.jog_keys import keyboard
 from gemelo.services.cli.parser import Options, Parser
 from gemelo.services.cli.session import load_robot, require_router
-from gemelo.services.recordings.export import chosen, topics_in
-from gemelo.services.recordings.player import NODE, Player, Roles
-from gemelo.services.recordings.reader import RecordingReader
-from gemelo.services.recordings.shadow import NAME, recorded_robot, shadow_folder, write_shadow
 
 RATE = 100.0  # [Hz] of looks at what is due
 LEAVE = ("q", "x", "\x03", "\x04")

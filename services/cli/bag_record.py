@@ -9,6 +9,11 @@ from typing import Any
 
 from mcap.writer import CompressionType
 
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.mcap_file import McapFile
+from gemelo.libraries.recordings.origin import metadata_of
+from gemelo.libraries.recordings.subscriptions import Subscriptions
+from gemelo.libraries.recordings.table import recorded_topics
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import DESCRIPTION, Delivery, Topic
@@ -16,11 +21,6 @@ from gemelo.services.cli.bag import one_sentence
 from gemelo.services.cli.errors import ExitCode, unknown
 from gemelo.services.cli.parser import Options, Parser, positive_number
 from gemelo.services.cli.session import CommandSession, connect
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.mcap_file import McapFile
-from gemelo.services.recordings.origin import metadata_of
-from gemelo.services.recordings.subscriptions import Subscriptions
-from gemelo.services.recordings.table import recorded_topics
 
 COMPRESSIONS = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4, "none": CompressionType.NONE}
 WRITE_RATE = 2.0  # [Hz]

@@ -9,13 +9,7 @@ from pathlib import Path
 
 import msgspec
 
-from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.cli.bag import one_sentence
-from gemelo.services.cli.errors import CommandError, ExitCode
-from gemelo.services.cli.parser import Options, Parser, json_option
-from gemelo.services.cli.session import load_robot
-from gemelo.services.cli.text_table import table
-from gemelo.services.recordings.incidents import (
+from gemelo.libraries.recordings.incidents import (
     FOLDER,
     BlackBoxFile,
     Incident,
@@ -24,6 +18,12 @@ from gemelo.services.recordings.incidents import (
     read_incident,
     time_of,
 )
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.services.cli.bag import one_sentence
+from gemelo.services.cli.errors import CommandError, ExitCode
+from gemelo.services.cli.parser import Options, Parser, json_option
+from gemelo.services.cli.session import load_robot
+from gemelo.services.cli.text_table import table
 
 SAVING = "a black box of what has just happened is being saved: `gemelo blackbox list` has it in a few seconds"
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from gemelo.libraries.recordings.living_topic import living_topic
 from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
 from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.errors import ConfigurationError
@@ -15,7 +16,6 @@ from gemelo.schemas.topics import TOPICS, Topic
 from gemelo.services.cli.errors import unknown
 from gemelo.services.cli.node import TIMEOUT, living
 from gemelo.services.cli.session import CommandSession, connect
-from gemelo.services.recordings.living_topic import living_topic
 
 KNOWN = {topic.key: topic for topic in TOPICS}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from gemelo.libraries.recordings.table import exchanges_of, goal_request_of
 from gemelo.libraries.runtime.actions import keys
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import ACTIONS, DEVICE_COMMAND, REQUESTS, Request
@@ -16,7 +17,6 @@ from gemelo.services.cli.parser import Choices, Options, Parser, json_option
 from gemelo.services.cli.session import CommandSession, connect, share_control
 from gemelo.services.cli.text_table import table
 from gemelo.services.cli.topic import echo
-from gemelo.services.recordings.table import exchanges_of, goal_request_of
 
 if TYPE_CHECKING:
     from gemelo import Robot

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from gemelo.libraries.recordings.living_topic import LivingTopic
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import TOPICS, Topic
 from gemelo.services.cli.errors import CommandError, ExitCode, unknown
@@ -18,7 +19,6 @@ from gemelo.services.cli.parser import Choices, Options, Parser, json_option, po
 from gemelo.services.cli.session import CommandSession, connect
 from gemelo.services.cli.text_table import table
 from gemelo.services.cli.topic_ends import Ends, ends
-from gemelo.services.recordings.living_topic import LivingTopic
 
 if TYPE_CHECKING:
     from gemelo import Robot

@@ -10,6 +10,18 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.incidents import (
+    BLACK_BOX,
+    Incident,
+    IncidentKind,
+    incident_in,
+    incident_metadata,
+    saving_mark,
+)
+from gemelo.libraries.recordings.mcap_file import McapFile
+from gemelo.libraries.recordings.reader import BadRecording, RecordingReader
+from gemelo.libraries.recordings.view_layout import layout_metadata, layout_of
 from gemelo.libraries.runtime.bus.wire import MAX_PAYLOAD_OF
 from gemelo.libraries.runtime.process.own_files import own_folder
 from gemelo.schemas.message import Message, encode
@@ -19,18 +31,6 @@ from gemelo.services.logger.core import is_past_mesh
 from gemelo.services.logger.files import MCAP, prune, stem_of
 from gemelo.services.logger.incident_story import incident_of
 from gemelo.services.logger.incident_watch import IncidentWatch, Trigger
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.incidents import (
-    BLACK_BOX,
-    Incident,
-    IncidentKind,
-    incident_in,
-    incident_metadata,
-    saving_mark,
-)
-from gemelo.services.recordings.mcap_file import McapFile
-from gemelo.services.recordings.reader import BadRecording, RecordingReader
-from gemelo.services.recordings.view_layout import layout_metadata, layout_of
 
 SECOND = 1_000_000_000  # [ns]
 AFTERWARDS = 3 * SECOND  # [ns] that are waited for what follows an incident

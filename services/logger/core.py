@@ -6,13 +6,13 @@ from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import Any
 
+from gemelo.libraries.recordings.channels import Entry
 from gemelo.schemas.device import CommandAck, CommandChunk
 from gemelo.schemas.message import Message
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.scene_meshes import digests_in
 from gemelo.schemas.topics import Delivery, Topic, scene_mesh
 from gemelo.services.logger.command_log import CommandLog, CommandRow
-from gemelo.services.recordings.channels import Entry
 
 MAX_WAITING = 10_000  # messages held while the disk refuses: about half a minute of full motion
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from gemelo.libraries.recordings.foxglove import CAMERA, IMAGE
+from gemelo.libraries.recordings.foxglove_schemas import Quaternion, Time, Vector3, time_of
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.camera import CameraImage, CameraInfo
 from gemelo.schemas.message import Message, Vector
 from gemelo.schemas.topics import LATCHED, LATEST, Delivery, Topic, camera_image, camera_info
-from gemelo.services.recordings.foxglove import CAMERA, IMAGE
-from gemelo.services.recordings.foxglove_schemas import Quaternion, Time, Vector3, time_of
 
 PERIOD_SLACK = 0.2  # of the time between two images: one that comes so much early counts as on time
 SECOND = 1_000_000_000  # [ns]

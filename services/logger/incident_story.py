@@ -10,6 +10,8 @@ import msgspec
 
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint, urdf_of
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.incidents import BLACK_BOX, Happening, Incident, time_of
 from gemelo.libraries.runtime.actions import keys
 from gemelo.libraries.runtime.requests.exchanges import PREFIX
 from gemelo.schemas.actions import GoalStatusCode
@@ -22,8 +24,6 @@ from gemelo.schemas.planning import PlanResponse
 from gemelo.schemas.system import LogLevel, LogRecord, ParameterChange
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, JOINT_STATES
 from gemelo.services.logger.incident_watch import STOPPED, Trigger
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.incidents import BLACK_BOX, Happening, Incident, time_of
 
 SECOND = 1_000_000_000  # [ns]
 BEFORE, AFTER = 20, 20  # happenings that are told at most

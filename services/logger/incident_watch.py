@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from gemelo.libraries.recordings.incidents import IncidentKind
 from gemelo.libraries.runtime.actions import keys
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceEvent, DeviceFault, DeviceMode, DeviceState
@@ -13,7 +14,6 @@ from gemelo.schemas.message import Message
 from gemelo.schemas.roles import SERVICES
 from gemelo.schemas.system import NodeStatistics
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, Topic
-from gemelo.services.recordings.incidents import IncidentKind
 
 STOPPED = (DeviceMode.FAULT, DeviceMode.ESTOP)
 ENDED = keys.ended_topic(FOLLOW_JOINT_TRAJECTORY).key

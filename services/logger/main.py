@@ -6,6 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from gemelo.libraries.arm.cell.cell_file import deployed_cell
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.incidents import FOLDER, Incident
+from gemelo.libraries.recordings.origin import metadata_of
+from gemelo.libraries.recordings.subscriptions import Subscriptions
 from gemelo.libraries.runtime.application import service
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.node import Node
@@ -17,10 +21,6 @@ from gemelo.services.logger.black_box import BlackBox, BlackBoxWriter, SavingMar
 from gemelo.services.logger.core import Batch, Logger
 from gemelo.services.logger.disk import LoggerParameters, RecordingWriter
 from gemelo.services.logger.images import record_cameras
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.incidents import FOLDER, Incident
-from gemelo.services.recordings.origin import metadata_of
-from gemelo.services.recordings.subscriptions import Subscriptions
 
 # With those who supervise it the logger has 5 s to end. On a busy machine it comes after all others: 2 s are too few.
 GRACE = 4.0  # [s] to end the recording, the black box and the session

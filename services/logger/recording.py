@@ -10,12 +10,12 @@ from itertools import groupby
 from pathlib import Path
 from typing import IO
 
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.mcap_file import McapFile
+from gemelo.libraries.recordings.table import recorded_topics
 from gemelo.libraries.runtime.process.own_files import created
 from gemelo.services.logger.command_log import CommandRow, Row, header
 from gemelo.services.logger.files import CSV, MCAP
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.mcap_file import McapFile
-from gemelo.services.recordings.table import recorded_topics
 
 
 class Recording:

@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 import msgspec
 
+from gemelo.libraries.recordings.origin import PACKAGES, processor, version_of
+from gemelo.libraries.recordings.reader import BadRecording
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.topics import Topic
-from gemelo.services.recordings.origin import PACKAGES, processor, version_of
-from gemelo.services.recordings.reader import BadRecording
 from gemelo.services.replay import planner, state_publisher, stepper_gateway
 from gemelo.services.replay.comparison import Comparison, Difference
 from gemelo.services.replay.options import add_options

@@ -21,11 +21,11 @@ from mcap.records import Channel, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 import gemelo
+from gemelo.libraries.recordings.foreign import METADATA, PROFILE
+from gemelo.libraries.recordings.mcap_file import DEPLOYMENT
+from gemelo.libraries.recordings.reader import RecordingReader
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.topics import Topic
-from gemelo.services.recordings.foreign import METADATA, PROFILE
-from gemelo.services.recordings.mcap_file import DEPLOYMENT
-from gemelo.services.recordings.reader import RecordingReader
 from gemelo.services.replay.main import SERVICES, Replayed, replay, text_of
 from gemelo.services.stack.stack import Stack, StackError
 

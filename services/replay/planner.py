@@ -14,10 +14,10 @@ from msgspec.structs import replace
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.recordings.table import exchanges_of
 from gemelo.schemas.planning import PlanCode, PlanInputs, PlanningTimes, PlanRequest, PlanResponse, SceneVersion
 from gemelo.schemas.topics import JOG_INPUTS, PLAN, PLAN_INPUTS, PLANNED_PATH, SCENE
 from gemelo.services.planner.core import LONGEST, Planner
-from gemelo.services.recordings.table import exchanges_of
 from gemelo.services.replay import planner_answers, planner_jog
 from gemelo.services.replay.comparison import Comparison
 from gemelo.services.replay.planner_answers import AnswersAgain

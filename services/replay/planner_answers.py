@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.recordings.table import exchanges_of
 from gemelo.schemas.message import Message
 from gemelo.schemas.planning import AnswerInputs
 from gemelo.schemas.scene import SceneResponse
@@ -18,7 +19,6 @@ from gemelo.schemas.topics import ANSWER_INPUTS, FK, IK, SCENE, SCENE_EDIT, STAT
 from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
 from gemelo.services.planner.scene.scene_store import SceneStore, changed
 from gemelo.services.planner.scene.standing import link_poses, standing
-from gemelo.services.recordings.table import exchanges_of
 from gemelo.services.replay.comparison import Comparison
 from gemelo.services.replay.recorded import Heard, Recorded
 from gemelo.services.replay.scenes import Scenes

@@ -14,16 +14,16 @@ from typing import Any, Generic, TypeVar, cast
 import msgspec
 
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.recordings.channels import schema_of
+from gemelo.libraries.recordings.foreign import METADATA
+from gemelo.libraries.recordings.mcap_file import DEPLOYMENT, ROBOT
+from gemelo.libraries.recordings.reader import RecordingReader, Row
+from gemelo.libraries.recordings.table import described
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.message import Message
 from gemelo.schemas.scene import SceneMesh
 from gemelo.schemas.text_file import read_text
 from gemelo.schemas.topics import Topic, scene_mesh
-from gemelo.services.recordings.channels import schema_of
-from gemelo.services.recordings.foreign import METADATA
-from gemelo.services.recordings.mcap_file import DEPLOYMENT, ROBOT
-from gemelo.services.recordings.reader import RecordingReader, Row
-from gemelo.services.recordings.table import described
 
 M = TypeVar("M", bound=Message)
 

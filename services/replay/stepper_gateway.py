@@ -12,6 +12,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.recordings.table import action_topics, recorded_topics
 from gemelo.schemas.device import GatewayInputs
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import (
@@ -23,7 +24,6 @@ from gemelo.schemas.topics import (
     Delivery,
     Topic,
 )
-from gemelo.services.recordings.table import action_topics, recorded_topics
 from gemelo.services.replay.comparison import ABSENT, Comparison
 from gemelo.services.replay.recorded import AGAIN, Heard, NotReplayable, Recorded
 from gemelo.services.stepper_gateway.core import GatewayCore

@@ -20,6 +20,11 @@ import rerun as rr
 
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.recordings.foxglove import CAMERA, IMAGE
+from gemelo.libraries.recordings.incidents import Incident, incident_in
+from gemelo.libraries.recordings.reader import BadRecording, RecordingReader, Row
+from gemelo.libraries.recordings.shadow import recorded_robot, shadow_folder, write_shadow
+from gemelo.libraries.recordings.view_layout import LAYOUT, ViewLayout
 from gemelo.libraries.runtime.deployment import DeploymentError, project_root
 from gemelo.libraries.runtime.process.own_files import make_own
 from gemelo.libraries.runtime.started import load_started
@@ -30,11 +35,6 @@ from gemelo.schemas.scene import MeshShape, PlanningScene, SceneMesh
 from gemelo.schemas.scene_meshes import with_meshes
 from gemelo.schemas.topics import DESCRIPTION, SCENE
 from gemelo.schemas.topics import scene_mesh as mesh_topic
-from gemelo.services.recordings.foxglove import CAMERA, IMAGE
-from gemelo.services.recordings.incidents import Incident, incident_in
-from gemelo.services.recordings.reader import BadRecording, RecordingReader, Row
-from gemelo.services.recordings.shadow import recorded_robot, shadow_folder, write_shadow
-from gemelo.services.recordings.view_layout import LAYOUT, ViewLayout
 from gemelo.services.visualizer.core import Visualizer
 from gemelo.services.visualizer.feeds import feeds
 from gemelo.services.visualizer.model.mesh_files import scene_mesh

@@ -13,13 +13,13 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.mcap_file import McapFile
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DESCRIPTION, Delivery, Topic
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.mcap_file import McapFile
 from gemelo.services.state_publisher.main import describe
 from tests.runtime.support import ROOT, spinning, until
 

@@ -19,14 +19,14 @@ from mcap.stream_reader import StreamReader
 
 import gemelo
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.mcap_file import McapFile
 from gemelo.libraries.runtime.deployment import load_deployment
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DESCRIPTION, JOINT_STATES, Delivery, Topic
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.mcap_file import McapFile
 from gemelo.services.state_publisher.main import describe
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.program.rerun_program import rerun_binary

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.recordings.incidents import Happening, Incident, IncidentKind, is_saving, saving_mark
+from gemelo.libraries.recordings.mcap_file import McapFile
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.logger.black_box import SavingMark, write_black_box
-from gemelo.services.recordings.incidents import Happening, Incident, IncidentKind, is_saving, saving_mark
-from gemelo.services.recordings.mcap_file import McapFile
 
 SECOND = 1_000_000_000
 START = 1_795_000_000 * SECOND

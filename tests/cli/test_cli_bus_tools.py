@@ -26,6 +26,7 @@ from msgspec import Meta
 
 import gemelo
 from gemelo.libraries.arm.frames.transforms import from_rpy, to_rpy
+from gemelo.libraries.recordings.table import exchanges_of
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.topics import Publisher
@@ -62,7 +63,6 @@ from gemelo.services.cli.field_path import FieldPath, leaves
 from gemelo.services.cli.forms import csv_lines, json_line, yaml_document
 from gemelo.services.cli.main import run
 from gemelo.services.cli.session import CommandSession
-from gemelo.services.recordings.table import exchanges_of
 from tests.runtime.support import hear, spinning
 
 WHOLE = FieldPath(FrameTransform, "")

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
+from gemelo.libraries.recordings.channels import Entry
 from gemelo.schemas.message import Message, decode, encode
 from gemelo.schemas.topics import TOPICS
 from gemelo.services.logger.core import Logger
 from gemelo.services.logger.recording import Recording
-from gemelo.services.recordings.channels import Entry
 from gemelo.services.visualizer.core import Visualizer
 from gemelo.services.visualizer.model.urdf import parse_urdf
 from tests.profiles import examples

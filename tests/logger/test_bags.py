@@ -14,6 +14,15 @@ from mcap.records import Chunk
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader, breakup_chunk
 
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.contents import contents_of
+from gemelo.libraries.recordings.export import NothingToExport, chosen, export
+from gemelo.libraries.recordings.mcap_file import McapFile
+from gemelo.libraries.recordings.player import Player, Roles, payload_of
+from gemelo.libraries.recordings.reader import BadRecording, RecordingReader
+from gemelo.libraries.recordings.repair import repair
+from gemelo.libraries.recordings.shadow import recorded_robot, write_shadow
+from gemelo.libraries.recordings.table import exchanges_of, recorded_topics
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.libraries.runtime.errors import NodeNameTaken
 from gemelo.libraries.runtime.node import Node
@@ -24,15 +33,6 @@ from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import DESCRIPTION, JOINT_STATES, LOG, PLAN
 from gemelo.services.logger.command_log import CommandRow
 from gemelo.services.logger.recording import Recording
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.contents import contents_of
-from gemelo.services.recordings.export import NothingToExport, chosen, export
-from gemelo.services.recordings.mcap_file import McapFile
-from gemelo.services.recordings.player import Player, Roles, payload_of
-from gemelo.services.recordings.reader import BadRecording, RecordingReader
-from gemelo.services.recordings.repair import repair
-from gemelo.services.recordings.shadow import recorded_robot, write_shadow
-from gemelo.services.recordings.table import exchanges_of, recorded_topics
 from gemelo.services.visualizer.program.rerun_program import rerun_binary
 from tests.schemas.samples import sample
 from tests.table import table

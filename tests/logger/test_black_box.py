@@ -12,6 +12,9 @@ from msgspec import Raw
 from msgspec.structs import replace
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.recordings.incidents import Incident, IncidentKind, black_boxes, read_incident
+from gemelo.libraries.recordings.reader import BadRecording
+from gemelo.libraries.recordings.table import action_topics, exchanges_of, goal_request_of
 from gemelo.schemas.actions import GoalResponse, GoalStatusCode
 from gemelo.schemas.device import (
     DeviceCommandResponse,
@@ -56,9 +59,6 @@ from gemelo.schemas.topics import (
 )
 from gemelo.services.logger.black_box import MOST, MOST_BYTES, BlackBox, BlackBoxWriter
 from gemelo.services.logger.incident_story import LONGEST, brief
-from gemelo.services.recordings.incidents import Incident, IncidentKind, black_boxes, read_incident
-from gemelo.services.recordings.reader import BadRecording
-from gemelo.services.recordings.table import action_topics, exchanges_of, goal_request_of
 from gemelo.services.state_publisher.main import describe
 
 SECOND = 1_000_000_000

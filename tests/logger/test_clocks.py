@@ -8,6 +8,12 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.recordings.census import Census, is_news
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.contents import contents_of
+from gemelo.libraries.recordings.mcap_file import CLOCKS, McapFile
+from gemelo.libraries.recordings.reader import RecordingReader
+from gemelo.libraries.recordings.table import NODES
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.topics import Publisher
@@ -15,12 +21,6 @@ from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.system import NodeInfo, NodeRecord, NodeStatistics, Parameter
 from gemelo.schemas.topics import STATISTICS
 from gemelo.services.cli.bag import information
-from gemelo.services.recordings.census import Census, is_news
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.contents import contents_of
-from gemelo.services.recordings.mcap_file import CLOCKS, McapFile
-from gemelo.services.recordings.reader import RecordingReader
-from gemelo.services.recordings.table import NODES
 from tests.runtime.support import hear, spinning
 from tests.runtime.test_clock_offset import Skewed
 
@@ -61,7 +61,7 @@ def test_names_that_nobody_has_hold_up_nobody(tmp_path: Path, monkeypatch: pytes
 
 
 def test_a_node_that_was_started_again_is_asked_at_once_and_one_of_long_ago_makes_place(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("gemelo.services.recordings.census.MAX_NODES", 1)
+    monkeypatch.setattr("gemelo.libraries.recordings.census.MAX_NODES", 1)
     deployment = Deployment(paths=PathsSection(run=str(tmp_path / "run"), out=str(tmp_path / "out")))
     network, records = MemoryNetwork(), []
     asked: list[tuple[str, int]] = []

@@ -6,13 +6,13 @@ from contextlib import closing
 
 from msgspec.structs import replace
 
+from gemelo.libraries.recordings.subscriptions import Subscriptions
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.device import GatewayInputs
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import GATEWAY, GATEWAY_INPUTS, JOINT_STATES, LOG
 from gemelo.services.chaos.slow_link import SlowLink
-from gemelo.services.recordings.subscriptions import Subscriptions
 from tests.runtime.support import RouterProcess, free_port, hear, until
 
 MINUTE = range(2, 122)  # two batches of what the gateway was given a second

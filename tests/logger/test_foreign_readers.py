@@ -16,13 +16,13 @@ from mcap.writer import CompressionType
 from rerun.chunk import McapReader
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.mcap_file import McapFile
+from gemelo.libraries.recordings.repair import repair
+from gemelo.libraries.recordings.table import recorded_topics
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import DESCRIPTION, JOINT_STATES, LOG
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.mcap_file import McapFile
-from gemelo.services.recordings.repair import repair
-from gemelo.services.recordings.table import recorded_topics
 from gemelo.services.state_publisher.main import describe
 from tests.logger.mcap_by_the_book import CHUNK, MESSAGE_INDEX, Book, records_of
 

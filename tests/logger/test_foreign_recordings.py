@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from mcap.writer import CompressionType, Writer
 
+from gemelo.libraries.recordings.reader import BadRecording
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.recordings.reader import BadRecording
 from gemelo.services.replay.main import CANNOT
 from gemelo.services.replay.main import main as replay
 from gemelo.services.replay.recorded import Recorded

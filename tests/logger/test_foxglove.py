@@ -10,13 +10,13 @@ from mcap.reader import make_reader
 
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.arm.model.urdf import JointKind
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.mcap_file import McapFile
 from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, PlanningScene, SceneObject, SphereShape
 from gemelo.schemas.system import LogLevel, LogRecord
 from gemelo.schemas.topics import DESCRIPTION, FRAMES, LOG, SCENE, STATIC_FRAMES
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.mcap_file import McapFile
 from gemelo.services.state_publisher.core import StatePublisher
 from gemelo.services.state_publisher.main import describe
 

@@ -15,14 +15,14 @@ from mcap.reader import make_reader
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
+from gemelo.libraries.recordings import foxglove
+from gemelo.libraries.recordings.channels import Entry, schema_of
+from gemelo.libraries.recordings.table import recorded_topics
 from gemelo.schemas.frames import FrameTransform, FrameTransforms, RobotDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, TOPICS
 from gemelo.services.logger.command_log import CommandRow
 from gemelo.services.logger.recording import Recording
-from gemelo.services.recordings import foxglove
-from gemelo.services.recordings.channels import Entry, schema_of
-from gemelo.services.recordings.table import recorded_topics
 from tests.table import table
 
 START = 1_795_000_000_000_000_000
@@ -108,7 +108,7 @@ from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import JOINT_STATES
 from gemelo.services.logger.command_log import CommandRow
 from gemelo.services.logger.recording import Recording
-from gemelo.services.recordings.channels import Entry
+from gemelo.libraries.recordings.channels import Entry
 recording = Recording(Path(sys.argv[1]), "killed", {})
 count = 0
 while True:

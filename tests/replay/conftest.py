@@ -11,7 +11,7 @@ import pytest
 from mcap.records import Channel, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
-from gemelo.services.recordings.reader import RecordingReader
+from gemelo.libraries.recordings.reader import RecordingReader
 from tests.replay.recorded_bus import planner  # noqa: F401  # a fixture
 
 RECORDINGS = Path(__file__).parent / "recordings"

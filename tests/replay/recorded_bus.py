@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.mcap_file import McapFile
+from gemelo.libraries.recordings.table import recorded_topics
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.topics import DESCRIPTION
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.mcap_file import McapFile
-from gemelo.services.recordings.table import recorded_topics
 from gemelo.services.replay.planner import PLANS, TOPICS
 from gemelo.services.state_publisher.main import describe
 from tests.planner.planning_node import beside_a_planner

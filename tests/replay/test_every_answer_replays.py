@@ -10,6 +10,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.recordings.channels import Entry
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import Message
@@ -26,7 +27,6 @@ from gemelo.schemas.planning import (
 from gemelo.schemas.scene import BoxShape, SceneAdd, SceneAttach, SceneMove, SceneObject, SceneRemove, SceneRequest
 from gemelo.schemas.topics import FK, IK, JOG, JOINT_STATES, JOINT_TARGETS, SCENE_EDIT, STATE_VALIDITY
 from gemelo.services.planner.jog.jog import SILENCE
-from gemelo.services.recordings.channels import Entry
 from gemelo.services.replay import planner_jog
 from gemelo.services.replay.main import Replayed, replay, text_of
 from gemelo.services.replay.planner_answers import UNKNOWN

@@ -9,7 +9,7 @@ import sys
 import pytest
 from mcap.records import Channel, Metadata, Schema
 
-from gemelo.services.recordings.reader import BadRecording
+from gemelo.libraries.recordings.reader import BadRecording
 from gemelo.services.replay.main import replay, text_of
 from gemelo.services.replay.recorded import NotReplayable
 from tests.replay.conftest import RECORDINGS, Messages

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.mcap_file import McapFile
 from gemelo.schemas.topics import DESCRIPTION, GATEWAY_INPUTS
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.mcap_file import McapFile
 from gemelo.services.replay.main import replay, text_of
 from gemelo.services.replay.recorded import NotReplayable
 from gemelo.services.replay.stepper_gateway import EARLIER, OUTSIDE

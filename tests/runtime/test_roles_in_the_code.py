@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.recordings.table import NODES, recorded_topics
 from gemelo.libraries.runtime.actions.keys import goal_request
 from gemelo.libraries.runtime.permissions import permissions
 from gemelo.schemas import topics
 from gemelo.schemas.roles import role
 from gemelo.schemas.topics import DEVICE_CONFIGURE, DEVICE_INJECT, Action, Request, Topic
-from gemelo.services.recordings.table import NODES, recorded_topics
 from tests.runtime.support import ROOT
 
 VERBS = {

@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import gemelo
+from gemelo.libraries.recordings.subscriptions import Subscriptions
 from gemelo.libraries.runtime.bus.wire import MAX_PAYLOAD_OF
 from gemelo.libraries.runtime.requests.exchanges import exchange_topic
 from gemelo.libraries.runtime.scene_meshes import SceneMeshes
@@ -24,7 +25,6 @@ from gemelo.schemas.topics import SCENE, SCENE_EDIT, scene_mesh
 from gemelo.services.panel.model.readings import BusReadings
 from gemelo.services.planner import main as planner_main
 from gemelo.services.planner.scene.scene_keeper import SceneKeeper
-from gemelo.services.recordings.subscriptions import Subscriptions
 
 KEEPERS: list[SceneKeeper] = []
 FAR = (3.0, 0.0, 0.0)  # [m] from where no arm is in its way

@@ -9,11 +9,11 @@ import re
 import pytest
 
 import gemelo as api
+from gemelo.libraries.recordings.mcap_file import CLOCKS
+from gemelo.libraries.recordings.reader import RecordingReader
 from gemelo.schemas.topics import camera_truth
 from gemelo.services.bench.vision.picks import FLOOR, PROCESSES
 from gemelo.services.chaos.clocks import shifted
-from gemelo.services.recordings.mcap_file import CLOCKS
-from gemelo.services.recordings.reader import RecordingReader
 from gemelo.services.stack.stack import Stack
 from tests.stack.gemelo import gemelo
 

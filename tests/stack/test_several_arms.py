@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 import gemelo as api
+from gemelo.libraries.recordings.foreign import METADATA
+from gemelo.libraries.recordings.reader import RecordingReader
 from gemelo.libraries.runtime.robots import robots_on
 from gemelo.libraries.runtime.started import deployment_of_arm
 from gemelo.schemas.actions import GoalStatusCode
-from gemelo.services.recordings.foreign import METADATA
-from gemelo.services.recordings.reader import RecordingReader
 from gemelo.services.stack.stack import Stack, free_ports
 from gemelo.services.visualizer.program.rerun_program import rerun_binary
 from tests.stack.gemelo import gemelo

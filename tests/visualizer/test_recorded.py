@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.recordings.channels import Entry
+from gemelo.libraries.recordings.incidents import Happening, Incident, IncidentKind, incident_metadata
+from gemelo.libraries.recordings.mcap_file import ROBOT, McapFile
+from gemelo.libraries.recordings.reader import BadRecording
+from gemelo.libraries.recordings.view_layout import ViewLayout, layout_metadata
 from gemelo.schemas.device import DeviceMode, DeviceState
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import DESCRIPTION, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS, Delivery, Topic
-from gemelo.services.recordings.channels import Entry
-from gemelo.services.recordings.incidents import Happening, Incident, IncidentKind, incident_metadata
-from gemelo.services.recordings.mcap_file import ROBOT, McapFile
-from gemelo.services.recordings.reader import BadRecording
-from gemelo.services.recordings.view_layout import ViewLayout, layout_metadata
 from gemelo.services.state_publisher.main import describe
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.program.rerun_program import rerun_binary

@@ -10,8 +10,8 @@ import msgspec
 import rerun as rr
 from msgspec import Meta
 
+from gemelo.libraries.recordings.view_layout import SECONDS
 from gemelo.schemas.deployment import ViewerMode, ViewerSection
-from gemelo.services.recordings.view_layout import SECONDS
 from gemelo.services.visualizer.core import Visualizer
 from gemelo.services.visualizer.program.viewer_connection import ViewerConnection
 from gemelo.services.visualizer.render.arms_layout import SharedView, arms_blueprint

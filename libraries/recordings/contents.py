@@ -10,8 +10,8 @@ from pathlib import Path
 import msgspec
 from mcap.reader import make_reader
 
-from gemelo.services.recordings.mcap_file import CLOCKS
-from gemelo.services.recordings.reader import UNREADABLE, Damage, RecordingReader
+from gemelo.libraries.recordings.mcap_file import CLOCKS
+from gemelo.libraries.recordings.reader import UNREADABLE, Damage, RecordingReader
 
 
 class TopicContents(msgspec.Struct, frozen=True, kw_only=True):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from gemelo.services.recordings.reader import RecordingReader
+from gemelo.libraries.recordings.reader import RecordingReader
 
 LONGEST_LIST = 32  # elements that get columns of their own; a longer one is one cell of JSON
 MAX_COLUMNS = 2000

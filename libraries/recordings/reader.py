@@ -19,7 +19,7 @@ from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from gemelo.services.recordings.foreign import METADATA, PROFILE, kind_of, sentence_of
+from gemelo.libraries.recordings.foreign import METADATA, PROFILE, kind_of, sentence_of
 
 S = TypeVar("S", bound=msgspec.Struct)
 

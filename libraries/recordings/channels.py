@@ -13,9 +13,9 @@ from typing import Any, TypeAlias, cast
 
 import msgspec
 
+from gemelo.libraries.recordings.table import described
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import Topic
-from gemelo.services.recordings.table import described
 
 MESSAGE_ENCODING = "json"
 SCHEMA_ENCODING = "jsonschema"

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from gemelo.services.recordings.channels import LAST_STAMP
+from gemelo.libraries.recordings.channels import LAST_STAMP
 
 Empty = tuple[Any, ...]  # of primitives that are never drawn here
 

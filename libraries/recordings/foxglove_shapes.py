@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.libraries.arm.stl import BadStl, read_stl
+from gemelo.libraries.recordings import foxglove_schemas as fox
 from gemelo.schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, Shape, SphereShape
-from gemelo.services.recordings import foxglove_schemas as fox
 
 LINK = fox.Color(r=0.85, g=0.85, b=0.87, a=1.0)
 OBJECT = fox.Color(r=0.35, g=0.55, b=0.85, a=0.7)

@@ -11,14 +11,14 @@ from dataclasses import dataclass, field
 
 import msgspec
 
+from gemelo.libraries.recordings.reader import RecordingReader, Row
+from gemelo.libraries.recordings.table import NODES, recorded_topics
 from gemelo.libraries.runtime.bus import identity
 from gemelo.libraries.runtime.bus.branches import NAME, is_of_many
 from gemelo.libraries.runtime.bus.interface import Bus, Publication
 from gemelo.schemas.message import Message, encode
 from gemelo.schemas.scene import SceneMesh
 from gemelo.schemas.topics import ANY, Delivery
-from gemelo.services.recordings.reader import RecordingReader, Row
-from gemelo.services.recordings.table import NODES, recorded_topics
 
 NODE = "player"
 NOT_PLAYED = {NODES.key}  # what the logger itself has written

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.libraries.recordings.foreign import METADATA
+from gemelo.libraries.recordings.mcap_file import DEPLOYMENT
 from gemelo.schemas.deployment import Deployment
-from gemelo.services.recordings.foreign import METADATA
-from gemelo.services.recordings.mcap_file import DEPLOYMENT
 
 PACKAGES = {  # by the name in the record
     "gemelo": "gemelo", "mcap": "mcap", "zenoh": "eclipse-zenoh", "msgspec": "msgspec", "numpy": "numpy",

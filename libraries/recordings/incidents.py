@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from gemelo.services.recordings.reader import BadRecording, RecordingReader
+from gemelo.libraries.recordings.reader import BadRecording, RecordingReader
 
 INCIDENT = "incident"  # the name of the metadata record
 BLACK_BOX = "black box: "  # the logger's line about a new one begins with it

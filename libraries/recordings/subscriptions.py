@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from gemelo.libraries.recordings.census import Census
+from gemelo.libraries.recordings.table import NODES, recorded_topics, topics_of_node
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.scene_meshes import SceneMeshes
 from gemelo.libraries.runtime.topics import Subscription
 from gemelo.schemas.message import Message
 from gemelo.schemas.system import NodeRecord
 from gemelo.schemas.topics import SCENE, Topic
-from gemelo.services.recordings.census import Census
-from gemelo.services.recordings.table import NODES, recorded_topics, topics_of_node
 
 MAX_OTHERS = 512  # topics besides those of the table: what a node tells of itself is not to be trusted for more
 ALL = 0.0  # [s] of a LATEST topic too no message is left out while a file is written

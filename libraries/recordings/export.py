@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from gemelo.libraries.recordings.reader import RecordingReader
+from gemelo.libraries.recordings.rerun_file import write_rerun
+from gemelo.libraries.recordings.series import Series, series_of
 from gemelo.libraries.runtime.process.own_files import own_file, own_folder
-from gemelo.services.recordings.reader import RecordingReader
-from gemelo.services.recordings.rerun_file import write_rerun
-from gemelo.services.recordings.series import Series, series_of
 
 Written = tuple[Path, int]  # a file, and its rows
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from gemelo.libraries.recordings import foxglove_schemas as fox
+from gemelo.libraries.recordings.channels import Channel, Entry, schema_of
+from gemelo.libraries.recordings.foxglove_shapes import Drawn, drawn_links, drawn_object, pose_of
 from gemelo.schemas.frames import FrameTransforms, RobotDescription
 from gemelo.schemas.scene import PlanningScene, SceneMesh
 from gemelo.schemas.scene_meshes import with_meshes
 from gemelo.schemas.system import LogRecord
-from gemelo.services.recordings import foxglove_schemas as fox
-from gemelo.services.recordings.channels import Channel, Entry, schema_of
-from gemelo.services.recordings.foxglove_shapes import Drawn, drawn_links, drawn_object, pose_of
 
 FRAMES, STATIC_FRAMES, LOG = "foxglove/frames", "foxglove/static_frames", "foxglove/log"
 SCENE, ARM = "foxglove/scene", "foxglove/arm"

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 import msgspec
 
+from gemelo.libraries.recordings.channels import Entry
 from gemelo.schemas.system import NodeRecord
-from gemelo.services.recordings.channels import Entry
 
 LAYOUT = "layout"  # the name of the metadata record
 SECONDS = 20.0  # [s] of the past that plots and the tool's way show where nobody has chosen

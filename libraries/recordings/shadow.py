@@ -6,8 +6,8 @@ import re
 import tomllib
 from pathlib import Path
 
-from gemelo.services.recordings.mcap_file import ROBOT
-from gemelo.services.recordings.reader import BadRecording, RecordingReader
+from gemelo.libraries.recordings.mcap_file import ROBOT
+from gemelo.libraries.recordings.reader import BadRecording, RecordingReader
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _NAME_LINE = re.compile(r'^name\s*=\s*("[^"]*"|\'[^\']*\')', re.MULTILINE)

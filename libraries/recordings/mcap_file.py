@@ -14,13 +14,13 @@ from typing import IO, Any
 import msgspec
 from mcap.writer import CompressionType, Writer
 
+from gemelo.libraries.recordings import foxglove
+from gemelo.libraries.recordings.channels import MESSAGE_ENCODING, SCHEMA_ENCODING, Channel, Entry, channel_of
+from gemelo.libraries.recordings.foreign import PROFILE
 from gemelo.libraries.runtime.process.own_files import created
 from gemelo.schemas.frames import RobotDescription
 from gemelo.schemas.system import NodeRecord
 from gemelo.schemas.topics import Topic
-from gemelo.services.recordings import foxglove
-from gemelo.services.recordings.channels import MESSAGE_ENCODING, SCHEMA_ENCODING, Channel, Entry, channel_of
-from gemelo.services.recordings.foreign import PROFILE
 
 # [B] uncompressed; more than the batch of one write (measured: 110 kB), so that each becomes one chunk: the writer
 # keeps 2 kB of index for every chunk until the file ends.

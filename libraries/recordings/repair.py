@@ -9,10 +9,10 @@ from pathlib import Path
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
+from gemelo.libraries.recordings.foreign import PROFILE
+from gemelo.libraries.recordings.mcap_file import CHUNK_SIZE
+from gemelo.libraries.recordings.reader import Damage, RecordingReader
 from gemelo.libraries.runtime.process.own_files import own_file
-from gemelo.services.recordings.foreign import PROFILE
-from gemelo.services.recordings.mcap_file import CHUNK_SIZE
-from gemelo.services.recordings.reader import Damage, RecordingReader
 
 
 @dataclass

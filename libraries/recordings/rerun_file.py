@@ -10,10 +10,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from gemelo.libraries.recordings.foxglove_shapes import Drawn, drawn_links
+from gemelo.libraries.recordings.reader import RecordingReader
+from gemelo.libraries.recordings.series import STAMPS, Series
 from gemelo.schemas.frames import FrameTransforms, RobotDescription
-from gemelo.services.recordings.foxglove_shapes import Drawn, drawn_links
-from gemelo.services.recordings.reader import RecordingReader
-from gemelo.services.recordings.series import STAMPS, Series
 
 TIMELINE = "time"  # as in the live view
 ARM = "arm"
