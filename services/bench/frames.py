@@ -13,6 +13,7 @@ from gemelo.libraries.arm.frames.frame_buffer import FrameBuffer
 from gemelo.libraries.arm.frames.transforms import to_message
 from gemelo.libraries.arm.kinematics.chain import joint_transform
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.mqtt.client import stop_loop
 from gemelo.schemas.device import DeviceState
 from gemelo.schemas.frames import FrameTransform, FrameTransforms
 from gemelo.schemas.topics import DEVICE_STATE, FRAMES
@@ -20,7 +21,6 @@ from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_sa
 from gemelo.services.bench.scenes import rm1
 from gemelo.services.bench.stack import Running, Stacks
 from gemelo.services.bench.traffic import send_at_once
-from gemelo.services.mqtt.client import stop_loop
 from gemelo.services.stepper_gateway.links.frames import BadFrame, StateFrame, decode
 
 LOOKUP_GOAL = FigureGoal(median=10.0)  # [us]

@@ -16,6 +16,7 @@ from queue import Empty, SimpleQueue
 
 from paho.mqtt.client import Client, MQTTMessage
 
+from gemelo.libraries.mqtt.client import stop_loop
 from gemelo.libraries.runtime.bus.interface import BusReply
 from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
 from gemelo.schemas.device import (
@@ -35,7 +36,6 @@ from gemelo.services.bench.figures import Figure, FigureGoal, NotMeasured, of_sa
 from gemelo.services.bench.latency import sharp_start
 from gemelo.services.bench.stack import Running, Stacks, families
 from gemelo.services.bench.traffic import FORGED, GARBAGE, OURS, SESSIONS, connected, flood
-from gemelo.services.mqtt.client import stop_loop
 
 GOAL = FigureGoal(p99=20.0)  # [ms]
 CALLS = 200  # for each condition in which the device answers

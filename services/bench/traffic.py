@@ -26,6 +26,7 @@ import msgspec
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
+from gemelo.libraries.mqtt.client import stop_loop
 from gemelo.libraries.runtime.bus.pace import Pace, Rate
 from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
 from gemelo.libraries.runtime.errors import BusError
@@ -53,7 +54,6 @@ from gemelo.schemas.topics import (
     JOINT_TARGETS,
     PLAN,
 )
-from gemelo.services.mqtt.client import stop_loop
 
 THERE, BACK = "gemelo-bench/there", "gemelo-bench/back"
 PATIENCE = 5.0  # [s] for a connection

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.deployment import MqttSection
 from gemelo.services.broker.replacement import NotInstalled
-from gemelo.services.mqtt import secure_folder
 
 PROGRAM = ".gemelo/bin/gemelo-mqtt"  # deploy/embedded_broker.sh
 PERSISTENCE = "embedded_broker.json"  # in mqtt.persistence_folder

@@ -10,6 +10,8 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
+from gemelo.libraries.mqtt.access import gateway_access
+from gemelo.libraries.mqtt.secure_folder import CERTIFICATE, require_made
 from gemelo.libraries.runtime.certificate_watch import CertificateWatch
 from gemelo.libraries.runtime.deployment import DeploymentError, exposure, load_deployment
 from gemelo.libraries.runtime.process.logs import LEVELS, line_logger
@@ -21,8 +23,6 @@ from gemelo.schemas.deployment import Broker, Deployment, MqttSection
 from gemelo.services.broker import embedded, mosquitto
 from gemelo.services.broker.replacement import NotInstalled, become
 from gemelo.services.credentials.private_files import AccessError
-from gemelo.services.mqtt.access import gateway_access
-from gemelo.services.mqtt.secure_folder import CERTIFICATE, require_made
 
 BEAT = 1.0  # [s] of the readiness file
 RENEWAL = (

@@ -7,9 +7,9 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
+from gemelo.libraries.mqtt import secure_folder
 from gemelo.schemas.deployment import MqttSection
 from gemelo.services.broker.replacement import NotInstalled
-from gemelo.services.mqtt import secure_folder
 
 OPEN = "allow_anonymous true"
 CONFIGURATION = "mosquitto.conf"

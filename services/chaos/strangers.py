@@ -11,13 +11,13 @@ from random import Random
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
+from gemelo.libraries.mqtt.client import stop_loop
 from gemelo.libraries.runtime.actions.keys import feedback_topic, status_topic
 from gemelo.libraries.runtime.bus.branches import is_of_many
 from gemelo.libraries.runtime.bus.interface import BusReply
 from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
 from gemelo.schemas.deployment import RouterSection
 from gemelo.schemas.topics import ACTIONS, CAMERA_TOPICS, TOPICS, Delivery
-from gemelo.services.mqtt.client import stop_loop
 
 KEPT = 200  # frames of the wire that can be said again
 STRANGER = "stranger"  # its name where each node has a key of its own

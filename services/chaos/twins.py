@@ -11,7 +11,7 @@ import psutil
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
-from gemelo.services.mqtt.client import stop_loop
+from gemelo.libraries.mqtt.client import stop_loop
 from gemelo.services.stack.stack import Stack, StackError
 
 TO_BEGIN = 60.0  # [s] until a second process has loaded all and shows itself, on a machine without time

@@ -6,6 +6,8 @@ import os
 from pathlib import Path
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.mqtt import secure_folder
+from gemelo.libraries.mqtt.access import AUTHORITY
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.deployment import Deployment
@@ -14,8 +16,6 @@ from gemelo.services.cli.errors import CommandError, ExitCode, usage
 from gemelo.services.cli.parser import Options, Parser, positive_integer
 from gemelo.services.cli.provision import BAUD, PASSWORDS, provision
 from gemelo.services.credentials.private_files import AccessError
-from gemelo.services.mqtt import secure_folder
-from gemelo.services.mqtt.access import AUTHORITY
 
 FOLDER = ".gemelo/broker"
 PLAIN_PORT, TLS_PORT = 1883, 8883

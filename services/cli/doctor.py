@@ -15,6 +15,7 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.libraries.mqtt.access import gateway_access
 from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.libraries.runtime.deployment import project_root, when_silent
 from gemelo.libraries.runtime.process.priority import may_step_ahead
@@ -34,7 +35,6 @@ from gemelo.services.cli.session import CommandSession, connect
 from gemelo.services.cli.text_table import table
 from gemelo.services.cli.version import gemelo_version, version_text
 from gemelo.services.credentials.private_files import AccessError
-from gemelo.services.mqtt.access import gateway_access
 
 BROKER_PAGE = "docs/my_broker.md has every such sentence with what to do"
 # Tuning constants: chosen.
@@ -213,7 +213,7 @@ def _listener(name: str, host: str, port: int) -> Diagnosis:
 
 def broker(section: MqttSection) -> Diagnosis:
     """Of the broker: whether it is there, and lets the gateway in."""
-    from gemelo.services.mqtt.check import problem  # 50 ms
+    from gemelo.libraries.mqtt.check import problem  # 50 ms
 
     try:
         access = gateway_access(section)

@@ -9,6 +9,7 @@ import secrets
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
+from gemelo.libraries.mqtt.client import stop_loop
 from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
 from gemelo.schemas.device import DeviceCommandRequest, DeviceEvent, OutputCommand
 from gemelo.schemas.joints import JointTargets
@@ -24,7 +25,6 @@ from gemelo.services.cli.errors import CommandError, ExitCode
 from gemelo.services.cli.parser import Options
 from gemelo.services.cli.ra_intake import OUTPUT, RaIntake, RefusedMessage
 from gemelo.services.cli.session import CommandSession, connect, share_control
-from gemelo.services.mqtt.client import stop_loop
 
 JOINTS, STATES, READINGS = "ra/juntas", "ra/estados", "ra/sensores"
 PERIOD = 0.05  # [s] between two targets; the gateway brakes after 0.5 s without one

@@ -14,6 +14,9 @@ from typing import Any, Protocol
 import msgspec
 from paho.mqtt import client as paho
 
+from gemelo.libraries.mqtt.access import BrokerAccess
+from gemelo.libraries.mqtt.client import MqttClient, is_failure
+from gemelo.libraries.mqtt.failures import denial
 from gemelo.libraries.runtime.firmware_update import PIECE, UpdateAck, UpdateStep, begin_content, update_frame
 from gemelo.libraries.runtime.serial_frames import (
     JsonFrame,
@@ -26,9 +29,6 @@ from gemelo.libraries.runtime.serial_frames import (
 from gemelo.schemas.device_topics import topic
 from gemelo.services.cli.errors import CommandError, ExitCode
 from gemelo.services.cli.provision import BoardLine
-from gemelo.services.mqtt.access import BrokerAccess
-from gemelo.services.mqtt.client import MqttClient, is_failure
-from gemelo.services.mqtt.failures import denial
 
 ANSWER_TIME = 2.0  # [s] for a piece: the flash of a board erases and writes 4 kB in a tenth of that
 CHECK_TIME = 15.0  # [s] for the first and the last step, in which a signature or the whole image is checked

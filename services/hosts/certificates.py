@@ -10,11 +10,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from gemelo.libraries.mqtt.secure_folder import CERTIFICATE
 from gemelo.schemas.site import Site
 from gemelo.services.credentials.authority import FORMER
 from gemelo.services.credentials.expiry import WARN_WITHIN, days_left, ending, expiry, not_after
 from gemelo.services.hosts.layout import BROKER, ROUTER, roles
-from gemelo.services.mqtt.secure_folder import CERTIFICATE
 
 HANDSHAKE = 2.0  # [s]
 AUTHORITY_FOLDER = "authority"  # below the site's; it stays where it was made

@@ -11,14 +11,14 @@ from functools import partial
 from pathlib import Path
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.mqtt import secure_folder
+from gemelo.libraries.mqtt.access import AUTHORITY, GATEWAY
 from gemelo.schemas.site import Site
 from gemelo.services.credentials.authority import Authority
 from gemelo.services.credentials.expiry import WARN_WITHIN, days_left, expiry
 from gemelo.services.credentials.private_files import write
 from gemelo.services.hosts.certificates import AUTHORITY_FOLDER, Certificate
 from gemelo.services.hosts.layout import listening, principal, processes, roles
-from gemelo.services.mqtt import secure_folder
-from gemelo.services.mqtt.access import AUTHORITY, GATEWAY
 
 LOOPBACK = ("localhost", "127.0.0.1")
 UNSPECIFIED = ("0.0.0.0", "::")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from gemelo.libraries.mqtt.secure_folder import lines, mosquitto_conf
 from gemelo.libraries.runtime.bus.zenoh_config import locked_router
 from gemelo.libraries.runtime.permissions import access_control
 from gemelo.schemas.site import Site
@@ -13,7 +14,6 @@ from gemelo.services.hosts.containers import compose, containerfile, process_com
 from gemelo.services.hosts.firewall import FILE, firewall, ports
 from gemelo.services.hosts.layout import listening, principals, robots
 from gemelo.services.hosts.units import units
-from gemelo.services.mqtt.secure_folder import lines, mosquitto_conf
 
 OF_A_PLACE = ("router.json5", "mosquitto.conf", FILE)  # of a host where router or broker run
 

@@ -10,13 +10,13 @@ from typing import TextIO
 from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm, require_motors
 from gemelo.libraries.arm.model.virtual_drive import NO_MOTORS
+from gemelo.libraries.mqtt.access import device_access, gateway_access
+from gemelo.libraries.mqtt.secure_folder import require_made
 from gemelo.libraries.runtime.deployment import exposure, forget_arms, load_deployment, project_root
 from gemelo.libraries.runtime.process.ports import PortTaken, require_free
 from gemelo.libraries.runtime.started import keep_started
 from gemelo.schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
 from gemelo.schemas.errors import ConfigurationError
-from gemelo.services.mqtt.access import device_access, gateway_access
-from gemelo.services.mqtt.secure_folder import require_made
 
 
 def start_problems(deployment: Deployment) -> list[str]:
@@ -79,7 +79,7 @@ def broker_problems(deployment: Deployment, device: str) -> list[str]:
         return [str(error)]
     if section.broker is not Broker.EXTERNAL or deployment.wire is Wire.SERIAL:
         return []
-    from gemelo.services.mqtt.check import problem  # paho takes 50 ms that only a strange broker is worth
+    from gemelo.libraries.mqtt.check import problem  # paho takes 50 ms that only a strange broker is worth
 
     return list(dict.fromkeys(filter(None, map(problem, accesses))))
 

@@ -68,7 +68,7 @@ def open_device(deployment: Deployment, arm: ArmDescription, wake: Callable[[], 
         case Dialect.GEMELO:
             return open_link(deployment, arm.device.name, wake, baud_of(deployment, arm))
         case Dialect.RA:
-            from gemelo.services.mqtt.access import gateway_access  # slow to load: only the wire's own library
+            from gemelo.libraries.mqtt.access import gateway_access  # slow to load: only the wire's own library
             from gemelo.services.stepper_gateway.links.foreign.ra_link import RaLink
 
             return RaLink(gateway_access(deployment.mqtt), arm, wake)
@@ -82,7 +82,7 @@ def open_link(deployment: Deployment, device: str, wake: Callable[[], None], bau
     """The other wire's library is not even imported."""
     match deployment.wire:
         case Wire.MQTT:
-            from gemelo.services.mqtt.access import gateway_access  # slow to load: only the wire's own library
+            from gemelo.libraries.mqtt.access import gateway_access  # slow to load: only the wire's own library
             from gemelo.services.stepper_gateway.links.mqtt import MqttLink
 
             return MqttLink(gateway_access(deployment.mqtt), device, wake)

@@ -16,8 +16,8 @@ import paho.mqtt.client as mqtt
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
+from gemelo.libraries.mqtt.client import stop_loop
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.mqtt.client import stop_loop
 from gemelo.services.stack.stack import free_ports
 from tests.optional import need
 

@@ -14,8 +14,8 @@ from contextlib import contextmanager
 import psutil
 import pytest
 
-from gemelo.services.mqtt import secure_folder
-from gemelo.services.mqtt.access import tls_context
+from gemelo.libraries.mqtt import secure_folder
+from gemelo.libraries.mqtt.access import tls_context
 from tests.broker.running import Client, RunningBroker, wait_until
 
 HALF_OPEN = 1000

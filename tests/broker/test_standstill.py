@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.runtime.process.readiness import ALIVE
-from gemelo.services.mqtt import secure_folder
 from tests.broker.running import BROKERS
 from tests.optional import need
 from tests.runtime.support import ROOT, free_port, until

@@ -11,8 +11,8 @@ import pytest
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
+from gemelo.libraries.mqtt.client import stop_loop
 from gemelo.services.chaos.slow_link import OneWay, SlowLink, Way, client_id_in
-from gemelo.services.mqtt.client import stop_loop
 from gemelo.services.stack.stack import free_ports
 from tests.broker.running import VERSIONS
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus
 from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.libraries.runtime.deployment import when_silent
@@ -22,7 +23,6 @@ from gemelo.services.chaos.descriptors import give_descriptors, take_descriptors
 from gemelo.services.cli import doctor
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.mqtt import secure_folder
 from tests.disks import WAYS, refusing_disk
 from tests.real_time import may_run_in_real_time
 from tests.stepper_gateway.locked import Mosquitto, external, locked

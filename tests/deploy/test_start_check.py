@@ -10,6 +10,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from gemelo.libraries.mqtt import secure_folder
 from gemelo.schemas.deployment import (
     Broker,
     Deployment,
@@ -19,7 +20,6 @@ from gemelo.schemas.deployment import (
     ViewerMode,
     ViewerSection,
 )
-from gemelo.services.mqtt import secure_folder
 from gemelo.services.stack.stack import free_ports
 from gemelo.services.stack.start_check import main, start_problems
 from tests.arm.bare_arm import write_bare_arm

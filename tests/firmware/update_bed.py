@@ -24,6 +24,7 @@ from gemelo.firmware.platform.host.pty import SerialLine
 from gemelo.firmware.platform.host.virtual_esp32 import VirtualEsp32
 from gemelo.firmware.platform.host.wires import Wires
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.mqtt.access import BrokerAccess
 from gemelo.libraries.runtime.firmware_update import UpdateAck
 from gemelo.libraries.runtime.process.readiness import Readiness
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
@@ -34,7 +35,6 @@ from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.cli.provision import BAUD, open_line
 from gemelo.services.cli.update_transfer import SerialWire, UpdateStatus, UpdateWire, await_status
-from gemelo.services.mqtt.access import BrokerAccess
 
 ROOT = Path(__file__).resolve().parents[2]
 NEWER = "1.0.9"  # as long as the version that it replaces in the library's bytes

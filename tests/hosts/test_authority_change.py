@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.mqtt.access import tls_context
 from gemelo.libraries.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.deployment import Broker, MqttSection
@@ -20,7 +21,6 @@ from gemelo.services.cli.main import run
 from gemelo.services.credentials.authority import Authority, openssl
 from gemelo.services.credentials.expiry import CERTIFICATE, expiries
 from gemelo.services.hosts.keys import authority_in, make_keys
-from gemelo.services.mqtt.access import tls_context
 from tests.hosts.site_router import SiteRouter
 from tests.runtime.support import free_port, until
 from tests.stepper_gateway.locked import Mosquitto

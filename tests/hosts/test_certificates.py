@@ -10,6 +10,7 @@ from contextlib import ExitStack
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Broker, MqttSection
@@ -19,7 +20,6 @@ from gemelo.services.cli.main import run
 from gemelo.services.credentials.authority import Authority
 from gemelo.services.credentials.expiry import DAY, expiry
 from gemelo.services.hosts.certificates import Certificate, days_by_host, endings, older, shown_at
-from gemelo.services.mqtt import secure_folder
 from tests.hosts.site_router import SiteRouter
 from tests.runtime.locks import HOST, Lock, LockedRouter
 from tests.runtime.support import free_port, spinning

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.mqtt.access import BrokerAccess
-from gemelo.services.mqtt.client import MqttClient
+from gemelo.libraries.mqtt.access import BrokerAccess
+from gemelo.libraries.mqtt.client import MqttClient
 from tests.profiles import examples
 from tests.runtime.support import until
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import psutil
 from mcap.reader import make_reader
 
-from gemelo.services.mqtt import secure_folder
+from gemelo.libraries.mqtt import secure_folder
 from gemelo.services.stack.stack import Stack
 from tests.optional import need
 from tests.stack.gemelo import gemelo

@@ -9,8 +9,8 @@ from contextlib import closing
 import pytest
 
 from gemelo.firmware.bindings.library import load_library
+from gemelo.libraries.mqtt.access import gateway_access
 from gemelo.schemas.deployment import MqttSection
-from gemelo.services.mqtt.access import gateway_access
 from gemelo.services.stepper_gateway.links.foreign.ra_link import RaLink
 from gemelo.services.stepper_gateway.links.mqtt import MqttLink
 from gemelo.services.stepper_gateway.links.serial import SerialLink

@@ -12,11 +12,11 @@ from pathlib import Path
 import psutil
 import pytest
 
+from gemelo.libraries.mqtt import secure_folder
+from gemelo.libraries.mqtt.access import BrokerAccess, gateway_access
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.deployment import Wire
 from gemelo.schemas.motion import FollowErrorCode
-from gemelo.services.mqtt import secure_folder
-from gemelo.services.mqtt.access import BrokerAccess, gateway_access
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.links.mqtt import MqttLink
 from tests.stepper_gateway.harness import ROOT

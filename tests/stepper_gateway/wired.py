@@ -9,8 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.mqtt.access import BrokerAccess
 from gemelo.schemas.device import InjectRequest, InjectResponse
-from gemelo.services.mqtt.access import BrokerAccess
 from gemelo.services.stepper_gateway.links.link import Link
 from gemelo.services.stepper_gateway.links.mqtt import MqttLink
 from gemelo.services.virtual_arm.gateway_driver import GatewayDriver, Kind, Moment

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 from paho.mqtt import client as paho
 
+from gemelo.libraries.mqtt.access import BrokerAccess
+from gemelo.libraries.mqtt.client import NO_ANSWER, OLD_BROKER, MqttClient, code_of, is_failure
+from gemelo.libraries.mqtt.failures import denial, failure, needs_a_person, refusal, silence
 from gemelo.libraries.runtime.firmware_update import UPDATE
 from gemelo.schemas.device_topics import topic
-from gemelo.services.mqtt.access import BrokerAccess
-from gemelo.services.mqtt.client import NO_ANSWER, OLD_BROKER, MqttClient, code_of, is_failure
-from gemelo.services.mqtt.failures import denial, failure, needs_a_person, refusal, silence
 
 log = logging.getLogger("virtual_esp32")
 

@@ -14,7 +14,7 @@ from gemelo.firmware.bindings.device import CoreDevice
 from gemelo.firmware.bindings.frames import OutFrame
 from gemelo.firmware.platform.host.flash import NetworkCredentials
 from gemelo.firmware.platform.host.link import REPORTS, DeviceLink, Item
-from gemelo.services.mqtt.access import BrokerAccess
+from gemelo.libraries.mqtt.access import BrokerAccess
 
 log = logging.getLogger("virtual_esp32")
 

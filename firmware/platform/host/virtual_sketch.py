@@ -12,9 +12,9 @@ from gemelo.firmware.platform.host.link import Item, MqttMessage, ShutdownReques
 from gemelo.firmware.platform.host.sketch import HostSketch
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.motors.relative_moves import ramp_of
+from gemelo.libraries.mqtt.access import BrokerAccess
+from gemelo.libraries.mqtt.client import MqttClient
 from gemelo.libraries.runtime.process.readiness import Readiness
-from gemelo.services.mqtt.access import BrokerAccess
-from gemelo.services.mqtt.client import MqttClient
 
 log = logging.getLogger("virtual_esp32")
 

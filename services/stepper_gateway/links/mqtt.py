@@ -14,10 +14,10 @@ from collections.abc import Callable, Iterable
 
 from paho.mqtt import client as paho
 
+from gemelo.libraries.mqtt.access import BrokerAccess
+from gemelo.libraries.mqtt.client import NO_ANSWER, OLD_BROKER, MqttClient, code_of, is_failure
+from gemelo.libraries.mqtt.failures import denial, failure, needs_a_person, refusal, silence
 from gemelo.schemas.device_topics import topic
-from gemelo.services.mqtt.access import BrokerAccess
-from gemelo.services.mqtt.client import NO_ANSWER, OLD_BROKER, MqttClient, code_of, is_failure
-from gemelo.services.mqtt.failures import denial, failure, needs_a_person, refusal, silence
 from gemelo.services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
 from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, Kind, Received
 

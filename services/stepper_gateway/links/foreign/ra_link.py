@@ -15,9 +15,9 @@ from functools import partial
 from paho.mqtt import client as paho
 
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.services.mqtt.access import BrokerAccess
-from gemelo.services.mqtt.client import CONNECT_TIMEOUT, MqttClient, code_of, is_failure
-from gemelo.services.mqtt.failures import failure, refusal
+from gemelo.libraries.mqtt.access import BrokerAccess
+from gemelo.libraries.mqtt.client import CONNECT_TIMEOUT, MqttClient, code_of, is_failure
+from gemelo.libraries.mqtt.failures import failure, refusal
 from gemelo.services.stepper_gateway.links.connection import keep_connected
 from gemelo.services.stepper_gateway.links.foreign import ra_messages
 from gemelo.services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor

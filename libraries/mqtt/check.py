@@ -8,9 +8,9 @@ import secrets
 
 from paho.mqtt import client as paho
 
-from gemelo.services.mqtt.access import BrokerAccess
-from gemelo.services.mqtt.client import OLD_BROKER, MqttClient, code_of, is_failure
-from gemelo.services.mqtt.failures import failure, refusal, silence
+from gemelo.libraries.mqtt.access import BrokerAccess
+from gemelo.libraries.mqtt.client import OLD_BROKER, MqttClient, code_of, is_failure
+from gemelo.libraries.mqtt.failures import failure, refusal, silence
 
 PATIENCE = 3.0  # [s] for an answer to CONNECT
 

@@ -14,7 +14,7 @@ from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
 from paho.mqtt.reasoncodes import ReasonCode
 
-from gemelo.services.mqtt.access import BrokerAccess
+from gemelo.libraries.mqtt.access import BrokerAccess
 
 log = logging.getLogger("mqtt")
 

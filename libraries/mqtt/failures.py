@@ -6,7 +6,7 @@ import errno
 import socket
 import ssl
 
-from gemelo.services.mqtt.access import BrokerAccess
+from gemelo.libraries.mqtt.access import BrokerAccess
 
 # X509_V_ERR_* of OpenSSL's x509_vfy.h.
 NOT_YET_VALID, EXPIRED, OTHER_NAME, OTHER_ADDRESS = 9, 10, 62, 64
