@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from gemelo.libraries.credentials.private_files import AccessError, require_private
 from gemelo.schemas.deployment import Broker, MqttSection
-from gemelo.services.credentials.private_files import AccessError, require_private
 
 PASSWORD, DEVICE_PASSWORD = "GEMELO_MQTT_PASSWORD", "GEMELO_MQTT_DEVICE_PASSWORD"  # in the environment
 GATEWAY = "gateway"  # its user name, where `gemelo broker secure` names it

@@ -13,10 +13,10 @@ import secrets
 from collections.abc import Iterable
 from pathlib import Path
 
+from gemelo.libraries.credentials.authority import DAYS, Authority
+from gemelo.libraries.credentials.private_files import AccessError, write
 from gemelo.libraries.mqtt.access import AUTHORITY, GATEWAY, read_secret
 from gemelo.schemas.device_topics import FROM_DEVICE, TO_DEVICE, topic
-from gemelo.services.credentials.authority import DAYS, Authority
-from gemelo.services.credentials.private_files import AccessError, write
 
 ACL, USERS, CERTIFICATE, KEY = "acl", "users", "server.pem", "server.key"
 SALT, HASH, ITERATIONS = 12, 64, 10_000  # [bytes], [bytes]; of mosquitto's "$7$": PBKDF2 with SHA-512

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from gemelo.services.credentials.expiry import ending, expiry
-from gemelo.services.credentials.private_files import AccessError
+from gemelo.libraries.credentials.expiry import ending, expiry
+from gemelo.libraries.credentials.private_files import AccessError
 
 PERIOD = 86_400.0  # [s] between two looks
 RENEWAL = "`gemelo deploy keys` renews it, then give this host its folder again and start this process anew"

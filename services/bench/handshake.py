@@ -12,13 +12,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
 from gemelo.libraries.runtime.bus.zenoh_config import locked_router
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.permissions import access_control
 from gemelo.schemas.deployment import RouterSection
 from gemelo.services.bench.figures import Figure, NotMeasured, of_samples, quantile
-from gemelo.services.credentials.authority import Authority
 from gemelo.services.stack.stack import free_ports
 
 ROUNDS = 40

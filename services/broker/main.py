@@ -10,6 +10,7 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
+from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt.access import gateway_access
 from gemelo.libraries.mqtt.secure_folder import CERTIFICATE, require_made
 from gemelo.libraries.runtime.certificate_watch import CertificateWatch
@@ -22,7 +23,6 @@ from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.deployment import Broker, Deployment, MqttSection
 from gemelo.services.broker import embedded, mosquitto
 from gemelo.services.broker.replacement import NotInstalled, become
-from gemelo.services.credentials.private_files import AccessError
 
 BEAT = 1.0  # [s] of the readiness file
 RENEWAL = (

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.mqtt.access import AUTHORITY
 from gemelo.libraries.runtime.deployment import project_root
@@ -15,7 +16,6 @@ from gemelo.services.cli.credentials import WIFI_PASSWORD, CredentialsChange, ce
 from gemelo.services.cli.errors import CommandError, ExitCode, usage
 from gemelo.services.cli.parser import Options, Parser, positive_integer
 from gemelo.services.cli.provision import BAUD, PASSWORDS, provision
-from gemelo.services.credentials.private_files import AccessError
 
 FOLDER = ".gemelo/broker"
 PLAIN_PORT, TLS_PORT = 1883, 8883

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.libraries.credentials.private_files import AccessError, require_private
 from gemelo.services.cli.errors import usage
-from gemelo.services.credentials.private_files import AccessError, require_private
 
 WIFI_PASSWORD, MQTT_PASSWORD = "GEMELO_WIFI_PASSWORD", "GEMELO_MQTT_PASSWORD"
 MQTT_DEVICE_PASSWORD = "GEMELO_MQTT_DEVICE_PASSWORD"  # wins over the other, which is the gateway's too

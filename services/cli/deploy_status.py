@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 import gemelo
+from gemelo.libraries.credentials.expiry import expiry
 from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.libraries.runtime.errors import BusError, NoAnswer, RequestRefused
 from gemelo.libraries.runtime.node import Node
@@ -24,7 +25,6 @@ from gemelo.services.cli.node import is_command
 from gemelo.services.cli.parser import Options, Parser, json_option
 from gemelo.services.cli.session import own_name, require_router
 from gemelo.services.cli.text_table import table
-from gemelo.services.credentials.expiry import expiry
 from gemelo.services.hosts.certificates import Certificate, days_by_host, endings, in_days, older, renewal, shown_at
 from gemelo.services.hosts.layout import BROKER, ROUTER
 from gemelo.services.hosts.status import SeenNode, SeenRobot, ServiceState, ServiceStatus, is_well, site_status

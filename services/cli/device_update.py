@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.credentials.private_files import AccessError, require_private
 from gemelo.libraries.mqtt.access import gateway_access
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.firmware_update import ImageHeader, NoImage, read_header
@@ -17,7 +18,6 @@ from gemelo.services.cli.parser import Options, Parser, positive_integer
 from gemelo.services.cli.provision import BAUD, open_line
 from gemelo.services.cli.terminal import LiveBlock
 from gemelo.services.cli.update_transfer import SerialWire, Transfer, UpdateStatus, UpdateWire, await_status, mqtt_wire
-from gemelo.services.credentials.private_files import AccessError, require_private
 
 KEY = ".gemelo/update.key"
 TO_ANSWER = 6.0  # [s] until a device that is there has said status

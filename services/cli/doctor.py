@@ -15,6 +15,7 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt.access import gateway_access
 from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.libraries.runtime.deployment import project_root, when_silent
@@ -34,7 +35,6 @@ from gemelo.services.cli.parser import Options
 from gemelo.services.cli.session import CommandSession, connect
 from gemelo.services.cli.text_table import table
 from gemelo.services.cli.version import gemelo_version, version_text
-from gemelo.services.credentials.private_files import AccessError
 
 BROKER_PAGE = "docs/my_broker.md has every such sentence with what to do"
 # Tuning constants: chosen.

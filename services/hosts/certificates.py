@@ -10,10 +10,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from gemelo.libraries.credentials.authority import FORMER
+from gemelo.libraries.credentials.expiry import WARN_WITHIN, days_left, ending, expiry, not_after
 from gemelo.libraries.mqtt.secure_folder import CERTIFICATE
 from gemelo.schemas.site import Site
-from gemelo.services.credentials.authority import FORMER
-from gemelo.services.credentials.expiry import WARN_WITHIN, days_left, ending, expiry, not_after
 from gemelo.services.hosts.layout import BROKER, ROUTER, roles
 
 HANDSHAKE = 2.0  # [s]

@@ -10,13 +10,13 @@ from pathlib import Path, PurePosixPath
 
 from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
+from gemelo.libraries.credentials.authority import DAYS
 from gemelo.libraries.runtime.deployment import is_loopback
 from gemelo.programs.toml_lines import Where
 from gemelo.schemas.deployment import DeviceKind, Wire
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.roles import ROLES
 from gemelo.schemas.site import Site
-from gemelo.services.credentials.authority import DAYS
 from gemelo.services.hosts.certificates import AUTHORITY_FOLDER
 from gemelo.services.hosts.deployments import HOST
 from gemelo.services.hosts.layout import BROKER, OF_A_ROBOT, ROUTER

@@ -11,12 +11,12 @@ from functools import partial
 from pathlib import Path
 
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.credentials.authority import Authority
+from gemelo.libraries.credentials.expiry import WARN_WITHIN, days_left, expiry
+from gemelo.libraries.credentials.private_files import write
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.mqtt.access import AUTHORITY, GATEWAY
 from gemelo.schemas.site import Site
-from gemelo.services.credentials.authority import Authority
-from gemelo.services.credentials.expiry import WARN_WITHIN, days_left, expiry
-from gemelo.services.credentials.private_files import write
 from gemelo.services.hosts.certificates import AUTHORITY_FOLDER, Certificate
 from gemelo.services.hosts.layout import listening, principal, processes, roles
 

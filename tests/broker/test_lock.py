@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.mqtt.access import tls_context
 from gemelo.schemas.device_topics import FROM_DEVICE, TO_DEVICE
-from gemelo.services.credentials.authority import Authority
 from tests.broker.running import BROKERS, Client, RunningBroker
 
 COMMAND, STATE, STATUS = "gemelo/v1/rm1/cmd", "gemelo/v1/rm1/state", "gemelo/v1/rm1/status"

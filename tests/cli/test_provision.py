@@ -12,12 +12,12 @@ import tty
 import msgspec
 import pytest
 
+from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 from gemelo.services.cli import provision as module
 from gemelo.services.cli.credentials import CredentialsChange, certificate, password, private_key, require_sound
 from gemelo.services.cli.errors import CommandError, ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.credentials.authority import Authority
 
 
 class Board:

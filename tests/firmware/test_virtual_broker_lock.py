@@ -13,11 +13,11 @@ from msgspec.structs import replace
 from gemelo.firmware.platform.host.flash import NetworkCredentials
 from gemelo.firmware.platform.host.link import Connected, Denied, DeviceLink, Disconnected, Item, MqttMessage
 from gemelo.firmware.platform.host.network import AddressError, broker_address
+from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.mqtt.access import BrokerAccess, device_access, gateway_access
 from gemelo.libraries.mqtt.client import MqttClient
 from gemelo.schemas.device_topics import topic
-from gemelo.services.credentials.authority import Authority
 from tests.stepper_gateway.locked import Mosquitto, locked, renew
 
 pytestmark = pytest.mark.full

@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.credentials.authority import Authority, openssl
+from gemelo.libraries.credentials.expiry import CERTIFICATE, expiries
 from gemelo.libraries.mqtt.access import tls_context
 from gemelo.libraries.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.deployment import Broker, MqttSection
 from gemelo.services.cli.credentials import LONGEST_PEM
 from gemelo.services.cli.main import run
-from gemelo.services.credentials.authority import Authority, openssl
-from gemelo.services.credentials.expiry import CERTIFICATE, expiries
 from gemelo.services.hosts.keys import authority_in, make_keys
 from tests.hosts.site_router import SiteRouter
 from tests.runtime.support import free_port, until
@@ -161,6 +161,6 @@ def test_the_command_says_when_the_authority_ends_and_leads_through_its_change(t
 
 def test_an_authority_that_certificates_would_outlive_is_told(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("GEMELO_PATHS_OUT", str(tmp_path / "out"))
-    monkeypatch.setattr("gemelo.services.credentials.authority.DAYS", 390)
+    monkeypatch.setattr("gemelo.libraries.credentials.authority.DAYS", 390)
     assert gemelo("deploy", "keys", "example") == 0
     assert "`gemelo deploy keys example --renew-authority` makes another one" in capsys.readouterr().out

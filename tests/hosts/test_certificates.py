@@ -10,6 +10,8 @@ from contextlib import ExitStack
 import pytest
 from msgspec.structs import replace
 
+from gemelo.libraries.credentials.authority import Authority
+from gemelo.libraries.credentials.expiry import DAY, expiry
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
@@ -17,8 +19,6 @@ from gemelo.schemas.deployment import Broker, MqttSection
 from gemelo.schemas.device import DeviceStatus
 from gemelo.schemas.topics import DEVICE_STATUS
 from gemelo.services.cli.main import run
-from gemelo.services.credentials.authority import Authority
-from gemelo.services.credentials.expiry import DAY, expiry
 from gemelo.services.hosts.certificates import Certificate, days_by_host, endings, older, shown_at
 from tests.hosts.site_router import SiteRouter
 from tests.runtime.locks import HOST, Lock, LockedRouter

@@ -6,11 +6,11 @@ import time
 
 import pytest
 
+from gemelo.libraries.credentials.authority import Authority, openssl
+from gemelo.libraries.credentials.common_name import common_name
+from gemelo.libraries.credentials.expiry import expiry
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.roles import ROLE_OF_NODE, ROLES
-from gemelo.services.credentials.authority import Authority, openssl
-from gemelo.services.credentials.common_name import common_name
-from gemelo.services.credentials.expiry import expiry
 from gemelo.services.hosts.checks import load_site
 from gemelo.services.hosts.keys import authority_in, make_keys
 from tests.hosts.sites import EXAMPLE, site

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt.access import BrokerAccess, read_secret, tls_context
 from gemelo.libraries.mqtt.failures import NO_TLS, WANTS_CERTIFICATE, denial, failure, refusal, silence
 from gemelo.libraries.runtime.deployment import load_deployment, project_root
-from gemelo.services.credentials.private_files import AccessError
 from gemelo.services.stepper_gateway.device.session import DeviceSession
 from gemelo.services.stepper_gateway.moment import Moment
 

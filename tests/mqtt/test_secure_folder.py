@@ -8,10 +8,10 @@ import subprocess
 
 import pytest
 
+from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.credentials.private_files import AccessError
 from tests.optional import need
 
 LONGEST_ON_A_BOARD = 2048  # [bytes] of mqtt_ca in firmware/PROTOCOL.md

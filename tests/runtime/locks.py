@@ -10,11 +10,11 @@ from typing import Any
 
 import zenoh
 
+from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.runtime.bus.zenoh_config import client_config, locked_router
 from gemelo.libraries.runtime.permissions import access_control
 from gemelo.schemas.deployment import RouterSection
 from gemelo.schemas.roles import ROLES
-from gemelo.services.credentials.authority import Authority
 from tests.runtime.support import RouterProcess
 
 HOST = "127.0.0.1"

@@ -10,6 +10,8 @@ import msgspec
 import pytest
 import zenoh
 
+from gemelo.libraries.credentials.authority import Authority
+from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.runtime.bus.connection import connect, refusal, require_certificate
 from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
 from gemelo.libraries.runtime.bus.zenoh_config import client_config
@@ -17,8 +19,6 @@ from gemelo.libraries.runtime.errors import BusError
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import RouterSection
 from gemelo.schemas.topics import PLAN
-from gemelo.services.credentials.authority import Authority
-from gemelo.services.credentials.private_files import AccessError
 from tests.runtime.locks import Lock, LockedRouter
 from tests.runtime.support import RouterProcess, until
 

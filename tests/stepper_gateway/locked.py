@@ -10,12 +10,12 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.mqtt.access import BrokerAccess, gateway_access
 from gemelo.libraries.mqtt.client import MqttClient
 from gemelo.schemas.deployment import Broker, MqttSection
 from gemelo.services.broker import mosquitto
-from gemelo.services.credentials.authority import Authority
 from gemelo.services.stepper_gateway.links.mqtt import MqttLink
 from tests.optional import need
 from tests.stepper_gateway.processes import free_port

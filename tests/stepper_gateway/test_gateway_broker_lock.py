@@ -13,10 +13,10 @@ import pytest
 from msgspec.structs import replace
 
 from gemelo.firmware.platform.host.link import COMMANDS, REPORTS
+from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.mqtt.access import device_access, gateway_access
 from gemelo.schemas.deployment import Broker, MqttSection
-from gemelo.services.credentials.authority import Authority
 from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind
 from gemelo.services.stepper_gateway.links.mqtt import MqttLink
 from tests.stepper_gateway.locked import Mosquitto, external, locked, published, reason_of, renew, secret, wait_for

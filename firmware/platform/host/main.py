@@ -25,6 +25,7 @@ from gemelo.firmware.platform.host.virtual_sketch import VirtualSketch
 from gemelo.firmware.platform.host.wires import Wires
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt.access import device_access
 from gemelo.libraries.runtime.deployment import DeploymentError, load_deployment, project_root
 from gemelo.libraries.runtime.process.logs import LEVELS, line_logger
@@ -34,7 +35,6 @@ from gemelo.libraries.runtime.process.shutdown import ShutdownRequest, end_with_
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.deployment import Deployment, DeviceKind, Wire
 from gemelo.schemas.robot import Dialect
-from gemelo.services.credentials.private_files import AccessError
 
 NAME = "virtual_esp32"
 BEAT = 1.0  # [s] between two touches of the readiness file

@@ -8,13 +8,13 @@ import socket
 import ssl
 import time
 
+from gemelo.libraries.credentials.private_files import require_private
 from gemelo.libraries.runtime.bus.interface import Bus
 from gemelo.libraries.runtime.deployment import when_silent
 from gemelo.libraries.runtime.errors import BusError
 from gemelo.libraries.runtime.process.readiness import tell_alive
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import RouterSection
-from gemelo.services.credentials.private_files import require_private
 
 RETRY_PERIOD = 0.1  # [s]
 HANDSHAKE = 1.0  # [s] for the router to say why it refuses a certificate

@@ -19,6 +19,7 @@ import zenoh
 import zenoh.ext as zx
 from zenoh.handlers import Callback
 
+from gemelo.libraries.credentials.common_name import common_name
 from gemelo.libraries.runtime.bus.branches import (
     LOCAL,
     asked_under,
@@ -55,7 +56,6 @@ from gemelo.schemas.device import DeviceEvent, GatewayInputs
 from gemelo.schemas.planning import AnswerInputs, PlanInputs
 from gemelo.schemas.system import Exchange, LogRecord, NodeStatistics
 from gemelo.schemas.topics import Delivery
-from gemelo.services.credentials.common_name import common_name
 
 # Messages of an EVERY key that survive while the router is away: chosen, a minute of what is said most often (commands
 # and their acknowledgements, 22 a second). What is said less often fills as many only within the hour, and a process

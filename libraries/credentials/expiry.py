@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from gemelo.services.credentials.private_files import AccessError
+from gemelo.libraries.credentials.private_files import AccessError
 
 DAY = 86_400.0  # [s]
 WARN_WITHIN = 30.0  # [days] before its end a certificate is spoken of, and `gemelo deploy keys` renews it

@@ -17,9 +17,9 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from gemelo.services.credentials.common_name import common_name
-from gemelo.services.credentials.expiry import CERTIFICATE, days_left, expiry
-from gemelo.services.credentials.private_files import AccessError
+from gemelo.libraries.credentials.common_name import common_name
+from gemelo.libraries.credentials.expiry import CERTIFICATE, days_left, expiry
+from gemelo.libraries.credentials.private_files import AccessError
 
 DAYS = 3650  # of the authority and of what it signs
 KEY = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes")  # small enough for a board

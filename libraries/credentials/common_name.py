@@ -5,8 +5,8 @@ from __future__ import annotations
 import ssl
 from pathlib import Path
 
-from gemelo.services.credentials.expiry import CERTIFICATE, VERSION, elements
-from gemelo.services.credentials.private_files import AccessError
+from gemelo.libraries.credentials.expiry import CERTIFICATE, VERSION, elements
+from gemelo.libraries.credentials.private_files import AccessError
 
 COMMON_NAME = b"\x55\x04\x03"  # 2.5.4.3
 
