@@ -54,7 +54,7 @@ def xacro_argument(text: str) -> tuple[str, str]:
 def run(options: Options) -> ExitCode:
     """Imports, and ends with the line that starts the twin."""
     from gemelo.libraries.arm.errors import DescriptionError  # slow to load, with all below
-    from gemelo.services.robot_import.importing import ImportOptions, import_robot
+    from gemelo.libraries.robot_import.importing import ImportOptions, import_robot
 
     wanted = ImportOptions(
         options.source, options.output, options.name, options.yes, options.force,

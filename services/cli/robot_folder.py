@@ -63,13 +63,13 @@ def _findings(folder: Path, xacro: Mapping[str, str]) -> list[Finding]:
     from gemelo.libraries.arm.model.description import ROBOT_FILE
 
     if (folder / ROBOT_FILE).is_file():
-        from gemelo.services.robot_import.trial import trial_findings
+        from gemelo.libraries.robot_import.trial import trial_findings
 
         findings = findings_in(folder)
         is_broken = any(finding.severity is Severity.ERROR for finding in findings)
         return findings if is_broken else [*findings, *trial_findings(folder)]
     from gemelo.libraries.arm.errors import DescriptionError
-    from gemelo.services.robot_import.importing import ImportOptions, source_findings
+    from gemelo.libraries.robot_import.importing import ImportOptions, source_findings
 
     print(f"{folder} has no {ROBOT_FILE}: as `gemelo import {folder}` reads it, which mends what is a note")
     try:

@@ -12,12 +12,12 @@ import trimesh
 from gemelo.libraries.arm.checks.check import check
 from gemelo.libraries.arm.checks.findings import Severity
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.robot_import.limits import ask_limits
+from gemelo.libraries.robot_import.mending import mend
+from gemelo.libraries.robot_import.questions import Questions
+from gemelo.libraries.robot_import.source import find_source
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.robot_import.limits import ask_limits
-from gemelo.services.robot_import.mending import mend
-from gemelo.services.robot_import.questions import Questions
-from gemelo.services.robot_import.source import find_source
 from tests.robot_import.exports import by_hand, joint, link, mesh, package, solidworks, workspace, write
 
 

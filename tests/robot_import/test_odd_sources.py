@@ -13,14 +13,14 @@ from gemelo.libraries.arm.checks.findings import Severity
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.kinematics.chain import link_transforms
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.robot_import.limits import ask_limits
+from gemelo.libraries.robot_import.link_mending import shapeless
+from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.mending import mend
+from gemelo.libraries.robot_import.questions import Questions
+from gemelo.libraries.robot_import.source import find_source
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.robot_import.limits import ask_limits
-from gemelo.services.robot_import.link_mending import shapeless
-from gemelo.services.robot_import.mended import Mended
-from gemelo.services.robot_import.mending import mend
-from gemelo.services.robot_import.questions import Questions
-from gemelo.services.robot_import.source import find_source
 from tests.robot_import.exports import LIMIT, joint, write
 
 BOX = '<geometry><box size="0.06 0.06 0.2"/></geometry>'

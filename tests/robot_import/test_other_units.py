@@ -12,13 +12,13 @@ from gemelo.libraries.arm.checks.check import check
 from gemelo.libraries.arm.checks.findings import Severity
 from gemelo.libraries.arm.kinematics.chain import link_transforms
 from gemelo.libraries.arm.model.urdf import UrdfModel
+from gemelo.libraries.robot_import.limits import ask_limits
+from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.mending import mend
+from gemelo.libraries.robot_import.questions import Questions
+from gemelo.libraries.robot_import.source import find_source
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.robot_import.limits import ask_limits
-from gemelo.services.robot_import.mended import Mended
-from gemelo.services.robot_import.mending import mend
-from gemelo.services.robot_import.questions import Questions
-from gemelo.services.robot_import.source import find_source
 from tests.arm.bare_arm import write_bare_arm
 from tests.robot_import.exports import LIMIT, joint, link, mesh, write
 

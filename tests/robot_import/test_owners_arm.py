@@ -12,14 +12,14 @@ from gemelo.libraries.arm.checks.findings import Severity
 from gemelo.libraries.arm.checks.meshes import MOST_TRIANGLES
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.arm.model.srdf_edit import entries
+from gemelo.libraries.robot_import.coarser import coarser
+from gemelo.libraries.robot_import.mesh_copies import MOST_COARSER
+from gemelo.libraries.robot_import.rigid_groups import MOST_PARTS
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import PlanRequest, PoseGoal
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
 from gemelo.services.planner.core import Planner
-from gemelo.services.robot_import.coarser import coarser
-from gemelo.services.robot_import.mesh_copies import MOST_COARSER
-from gemelo.services.robot_import.rigid_groups import MOST_PARTS
 from tests.robot_import.plain_arm import LIMIT, arm, body, boxes, hinge, hinges, meshed, part, stl
 from tests.robot_import.test_what_restricts_motion import jaws, survey
 

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.robot_import.poses import states_around
+from gemelo.libraries.robot_import.poses import states_around
 
 LIMIT = st.floats(-6.3, 6.3)
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.arm.errors import DescriptionError
-from gemelo.services.robot_import.parts import DRIVERS, MOTORS, driver_named, motor_named
-from gemelo.services.robot_import.questions import Questions, above_zero, answers_text, read_answers, whole, yes_or_no
+from gemelo.libraries.robot_import.parts import DRIVERS, MOTORS, driver_named, motor_named
+from gemelo.libraries.robot_import.questions import Questions, above_zero, answers_text, read_answers, whole, yes_or_no
 
 
 @contextlib.contextmanager

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.arm.checks.findings import Severity
-from gemelo.services.robot_import.mended import Mended
-from gemelo.services.robot_import.mending import mend
-from gemelo.services.robot_import.questions import Questions
-from gemelo.services.robot_import.source import find_source
+from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.mending import mend
+from gemelo.libraries.robot_import.questions import Questions
+from gemelo.libraries.robot_import.source import find_source
 from tests.robot_import.plain_arm import APART, arm, body, boxes, hinges, meshed, stl
 from tests.table import table
 

@@ -11,12 +11,12 @@ import trimesh
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
 from gemelo.libraries.arm.model.virtual_drive import driven_joints
-from gemelo.services.robot_import.mended import Mended
-from gemelo.services.robot_import.mending import mend
-from gemelo.services.robot_import.poses import zero_state
-from gemelo.services.robot_import.questions import Questions
-from gemelo.services.robot_import.source import find_source
-from gemelo.services.robot_import.standing import ask_who_stands
+from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.mending import mend
+from gemelo.libraries.robot_import.poses import zero_state
+from gemelo.libraries.robot_import.questions import Questions
+from gemelo.libraries.robot_import.source import find_source
+from gemelo.libraries.robot_import.standing import ask_who_stands
 from tests.robot_import.exports import LIMIT, joint, write
 
 

@@ -12,11 +12,11 @@ from gemelo.libraries.arm.checks import meshes
 from gemelo.libraries.arm.checks.meshes import MeshFacts, facts_of
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.urdf import Limit
-from gemelo.services.robot_import.limits import ask_limits
-from gemelo.services.robot_import.mending import mend
-from gemelo.services.robot_import.mesh_copies import copy_meshes
-from gemelo.services.robot_import.questions import Questions
-from gemelo.services.robot_import.source import find_source
+from gemelo.libraries.robot_import.limits import ask_limits
+from gemelo.libraries.robot_import.mending import mend
+from gemelo.libraries.robot_import.mesh_copies import copy_meshes
+from gemelo.libraries.robot_import.questions import Questions
+from gemelo.libraries.robot_import.source import find_source
 from tests.robot_import.exports import joint, link, write
 
 TREE = '<link name="Eslabón"/><link name="arm"/>'

@@ -12,11 +12,11 @@ from gemelo.libraries.arm.checks.urdf import check_urdf
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.arm.model.srdf import read_srdf
 from gemelo.libraries.arm.model.srdf_edit import entries
+from gemelo.libraries.robot_import.questions import Questions
+from gemelo.libraries.robot_import.source import find_source
+from gemelo.libraries.robot_import.survey import Survey, surveyed
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.robot_import.questions import Questions
-from gemelo.services.robot_import.source import find_source
-from gemelo.services.robot_import.survey import Survey, surveyed
 from tests.robot_import.plain_arm import BOTH, LIMIT, arm, body, boxes, hinge, hinges, part
 
 JAW = '<geometry><box size="0.01 0.004 0.03"/></geometry>'

@@ -16,12 +16,12 @@ import pytest
 import xacro
 
 from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.robot_import.source import find_source
+from gemelo.libraries.robot_import.xacro_sandbox.expressions import ExpressionRefused, Interpreter
+from gemelo.libraries.robot_import.xacro_sandbox.keeper import Confined, command, expand, namespaces
+from gemelo.libraries.robot_import.xacro_sandbox.symbols import functions, symbols
 from gemelo.services.cli.errors import ExitCode
 from gemelo.services.cli.main import run
-from gemelo.services.robot_import.source import find_source
-from gemelo.services.robot_import.xacro_sandbox.expressions import ExpressionRefused, Interpreter
-from gemelo.services.robot_import.xacro_sandbox.keeper import Confined, command, expand, namespaces
-from gemelo.services.robot_import.xacro_sandbox.symbols import functions, symbols
 from tests.robot_import.test_xacro_files import xacro_file
 
 OPENED = (
@@ -344,13 +344,13 @@ def test_the_process_has_namespaces_where_bwrap_is_installed(tmp_path: Path):
     binds = {arguments[place + 1] for place, each in enumerate(arguments) if each == "--ro-bind-try"}
     assert binds >= {"/usr", sys.prefix, str(tmp_path)}
     assert not {"/", "/home", "/root", str(Path.home())} & binds
-    assert command()[-2:] == ["-m", "gemelo.services.robot_import.xacro_sandbox.process"]
+    assert command()[-2:] == ["-m", "gemelo.libraries.robot_import.xacro_sandbox.process"]
 
 
 def test_the_process_itself_opens_imports_and_runs_nothing():
     """What would go past the interpreter meets this."""
     program = (
-        "from gemelo.services.robot_import.xacro_sandbox import process; process.limit(); process.shut()\n"
+        "from gemelo.libraries.robot_import.xacro_sandbox import process; process.limit(); process.shut()\n"
         "import os, sys\n"
         "for each in (lambda: open('/etc/passwd'), lambda: os.system('true'), lambda: exec('1'), lambda: os.fork(),\n"
         "             lambda: __import__('wave'), lambda: os.listdir('/'), lambda: os.open('/etc/passwd', 0)):\n"

@@ -12,6 +12,7 @@ import gemelo
 from gemelo.api.scene_files import read_scene, write_scene
 from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.robot_import.questions import read_answers
 from gemelo.libraries.runtime.deployment import load_deployment
 from gemelo.libraries.runtime.errors import RequestRefused
 from gemelo.libraries.runtime.saved_parameters import SavedParameters
@@ -21,7 +22,6 @@ from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.text_file import NotUtf8, decode_text
 from gemelo.services.cli.plan_file import read_plan
 from gemelo.services.hosts.site_file import read_site
-from gemelo.services.robot_import.questions import read_answers
 from gemelo.services.state_publisher.main import describe
 
 ROOT = Path(__file__).parents[2]

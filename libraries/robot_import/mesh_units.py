@@ -16,8 +16,8 @@ import numpy as np
 
 from gemelo.libraries.arm.checks.meshes import IN_MILLIMETRES, MeshFacts
 from gemelo.libraries.arm.model.urdf import Geometry, UrdfLink, UrdfModel
-from gemelo.services.robot_import.link_boxes import carried_by, corners_of, longest_joint, placed, pose_of
-from gemelo.services.robot_import.mended import Mended, meshes_of, subject_of
+from gemelo.libraries.robot_import.link_boxes import carried_by, corners_of, longest_joint, placed, pose_of
+from gemelo.libraries.robot_import.mended import Mended, meshes_of, subject_of
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}  # [m]

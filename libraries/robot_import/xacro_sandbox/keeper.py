@@ -31,7 +31,7 @@ MOST_NOTES = 20  # chosen
 PACKAGE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 MARKS_OF_A_PACKAGE = ("package.xml", "urdf", "xacro", "meshes")
 SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/opt", "/etc/ld.so.cache", "/etc/ld.so.conf")
-MODULE = "gemelo.services.robot_import.xacro_sandbox.process"
+MODULE = "gemelo.libraries.robot_import.xacro_sandbox.process"
 Find = Callable[[str], Path]
 
 

@@ -24,8 +24,8 @@ import xacro
 import yaml
 from xacro import substitution_args
 
-from gemelo.services.robot_import.xacro_sandbox.expressions import REMEDY, ExpressionRefused, Interpreter
-from gemelo.services.robot_import.xacro_sandbox.symbols import functions, of_eval, symbols
+from gemelo.libraries.robot_import.xacro_sandbox.expressions import REMEDY, ExpressionRefused, Interpreter
+from gemelo.libraries.robot_import.xacro_sandbox.symbols import functions, of_eval, symbols
 
 CPU = 20  # [s] chosen: the largest published robots take 2
 MEMORY = 1 << 30  # [bytes] of addresses, chosen: Python with xacro has 0.2 of it

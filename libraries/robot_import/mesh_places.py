@@ -12,7 +12,7 @@ from gemelo.libraries.arm.checks.meshes import IN_MILLIMETRES
 from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, from_rpy, inverse, to_rpy
 from gemelo.libraries.arm.kinematics.chain import link_transforms
 from gemelo.libraries.arm.model.urdf import Geometry, UrdfLink, UrdfModel
-from gemelo.services.robot_import.link_boxes import (
+from gemelo.libraries.robot_import.link_boxes import (
     Box,
     between,
     box_of,
@@ -21,7 +21,7 @@ from gemelo.services.robot_import.link_boxes import (
     joints_at,
     longest_joint,
 )
-from gemelo.services.robot_import.mended import Mended, links_of, subject_of
+from gemelo.libraries.robot_import.mended import Mended, links_of, subject_of
 
 Array = NDArray[np.float64]
 

@@ -1,6 +1,6 @@
 """The pairs of links of a new robot's folder that need no check, sampled in a process of its own.
 
-`python -m gemelo.services.robot_import.pairs ROBOT_FOLDER METRES` prints each pair as JSON, one a line; links
+`python -m gemelo.libraries.robot_import.pairs ROBOT_FOLDER METRES` prints each pair as JSON, one a line; links
 that are never farther apart than METRES are always near.
 """
 
@@ -19,13 +19,13 @@ from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.kinematics.collision_matrix import LinkPairData, collision_matrix
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.arm.model.srdf_edit import with_pairs
-from gemelo.services.robot_import.mended import Mended
-from gemelo.services.robot_import.questions import yes_or_no
-from gemelo.services.robot_import.semantics import OF_SRDF
+from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.questions import yes_or_no
+from gemelo.libraries.robot_import.semantics import OF_SRDF
 
 # Of the steps in processes of their own: with matrices of three columns the threads of BLAS cost a fourth more CPU.
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
-MODULE = "gemelo.services.robot_import.pairs"
+MODULE = "gemelo.libraries.robot_import.pairs"
 MOST_NAMED = 3  # pairs of an SRDF that can touch
 BY_PERSON = "User"  # the reason of a pair that a person has excused
 

@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 from gemelo.libraries.arm.frames.transforms import from_axis_angle, from_rpy, multiply, rotate, to_rpy
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
 from gemelo.libraries.arm.model.xml_reader import XmlReader
-from gemelo.services.robot_import.limits import MOST_TRAVEL, TURN
-from gemelo.services.robot_import.mended import Mended
+from gemelo.libraries.robot_import.limits import MOST_TRAVEL, TURN
+from gemelo.libraries.robot_import.mended import Mended
 
 FREE = {"planar": "drives", "floating": "is free to move"}
 LEFT_BY_FIXING = ("axis", "limit", "dynamics", "mimic", "safety_controller", "calibration")

@@ -15,12 +15,12 @@ from gemelo.libraries.arm.checks.findings import Finding, Severity, error
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.arm.model.virtual_drive import NO_MOTORS
-from gemelo.services.robot_import.drive import speed_lines
-from gemelo.services.robot_import.questions import Questions, answers_text, read_answers, yes_or_no
-from gemelo.services.robot_import.robot_folder import Description, step, write_robot
-from gemelo.services.robot_import.source import RobotSource, find_source
-from gemelo.services.robot_import.survey import Survey, surveyed
-from gemelo.services.robot_import.trial import trial_findings
+from gemelo.libraries.robot_import.drive import speed_lines
+from gemelo.libraries.robot_import.questions import Questions, answers_text, read_answers, yes_or_no
+from gemelo.libraries.robot_import.robot_folder import Description, step, write_robot
+from gemelo.libraries.robot_import.source import RobotSource, find_source
+from gemelo.libraries.robot_import.survey import Survey, surveyed
+from gemelo.libraries.robot_import.trial import trial_findings
 
 ANSWERS_FILE = "import.toml"
 XACRO = "xacro."  # before the names of its arguments, in a file of answers

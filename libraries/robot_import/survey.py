@@ -10,20 +10,20 @@ from gemelo.libraries.arm.checks.meshes import MOST_TRIANGLES, MeshFacts
 from gemelo.libraries.arm.errors import DescriptionError, suggestion
 from gemelo.libraries.arm.model.urdf import UrdfModel
 from gemelo.libraries.arm.model.virtual_drive import MAX_NAME, device_name, driven_joints
-from gemelo.services.robot_import import motion_limits
-from gemelo.services.robot_import.drive import ask_drives
-from gemelo.services.robot_import.limits import ask_limits
-from gemelo.services.robot_import.link_mending import shapeless, untouched
-from gemelo.services.robot_import.mended import Mended, meshes_of, subject_of
-from gemelo.services.robot_import.mending import mend, safe_name
-from gemelo.services.robot_import.parts import MOTORS, USUAL_DRIVER, DriverPart, MotorPart, driver_named, motor_named
-from gemelo.services.robot_import.questions import Questions, yes_or_no
-from gemelo.services.robot_import.rigid_groups import merge_rigid
-from gemelo.services.robot_import.robot_folder import Description
-from gemelo.services.robot_import.semantics import semantics
-from gemelo.services.robot_import.source import RobotSource
-from gemelo.services.robot_import.standing import ask_who_stands
-from gemelo.services.robot_import.tool_link import other_tools, tool_link
+from gemelo.libraries.robot_import import motion_limits
+from gemelo.libraries.robot_import.drive import ask_drives
+from gemelo.libraries.robot_import.limits import ask_limits
+from gemelo.libraries.robot_import.link_mending import shapeless, untouched
+from gemelo.libraries.robot_import.mended import Mended, meshes_of, subject_of
+from gemelo.libraries.robot_import.mending import mend, safe_name
+from gemelo.libraries.robot_import.parts import MOTORS, USUAL_DRIVER, DriverPart, MotorPart, driver_named, motor_named
+from gemelo.libraries.robot_import.questions import Questions, yes_or_no
+from gemelo.libraries.robot_import.rigid_groups import merge_rigid
+from gemelo.libraries.robot_import.robot_folder import Description
+from gemelo.libraries.robot_import.semantics import semantics
+from gemelo.libraries.robot_import.source import RobotSource
+from gemelo.libraries.robot_import.standing import ask_who_stands
+from gemelo.libraries.robot_import.tool_link import other_tools, tool_link
 
 LONGEST_NAME = 60  # letters: with what others add it is a folder's name everywhere
 NOT_IN_A_NAME = r"[^A-Za-z0-9_-]+"

@@ -20,13 +20,13 @@ from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.arm.model.srdf_edit import entries, with_pairs
 from gemelo.libraries.arm.model.urdf import UrdfJoint, UrdfLink, UrdfModel
 from gemelo.libraries.arm.model.virtual_drive import device_name
+from gemelo.libraries.robot_import.drive import JointDrive, bare_toml, driven_toml
+from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.mesh_copies import copy_meshes
+from gemelo.libraries.robot_import.pairs import ONE_THREAD, sampled_pairs, write_pairs
+from gemelo.libraries.robot_import.poses import NamedStates, named_states, srdf_text, zero_state
+from gemelo.libraries.robot_import.semantics import srdf_lines
 from gemelo.schemas.text_file import read_text
-from gemelo.services.robot_import.drive import JointDrive, bare_toml, driven_toml
-from gemelo.services.robot_import.mended import Mended
-from gemelo.services.robot_import.mesh_copies import copy_meshes
-from gemelo.services.robot_import.pairs import ONE_THREAD, sampled_pairs, write_pairs
-from gemelo.services.robot_import.poses import NamedStates, named_states, srdf_text, zero_state
-from gemelo.services.robot_import.semantics import srdf_lines
 
 # [m] chosen: what shapes that are fitted to meshes may stand beyond them. Links that are never farther apart than this
 # beyond the clearance are parts of one hinge, whose true distance such shapes cannot tell.

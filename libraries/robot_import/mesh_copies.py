@@ -7,9 +7,9 @@ from pathlib import Path
 
 from gemelo.libraries.arm.checks.meshes import MOST_TRIANGLES, MeshFacts, facts_of, scene_of
 from gemelo.libraries.arm.errors import DescriptionError
-from gemelo.services.robot_import.coarser import coarser
-from gemelo.services.robot_import.mended import Mended
-from gemelo.services.robot_import.mending import safe_name
+from gemelo.libraries.robot_import.coarser import coarser
+from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.mending import safe_name
 
 KEPT = (".stl", ".glb")  # the viewer, the page and the fitting read these; other formats become .glb
 MOST_COARSER = MOST_TRIANGLES // 5  # triangles of a copy that is made coarser

@@ -11,9 +11,9 @@ from typing import Any
 import yaml
 
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.motion_limits import ends_of, joints_of, set_ends
 from gemelo.schemas.text_file import NotUtf8, read_text
-from gemelo.services.robot_import.mended import Mended
-from gemelo.services.robot_import.motion_limits import ends_of, joints_of, set_ends
 
 FILE = "joint_limits.yaml"
 CARTESIAN = ("cartesian_limits.yaml",)  # the ends of names: pilz_cartesian_limits.yaml

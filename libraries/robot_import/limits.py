@@ -6,8 +6,8 @@ import math
 import xml.etree.ElementTree as ET
 
 from gemelo.libraries.arm.model.urdf import JointKind, Limit, UrdfJoint
-from gemelo.services.robot_import.mended import Mended
-from gemelo.services.robot_import.questions import Questions, above_zero, number
+from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.questions import Questions, above_zero, number
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 MOST_TRAVEL = {JointKind.REVOLUTE: 8.02 * math.pi, JointKind.PRISMATIC: 5.0}  # [rad], [m]: beyond it is another unit

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from gemelo.services.robot_import.xacro_sandbox.expressions import Names
+from gemelo.libraries.robot_import.xacro_sandbox.expressions import Names
 
 DIRECT = (list, dict, map, len, str, float, int, bool, min, max, round, sorted, range)
 OF_PYTHON = (*DIRECT, abs, all, any, divmod, enumerate, filter, frozenset, ord, repr, reversed, set, sum, tuple, zip)

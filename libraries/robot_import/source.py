@@ -11,7 +11,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from gemelo.libraries.arm.errors import DescriptionError, nearest_name
-from gemelo.services.robot_import.xacro_files import SUFFIX, expanded, outermost
+from gemelo.libraries.robot_import.xacro_files import SUFFIX, expanded, outermost
 
 BESIDE = 2  # innermost folders, whose meshes are the file's own without a package
 DEPTH = 4  # folders below a package in which its configuration may be

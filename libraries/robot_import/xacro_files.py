@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from gemelo.libraries.arm.errors import DescriptionError, suggestion
-from gemelo.services.robot_import.xacro_sandbox.keeper import Confined, Failed, expand
+from gemelo.libraries.robot_import.xacro_sandbox.keeper import Confined, Failed, expand
 
 SUFFIX = ".xacro"
 NO_XACRO = (

@@ -10,14 +10,14 @@ import xml.etree.ElementTree as ET
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.urdf import JointKind, model_of
 from gemelo.libraries.arm.model.xml_reader import XmlReader, parse_xml
-from gemelo.services.robot_import import link_mending, mesh_places, motion_limits, number_mending, unit_mending
-from gemelo.services.robot_import.joint_mending import fix_free_base, fix_locked, follow_the_motor
-from gemelo.services.robot_import.mended import Mended, numbers_in
-from gemelo.services.robot_import.mesh_units import mesh_units
-from gemelo.services.robot_import.moveit_limits import joint_limits
-from gemelo.services.robot_import.questions import Questions
-from gemelo.services.robot_import.source import RobotSource
-from gemelo.services.robot_import.stick_figure import sticks
+from gemelo.libraries.robot_import import link_mending, mesh_places, motion_limits, number_mending, unit_mending
+from gemelo.libraries.robot_import.joint_mending import fix_free_base, fix_locked, follow_the_motor
+from gemelo.libraries.robot_import.mended import Mended, numbers_in
+from gemelo.libraries.robot_import.mesh_units import mesh_units
+from gemelo.libraries.robot_import.moveit_limits import joint_limits
+from gemelo.libraries.robot_import.questions import Questions
+from gemelo.libraries.robot_import.source import RobotSource
+from gemelo.libraries.robot_import.stick_figure import sticks
 
 FOREIGN = ("gazebo", "transmission", "ros2_control", "sensor")
 MOVES = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)

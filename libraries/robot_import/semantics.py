@@ -10,10 +10,10 @@ from xml.sax.saxutils import quoteattr
 
 from gemelo.libraries.arm.model.description import ROUNDING
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfModel
+from gemelo.libraries.robot_import.joint_mending import stand_at
+from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.poses import zero_state
 from gemelo.schemas.text_file import NotUtf8, read_text
-from gemelo.services.robot_import.joint_mending import stand_at
-from gemelo.services.robot_import.mended import Mended
-from gemelo.services.robot_import.poses import zero_state
 
 SUFFIX, XACRO = ".srdf", ".srdf.xacro"
 OWN_GROUP = "arm"  # of the robot's folder

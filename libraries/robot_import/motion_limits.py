@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 
 from gemelo.libraries.arm.checks.urdf import follower_range
 from gemelo.libraries.arm.model.urdf import JointKind, Limit, UrdfJoint
-from gemelo.services.robot_import.mended import Mended, numbers_in
+from gemelo.libraries.robot_import.mended import Mended, numbers_in
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 PLACES = 9  # significant digits of a limit that is written

@@ -6,8 +6,8 @@ import xml.etree.ElementTree as ET
 
 from gemelo.libraries.arm.model.urdf import JointKind
 from gemelo.libraries.arm.model.xml_reader import MINUSES
-from gemelo.services.robot_import.joint_mending import FREE
-from gemelo.services.robot_import.mended import Mended, numbers_in
+from gemelo.libraries.robot_import.joint_mending import FREE
+from gemelo.libraries.robot_import.mended import Mended, numbers_in
 
 TEXTS = ("name", "link", "joint", "type", "filename")  # attributes that are no numbers
 SEVERAL = ("xyz", "rpy", "scale", "size")

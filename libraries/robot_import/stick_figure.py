@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 
 from gemelo.libraries.arm.checks.units import joint_lengths
 from gemelo.libraries.arm.model.urdf import UrdfJoint
-from gemelo.services.robot_import.mended import Mended
+from gemelo.libraries.robot_import.mended import Mended
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 RADIUS_SHARE = 0.025  # of the longest rod: thin, and yet seen

@@ -14,7 +14,7 @@ from gemelo.libraries.arm.checks.units import (
 )
 from gemelo.libraries.arm.checks.urdf import principal_moments
 from gemelo.libraries.arm.model.urdf import JointKind
-from gemelo.services.robot_import.mended import Mended, links_of, numbers_in
+from gemelo.libraries.robot_import.mended import Mended, links_of, numbers_in
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 MILLIMETRE, DEGREE = 0.001, math.pi / 180.0  # [m], [rad]

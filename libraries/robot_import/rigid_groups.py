@@ -7,9 +7,9 @@ import xml.etree.ElementTree as ET
 from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose
 from gemelo.libraries.arm.kinematics.chain import origin_of
 from gemelo.libraries.arm.model.urdf import JointKind
-from gemelo.services.robot_import.link_boxes import pose_of
-from gemelo.services.robot_import.mended import Mended, links_of, subject_of
-from gemelo.services.robot_import.mesh_places import set_origin
+from gemelo.libraries.robot_import.link_boxes import pose_of
+from gemelo.libraries.robot_import.mended import Mended, links_of, subject_of
+from gemelo.libraries.robot_import.mesh_places import set_origin
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 MOST_PARTS = 40  # links with shapes: of more, pairs are sampled for minutes, and the native planner takes 64

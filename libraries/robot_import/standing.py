@@ -6,10 +6,10 @@ from gemelo.libraries.arm.device.device_config import MAX_COUNTS
 from gemelo.libraries.arm.errors import suggestion
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
 from gemelo.libraries.arm.model.virtual_drive import driven_joints
-from gemelo.services.robot_import.joint_mending import stand_at
-from gemelo.services.robot_import.mended import Mended
-from gemelo.services.robot_import.poses import zero_state
-from gemelo.services.robot_import.questions import Questions, yes_or_no
+from gemelo.libraries.robot_import.joint_mending import stand_at
+from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.poses import zero_state
+from gemelo.libraries.robot_import.questions import Questions, yes_or_no
 
 MOST = MAX_COUNTS["joint"]  # that one device drives
 FEW = 3  # names that are said

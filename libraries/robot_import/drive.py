@@ -13,8 +13,8 @@ from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
 from gemelo.libraries.arm.motors.speed import speed_limits
 from gemelo.libraries.arm.motors.steps import exact_ratio
 from gemelo.libraries.arm.motors.tick import fastest_steps
-from gemelo.services.robot_import.parts import PINS, SWITCH_PINS, DriverPart, MotorPart, driver_named, motor_named
-from gemelo.services.robot_import.questions import Questions, above_zero, one_of, whole, yes_or_no
+from gemelo.libraries.robot_import.parts import PINS, SWITCH_PINS, DriverPart, MotorPart, driver_named, motor_named
+from gemelo.libraries.robot_import.questions import Questions, above_zero, one_of, whole, yes_or_no
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 PINION_RADIUS = 0.01  # [m]

@@ -10,8 +10,8 @@ from gemelo.libraries.arm.checks.meshes import SMALLEST, Facts, MeshFacts, facts
 from gemelo.libraries.arm.checks.units import LARGEST_GYRATION, gyration
 from gemelo.libraries.arm.checks.urdf import UNTOUCHED, principal_moments
 from gemelo.libraries.arm.model.urdf import UrdfLink
-from gemelo.services.robot_import.mended import Mended, links_of, meshes_of, subject_of
-from gemelo.services.robot_import.questions import Questions, yes_or_no
+from gemelo.libraries.robot_import.mended import Mended, links_of, meshes_of, subject_of
+from gemelo.libraries.robot_import.questions import Questions, yes_or_no
 
 MOST_NAMED = 3
 

@@ -14,11 +14,11 @@ from gemelo.libraries.arm.checks.meshes import MeshFacts, check_meshes, facts_of
 from gemelo.libraries.arm.checks.urdf import check_urdf, fault_finding
 from gemelo.libraries.arm.model.urdf import Geometry, UrdfLink, UrdfModel, model_of
 from gemelo.libraries.arm.model.xml_reader import XmlReader
-from gemelo.services.robot_import.questions import Questions, one_of
-from gemelo.services.robot_import.source import RobotSource
+from gemelo.libraries.robot_import.questions import Questions, one_of
+from gemelo.libraries.robot_import.source import RobotSource
 
 if TYPE_CHECKING:
-    from gemelo.services.robot_import.semantics import Semantics
+    from gemelo.libraries.robot_import.semantics import Semantics
 
 
 @dataclass
