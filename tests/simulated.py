@@ -15,9 +15,9 @@ import gemelo
 from gemelo.api.simulation import SimulatedArm
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.topics import DEVICE_SHAFT
-from gemelo.services.cli import simulated
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli import simulated
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 
 NUMBERS = itertools.count(2)
 STANDS = 0.5  # [s] for which an arm that rests does not move

@@ -31,7 +31,7 @@ from gemelo.schemas.text_file import read_text
 # [m] chosen: what shapes that are fitted to meshes may stand beyond them. Links that are never farther apart than this
 # beyond the clearance are parts of one hinge, whose true distance such shapes cannot tell.
 EXCESS, EXCESS_SHARE = 0.005, 0.01  # the latter of the longest mesh
-COMMAND_LINE = "gemelo.services.cli.main"  # its steps in a process of their own: they load the planner
+COMMAND_LINE = "gemelo.tools.cli.main"  # its steps in a process of their own: they load the planner
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ def imported(folder: Path, link: Callable[[int], trimesh.Trimesh]) -> ArmDescrip
     """The robot that `gemelo import` makes of an arm with such links."""
     source = export(folder / "six_description", link)
     words = ("import", str(source), "--yes", "--output", str(folder))
-    command = [sys.executable, "-m", "gemelo.services.cli.main", *words]
+    command = [sys.executable, "-m", "gemelo.tools.cli.main", *words]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return load_arm(folder / "six")
 
@@ -256,5 +256,5 @@ def _link(package: str, name: str) -> str:
 
 def _seconds(*words: str) -> float:
     began = time.monotonic()
-    subprocess.run([sys.executable, "-m", "gemelo.services.cli.main", *words], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, "-m", "gemelo.tools.cli.main", *words], check=True, stdout=subprocess.DEVNULL)
     return time.monotonic() - began

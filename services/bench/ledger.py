@@ -24,9 +24,9 @@ from gemelo.schemas.topics import STEP_LEDGER
 from gemelo.services.bench.figures import Figure, rounded
 from gemelo.services.bench.scenes import rm1
 from gemelo.services.bench.stopping import random_place, smooth_move
-from gemelo.services.cli.text_table import table
 from gemelo.services.virtual_arm.gateway_driver import Kind
 from gemelo.services.virtual_arm.virtual_arm import BOOTED, PERIOD, VirtualArm
+from gemelo.tools.cli.text_table import table
 
 MOVES = 10_000
 QUICK = 300  # moves of `make bench`

@@ -26,7 +26,7 @@ READY_ROUNDS = 3
 CLI_GOAL = FigureGoal(p99=500.0)  # [ms]
 CLI_ROUNDS = 15
 CPUCLOCK_SCHED = 2  # the kernel's include/linux/posix-timers.h: with ~pid above it, the CPU clock of a whole process
-GEMELO = (sys.executable, "-m", "gemelo.services.cli.main")
+GEMELO = (sys.executable, "-m", "gemelo.tools.cli.main")
 
 
 @dataclass(frozen=True)

@@ -41,8 +41,8 @@ from gemelo.schemas.topics import (
     PLAN,
     STEP_ERRORS,
 )
-from gemelo.services.cli.session import CommandSession
 from gemelo.services.planner.core import Planner
+from gemelo.tools.cli.session import CommandSession
 from tests.runtime.support import RouterProcess, spinning
 
 MOVE_TIME = 0.4  # [s] that every goal takes here

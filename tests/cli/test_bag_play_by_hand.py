@@ -18,9 +18,9 @@ from gemelo.libraries.recordings.mcap_file import McapFile
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DESCRIPTION, Delivery, Topic
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
 from gemelo.services.state_publisher.main import describe
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.runtime.support import ROOT, spinning, until
 
 START = 1_795_000_000_000_000_000
@@ -46,7 +46,7 @@ class Playing:
         self.heard: list[int] = []
         self._keys, terminal = pty.openpty()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "gemelo.services.cli.main", "bag", "play", str(bag), "--paused"], cwd=ROOT,
+            [sys.executable, "-m", "gemelo.tools.cli.main", "bag", "play", str(bag), "--paused"], cwd=ROOT,
             env=environ, stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
         os.close(terminal)

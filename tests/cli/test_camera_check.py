@@ -13,9 +13,9 @@ import pytest
 
 from gemelo import Pose, Seen
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
-from gemelo.services.cli import camera_check
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli import camera_check
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 
 ROOT = Path(__file__).parents[2]
 

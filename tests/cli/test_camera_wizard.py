@@ -32,11 +32,11 @@ from gemelo.services.bench.vision import images
 from gemelo.services.bench.vision.images import Surface, render
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
 from gemelo.services.camera.virtual.world import CameraWorld
-from gemelo.services.cli import camera_mount
-from gemelo.services.cli.camera_boards import CHESS_BOARD, TAG_BOARD, tag_board
-from gemelo.services.cli.camera_calibrate import take
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli import camera_mount
+from gemelo.tools.cli.camera_boards import CHESS_BOARD, TAG_BOARD, tag_board
+from gemelo.tools.cli.camera_calibrate import take
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 
 BOARD_AT = np.array([0.28, -0.02, 0.0])  # [m] of the board with tags on the table
 CELL = """

@@ -25,11 +25,11 @@ from gemelo.libraries.runtime.deployment import load_deployment
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DESCRIPTION, JOINT_STATES, Delivery, Topic
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
 from gemelo.services.state_publisher.main import describe
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.program.rerun_program import rerun_binary
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.runtime.support import spinning, until
 
 START = 1_795_000_000_000_000_000
@@ -105,7 +105,7 @@ def test_a_recording_is_played_from_a_time_on_at_another_rate(router, ten_second
 def test_a_recording_is_played_again_and_again_until_it_is_ended(router, ten_seconds):
     heard: list[tuple[float, int]] = []
     with hearing(heard):
-        command = [sys.executable, "-m", "gemelo.services.cli.main", "bag", "play", str(ten_seconds)]
+        command = [sys.executable, "-m", "gemelo.tools.cli.main", "bag", "play", str(ten_seconds)]
         with subprocess.Popen([*command, "--loop", "--rate", "10", "--start", "5"], cwd=ROOT) as playing:
             try:
                 assert until(lambda: len(heard) > 250, 40.0)
@@ -121,7 +121,7 @@ def test_a_recording_is_played_again_and_again_until_it_is_ended(router, ten_sec
 def test_the_view_of_a_shadow_robot_shows_what_is_played(router, bag, tmp_path):
     """The visualizer itself, as a process that is told nothing but the shadow's folder."""
     shadow, view, heard = tmp_path / "out/shadows/rm1-replay", tmp_path / "view.rrd", list[JointState]()
-    play = [sys.executable, "-m", "gemelo.services.cli.main", "bag", "play", str(bag), "--loop"]
+    play = [sys.executable, "-m", "gemelo.tools.cli.main", "bag", "play", str(bag), "--loop"]
     show = [sys.executable, "-m", "gemelo.services.visualizer.main", "--set", f"recording_path={view}"]
     environment = os.environ | {"GEMELO_ROBOT": str(shadow), "GEMELO_VIEWER_MODE": "none"}
     with Node("tool", robot="rm1-replay") as tool, subprocess.Popen(play, cwd=ROOT) as playing:

@@ -10,9 +10,9 @@ import pytest
 
 from gemelo.libraries.recordings.incidents import Happening, Incident, IncidentKind, is_saving, saving_mark
 from gemelo.libraries.recordings.mcap_file import McapFile
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
 from gemelo.services.logger.black_box import SavingMark, write_black_box
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 
 SECOND = 1_000_000_000
 START = 1_795_000_000 * SECOND

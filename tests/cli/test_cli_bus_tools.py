@@ -46,7 +46,7 @@ from gemelo.schemas.topics import (
     Delivery,
     Topic,
 )
-from gemelo.services.cli import (
+from gemelo.tools.cli import (
     action_watch,
     interface,
     living_topics,
@@ -58,11 +58,11 @@ from gemelo.services.cli import (
     topic_ends,
     topic_rates,
 )
-from gemelo.services.cli.errors import CommandError, ExitCode
-from gemelo.services.cli.field_path import FieldPath, leaves
-from gemelo.services.cli.forms import csv_lines, json_line, yaml_document
-from gemelo.services.cli.main import run
-from gemelo.services.cli.session import CommandSession
+from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.field_path import FieldPath, leaves
+from gemelo.tools.cli.forms import csv_lines, json_line, yaml_document
+from gemelo.tools.cli.main import run
+from gemelo.tools.cli.session import CommandSession
 from tests.runtime.support import hear, spinning
 
 WHOLE = FieldPath(FrameTransform, "")

@@ -9,8 +9,8 @@ import pytest
 
 from gemelo.libraries.arm.model.srdf_edit import entries
 from gemelo.libraries.arm.model.urdf import read_urdf
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 
 
 @pytest.fixture

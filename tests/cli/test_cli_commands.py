@@ -9,10 +9,10 @@ import pytest
 import yaml
 
 from gemelo.schemas.topics import JOINT_TARGETS, TOPICS
-from gemelo.services.cli.errors import CommandError, ExitCode
-from gemelo.services.cli.main import run
-from gemelo.services.cli.messages import message_of
-from gemelo.services.cli.topic import topic_of
+from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.main import run
+from gemelo.tools.cli.messages import message_of
+from gemelo.tools.cli.topic import topic_of
 from tests.table import table
 
 
@@ -126,7 +126,7 @@ def test_a_message_that_is_none_is_refused_with_its_field(text, reason):
 
 
 def test_a_reader_that_has_enough_ends_the_command_quietly():
-    command = f"{sys.executable} -m gemelo.services.cli.main topic list | head -1"
+    command = f"{sys.executable} -m gemelo.tools.cli.main topic list | head -1"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=30, check=False)
     assert done.stdout.startswith("topic")
     assert done.stderr == ""
@@ -134,7 +134,7 @@ def test_a_reader_that_has_enough_ends_the_command_quietly():
 
 def test_bash_takes_the_completion():
     script = (
-        f"source <({sys.executable} -m gemelo.services.cli.main completion); "
+        f"source <({sys.executable} -m gemelo.tools.cli.main completion); "
         "COMP_WORDS=(gemelo topic ec); COMP_CWORD=2; _gemelo; echo ${COMPREPLY[@]}; "
         "COMP_WORDS=(gemelo topic hz joint_s); COMP_CWORD=3; _gemelo; echo ${COMPREPLY[@]}"
     )
@@ -143,7 +143,7 @@ def test_bash_takes_the_completion():
 
 
 def test_a_goal_may_come_from_a_file(tmp_path):
-    from gemelo.services.cli.action import goal_text
+    from gemelo.tools.cli.action import goal_text
 
     path = tmp_path / "goal.json"
     path.write_text(json.dumps({"goal_time_tolerance": 1.0}))

@@ -20,9 +20,9 @@ from gemelo.libraries.runtime.deployment import when_silent
 from gemelo.schemas.device import DeviceState, DeviceStatus
 from gemelo.schemas.system import NodeInfo
 from gemelo.services.chaos.descriptors import give_descriptors, take_descriptors
-from gemelo.services.cli import doctor
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli import doctor
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.disks import WAYS, refusing_disk
 from tests.real_time import may_run_in_real_time
 from tests.stepper_gateway.locked import Mosquitto, external, locked

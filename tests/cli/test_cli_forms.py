@@ -18,8 +18,8 @@ from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import ACTIONS, FRAMES, JOINT_STATES, REQUESTS, STATIC_FRAMES, TOPICS
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.runtime.support import spinning
 
 LIFT = Transform(translation=(0.1, 0.0, 0.2))

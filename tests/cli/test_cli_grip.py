@@ -9,10 +9,10 @@ import pytest
 
 import gemelo
 from gemelo import Gripped
-from gemelo.services.cli import grip
-from gemelo.services.cli.errors import CommandError
-from gemelo.services.cli.grip import opening
-from gemelo.services.cli.main import parse
+from gemelo.tools.cli import grip
+from gemelo.tools.cli.errors import CommandError
+from gemelo.tools.cli.grip import opening
+from gemelo.tools.cli.main import parse
 
 
 def said(to: str) -> CommandError:

@@ -15,11 +15,11 @@ from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import FkRequest, IkRequest, PoseGoal
 from gemelo.schemas.topics import FK, IK
-from gemelo.services.cli import kinematics
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
-from gemelo.services.cli.session import load_robot, reported
 from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
+from gemelo.tools.cli import kinematics
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
+from gemelo.tools.cli.session import load_robot, reported
 
 
 @pytest.fixture

@@ -21,13 +21,13 @@ from gemelo.schemas.device import (
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, NamedGoal, PlanRequest, PoseGoal
 from gemelo.schemas.topics import JOINT_STATES, JOINT_TARGETS
-from gemelo.services.cli import action, device, node, state, topic, topic_rates
-from gemelo.services.cli.errors import CommandError, ExitCode
-from gemelo.services.cli.field_path import FieldPath
-from gemelo.services.cli.forms import yaml_document
-from gemelo.services.cli.messages import message_of
-from gemelo.services.cli.move import move
-from gemelo.services.cli.terminal import Interrupt
+from gemelo.tools.cli import action, device, node, state, topic, topic_rates
+from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.field_path import FieldPath
+from gemelo.tools.cli.forms import yaml_document
+from gemelo.tools.cli.messages import message_of
+from gemelo.tools.cli.move import move
+from gemelo.tools.cli.terminal import Interrupt
 
 READY = PlanRequest(goal=NamedGoal(name="ready"))
 

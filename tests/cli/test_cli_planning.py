@@ -19,12 +19,12 @@ from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import NamedGoal, PlanPhase, PlanProgress, PlanRequest, PlanResponse
 from gemelo.schemas.scene import SceneReplace, SceneRequest
 from gemelo.schemas.topics import PLAN, PLAN_PROGRESS, SCENE_EDIT
-from gemelo.services.cli import move as move_module
-from gemelo.services.cli.errors import CommandError, ExitCode
-from gemelo.services.cli.move import move
-from gemelo.services.cli.terminal import LiveBlock
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.main import run
+from gemelo.tools.cli import move as move_module
+from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.move import move
+from gemelo.tools.cli.terminal import LiveBlock
 from tests.planner.walled import WALLED, past_the_wall
 from tests.runtime.support import spinning
 

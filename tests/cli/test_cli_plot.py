@@ -16,13 +16,13 @@ from gemelo.schemas.frames import FrameTransforms
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import JOINT_STATES, STEP_ERRORS, Delivery, Topic
-from gemelo.services.cli import living_topics
-from gemelo.services.cli.chart import ACROSS, BLANK, DOTS, DOWN, LABEL, ChartCurve, chart
-from gemelo.services.cli.errors import CommandError, ExitCode
-from gemelo.services.cli.field_path import FieldPath
-from gemelo.services.cli.main import run
-from gemelo.services.cli.plot import Field, Plot, plot
-from gemelo.services.cli.terminal import COLOUR, LiveBlock, cut
+from gemelo.tools.cli import living_topics
+from gemelo.tools.cli.chart import ACROSS, BLANK, DOTS, DOWN, LABEL, ChartCurve, chart
+from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.field_path import FieldPath
+from gemelo.tools.cli.main import run
+from gemelo.tools.cli.plot import Field, Plot, plot
+from gemelo.tools.cli.terminal import COLOUR, LiveBlock, cut
 from tests.runtime.support import spinning
 
 COLUMNS, ROWS = 60, 10

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from gemelo.programs import Go, Program
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 
 
 @pytest.fixture(autouse=True)

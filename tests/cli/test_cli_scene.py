@@ -27,13 +27,13 @@ from gemelo.schemas.scene import (
 )
 from gemelo.schemas.scene_meshes import mesh_digest
 from gemelo.schemas.topics import JOINT_STATES, SCENE
-from gemelo.services.cli import scene as scene_module
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
-from gemelo.services.cli.scene import attach_choices, pair_choices
-from gemelo.services.cli.session import load_robot, reported
 from gemelo.services.planner.scene.answer_log import AnswerLog
 from gemelo.services.planner.scene.scene_keeper import SceneKeeper
+from gemelo.tools.cli import scene as scene_module
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
+from gemelo.tools.cli.scene import attach_choices, pair_choices
+from gemelo.tools.cli.session import load_robot, reported
 from tests.runtime.support import until
 
 Said = Callable[[str], ExitCode]

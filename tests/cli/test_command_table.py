@@ -9,9 +9,9 @@ import sys
 import pytest
 
 from gemelo.libraries.arm.model import description
-from gemelo.services.cli.commands import COMMANDS, GROUPS
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import parse, run
+from gemelo.tools.cli.commands import COMMANDS, GROUPS
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import parse, run
 from tests.table import table
 
 SPEAKING = (
@@ -95,23 +95,23 @@ def test_a_robot_that_cannot_be_read_still_completes_the_commands(monkeypatch, c
 @pytest.mark.parametrize(
     ("line", "absent"),
     [
-        (["--help"], ("msgspec", "numpy", "zenoh", "gemelo.services.cli.move", "gemelo.services.cli.topic")),
+        (["--help"], ("msgspec", "numpy", "zenoh", "gemelo.tools.cli.move", "gemelo.tools.cli.topic")),
         (
             ["topic", "list"],
             (
                 "numpy",
                 "zenoh",
                 "gemelo.libraries.arm.model.description",
-                "gemelo.services.cli.move",
+                "gemelo.tools.cli.move",
                 "gemelo.libraries.runtime.actions",
             ),
         ),
-        (["move", "--help"], ("numpy", "zenoh", "rich", "gemelo.services.cli.jog")),
+        (["move", "--help"], ("numpy", "zenoh", "rich", "gemelo.tools.cli.jog")),
     ],
 )
 def test_a_command_loads_nothing_that_it_does_not_use(line, absent):
     program = (
-        "import sys\nfrom gemelo.services.cli.main import run\n"
+        "import sys\nfrom gemelo.tools.cli.main import run\n"
         f"try:\n    run({line!r})\nexcept SystemExit:\n    pass\nprint(*sys.modules, file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True)

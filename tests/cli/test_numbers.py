@@ -9,18 +9,18 @@ from typing import NamedTuple
 import pytest
 
 from gemelo.libraries.arm.model.description import load_arm
-from gemelo.services.cli import units
-from gemelo.services.cli.commands import COMMANDS
-from gemelo.services.cli.device import reference_request
-from gemelo.services.cli.device_press import request_of
-from gemelo.services.cli.errors import CommandError, ExitCode
-from gemelo.services.cli.jog import command_of
-from gemelo.services.cli.kinematics import ik_request
-from gemelo.services.cli.main import parse
-from gemelo.services.cli.move_request import request_from
-from gemelo.services.cli.parser import Options, Parser, complete
-from gemelo.services.cli.scene_object import object_of
-from gemelo.services.cli.units import (
+from gemelo.tools.cli import units
+from gemelo.tools.cli.commands import COMMANDS
+from gemelo.tools.cli.device import reference_request
+from gemelo.tools.cli.device_press import request_of
+from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.jog import command_of
+from gemelo.tools.cli.kinematics import ik_request
+from gemelo.tools.cli.main import parse
+from gemelo.tools.cli.move_request import request_from
+from gemelo.tools.cli.parser import Options, Parser, complete
+from gemelo.tools.cli.scene_object import object_of
+from gemelo.tools.cli.units import (
     ACCELERATION,
     ANGLE,
     ANGULAR_SPEED,

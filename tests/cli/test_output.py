@@ -14,12 +14,12 @@ import pytest
 from gemelo.libraries.runtime.process.logs import line_logger
 from gemelo.schemas.plain_text import escaped, escaped_but_colours
 from gemelo.schemas.system import LogLevel, LogRecord
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.log import line_of
-from gemelo.services.cli.main import run
-from gemelo.services.cli.messages import dump
-from gemelo.services.cli.output import EscapedStream, control, escaped_output, print_coloured
-from gemelo.services.cli.terminal import LiveBlock
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.log import line_of
+from gemelo.tools.cli.main import run
+from gemelo.tools.cli.messages import dump
+from gemelo.tools.cli.output import EscapedStream, control, escaped_output, print_coloured
+from gemelo.tools.cli.terminal import LiveBlock
 
 CLIPBOARD = "\x1b]52;c;cm0gLXJmIH4=\x07"  # what a terminal puts into its clipboard
 ATTACKS = (
@@ -80,7 +80,7 @@ def test_our_own_sequences_pass_and_colours_alone_within_a_drawing(capsys: pytes
 def test_what_writes_past_it_is_one_module():
     """Any other print of a command goes through the stream that escapes."""
     past = re.compile(r"__stdout__|__stderr__|\.unescaped|stdout\.buffer|os\.write\((1|2),|fdopen\((1|2)")
-    found = {path.name for path in (ROOT / "services" / "cli").glob("*.py") if past.search(path.read_text())}
+    found = {path.name for path in (ROOT / "tools" / "cli").glob("*.py") if past.search(path.read_text())}
     assert found == {"output.py"}
 
 

@@ -12,10 +12,10 @@ import pytest
 
 import gemelo
 from gemelo.schemas.planning import PlanResponse
-from gemelo.services.cli import move
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
-from gemelo.services.cli.session import load_robot, reported
+from gemelo.tools.cli import move
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
+from gemelo.tools.cli.session import load_robot, reported
 
 
 @pytest.fixture

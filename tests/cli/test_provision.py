@@ -14,10 +14,10 @@ import pytest
 
 from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
-from gemelo.services.cli import provision as module
-from gemelo.services.cli.credentials import CredentialsChange, certificate, password, private_key, require_sound
-from gemelo.services.cli.errors import CommandError, ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli import provision as module
+from gemelo.tools.cli.credentials import CredentialsChange, certificate, password, private_key, require_sound
+from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.main import run
 
 
 class Board:
@@ -159,8 +159,8 @@ def test_a_factory_reset_asks_first_and_then_says_only_that(line, capsys, monkey
 
 
 def test_no_option_takes_a_password():
-    from gemelo.services.cli.commands import COMMANDS
-    from gemelo.services.cli.completion import options_of
+    from gemelo.tools.cli.commands import COMMANDS
+    from gemelo.tools.cli.completion import options_of
 
     (command,) = [each for each in COMMANDS if each.words == ("device", "provision")]
     assert [option for option in options_of(command) if "pass" in option] == []

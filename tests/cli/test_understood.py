@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 
 SAID = {
     "move --joints brazo_joint=0.5235987755982988rad q3=0.04": "brazo_joint 30 deg, efector_joint 40 mm",

@@ -104,7 +104,7 @@ def test_the_block_is_real():
         loaded_by("gemelo.services.planner.main", ())
 
 
-@pytest.mark.parametrize("module", [module_of("stepper_gateway"), "gemelo.services.cli.main", "gemelo"])
+@pytest.mark.parametrize("module", [module_of("stepper_gateway"), "gemelo.tools.cli.main", "gemelo"])
 def test_a_gateway_host_and_a_person_need_no_extra(module):
     assert not loaded_by(module, ()) & NEVER_ON_A_GATEWAY
 

@@ -32,12 +32,12 @@ from gemelo.schemas.message import encode
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from gemelo.schemas.system import Failure
 from gemelo.schemas.topics import CONTROL, CONTROL_TAKE, DEVICE_EVENTS, FOLLOW_JOINT_TRAJECTORY, GATEWAY_INPUTS, LOG
-from gemelo.services.cli.control import describe
 from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.inputs import BeganInput, unpacked
 from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
 from gemelo.services.stepper_gateway.shell import Shell
+from gemelo.tools.cli.control import describe
 from tests.runtime.support import ROOT, spinning, until
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt import secure_folder
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.optional import need
 
 LONGEST_ON_A_BOARD = 2048  # [bytes] of mqtt_ca in firmware/PROTOCOL.md
@@ -80,8 +80,8 @@ def test_what_cannot_be_is_refused_by_name(tmp_path, capsys, words, reason):
 
 
 def test_no_option_takes_a_password():
-    from gemelo.services.cli.commands import COMMANDS
-    from gemelo.services.cli.completion import options_of
+    from gemelo.tools.cli.commands import COMMANDS
+    from gemelo.tools.cli.completion import options_of
 
     (command,) = [each for each in COMMANDS if each.words == ("broker", "secure")]
     assert [option for option in options_of(command) if "pass" in option] == []

@@ -18,7 +18,6 @@ from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.arm.model.srdf_edit import with_pairs
 from gemelo.libraries.arm.model.urdf_edit import with_collisions
-from gemelo.services.cli.robot_folder import plan_of
 from gemelo.services.collision_fitting import cuts
 from gemelo.services.collision_fitting.excess import SHARE, depth_in, depths
 from gemelo.services.collision_fitting.fit_writing import HULLS, touching_states, write_fits
@@ -34,6 +33,7 @@ from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision_geometry.coal_shapes import is_inside
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.collision_geometry.shapes import ShapeKind, TriangleMesh
+from gemelo.tools.cli.robot_folder import plan_of
 from tests.profiles import examples
 
 URDF = Path(__file__).parents[2] / "urdf"

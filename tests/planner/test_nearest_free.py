@@ -12,13 +12,13 @@ from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
-from gemelo.services.cli.jog import command_of
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.jog.jog import PERIOD
 from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
 from gemelo.services.stepper_gateway.motion.target_tracker import TargetTracker
+from gemelo.tools.cli.jog import command_of
 from tests.planner.jogging import Array, Jogged, arm_of, kinematics_of
 
 ARMS, KINDS = ("rm1", "parol6"), ("itself", "a post", "what it carries")

@@ -179,7 +179,7 @@ def test_nothing_but_inputs(changed):
     ],
 )
 def test_the_command_says_so_in_words_and_by_its_exit_code(arguments, code, said):
-    command = [sys.executable, "-m", "gemelo.services.cli.main", "replay", *arguments]
+    command = [sys.executable, "-m", "gemelo.tools.cli.main", "replay", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == code, done.stderr
     assert said in done.stdout + done.stderr
@@ -191,7 +191,7 @@ def test_the_command_ends_with_1_at_a_difference(changed):
             state["position"][0] += 1e-3
 
     file = changed("state_publisher", Messages("joint_states", alter))
-    command = [sys.executable, "-m", "gemelo.services.cli.main", "replay", str(file), "state_publisher", "--json"]
+    command = [sys.executable, "-m", "gemelo.tools.cli.main", "replay", str(file), "state_publisher", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 1, done.stderr
     assert '"topic":"frames"' in done.stdout

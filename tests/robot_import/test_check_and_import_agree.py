@@ -9,8 +9,8 @@ from random import Random
 
 import pytest
 
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.robot_import.plain_arm import APART, LIMIT, LINKS, arm, body, boxes, hinge, hinges, meshed
 from tests.robot_import.test_owners_arm import sliding
 from tests.robot_import.test_sizes_and_places import UNITS, assembled, in_unit

@@ -14,9 +14,9 @@ from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
 from gemelo.services.planner.core import Planner
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.robot_import.exports import EXPORTS, Export, hobby
 
 

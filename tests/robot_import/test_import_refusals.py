@@ -16,8 +16,8 @@ from gemelo.libraries.robot_import.limits import ask_limits
 from gemelo.libraries.robot_import.mending import mend
 from gemelo.libraries.robot_import.questions import Questions
 from gemelo.libraries.robot_import.source import find_source
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.robot_import.exports import by_hand, joint, link, mesh, package, solidworks, workspace, write
 
 

@@ -19,8 +19,8 @@ from gemelo.libraries.robot_import.mended import Mended
 from gemelo.libraries.robot_import.mending import mend
 from gemelo.libraries.robot_import.questions import Questions
 from gemelo.libraries.robot_import.source import find_source
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.robot_import.exports import LIMIT, joint, write
 
 BOX = '<geometry><box size="0.06 0.06 0.2"/></geometry>'

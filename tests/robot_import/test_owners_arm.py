@@ -17,9 +17,9 @@ from gemelo.libraries.robot_import.mesh_copies import MOST_COARSER
 from gemelo.libraries.robot_import.rigid_groups import MOST_PARTS
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import PlanRequest, PoseGoal
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
 from gemelo.services.planner.core import Planner
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.robot_import.plain_arm import LIMIT, arm, body, boxes, hinge, hinges, meshed, part, stl
 from tests.robot_import.test_what_restricts_motion import jaws, survey
 

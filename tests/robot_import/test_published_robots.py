@@ -12,8 +12,8 @@ from gemelo.libraries.arm.model.urdf import JointKind
 from gemelo.libraries.robot_import.mended import Mended
 from gemelo.libraries.robot_import.mending import mend
 from gemelo.libraries.robot_import.source import find_source
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.robot_import.exports import LIMIT, joint, link, mesh, package, write
 
 BASE = ('<link name="ground"/>', '<link name="base"/>', '<link name="arm"/>')

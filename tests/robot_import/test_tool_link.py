@@ -8,8 +8,8 @@ import pytest
 
 from gemelo.libraries.arm.model.urdf import UrdfModel, urdf_of
 from gemelo.libraries.robot_import.tool_link import other_tools, tool_link
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.robot_import.exports import LIMIT, joint, link, mesh, write
 
 

@@ -15,8 +15,8 @@ from gemelo.libraries.arm.model.srdf_edit import entries
 from gemelo.libraries.robot_import.questions import Questions
 from gemelo.libraries.robot_import.source import find_source
 from gemelo.libraries.robot_import.survey import Survey, surveyed
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.robot_import.plain_arm import BOTH, LIMIT, arm, body, boxes, hinge, hinges, part
 
 JAW = '<geometry><box size="0.01 0.004 0.03"/></geometry>'

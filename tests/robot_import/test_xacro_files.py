@@ -9,8 +9,8 @@ import pytest
 
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.robot_import.source import find_source
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 from tests.robot_import.exports import joint
 
 OPEN = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'

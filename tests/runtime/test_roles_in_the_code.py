@@ -26,7 +26,7 @@ FOLDERS = (
     ("services/stepper_gateway", "gateway", 5), ("services/planner", "planner", 12),
     ("services/state_publisher", "state_publisher", 4), ("services/visualizer", "visualizer", 13),
     ("services/camera", "camera", 3), ("services/detector", "detector", 1),
-    ("gemelo", "operator", 20), ("gemelo", "panel", 20), ("gemelo", "script", 20), ("services/cli", "operator", 15),
+    ("gemelo", "operator", 20), ("gemelo", "panel", 20), ("gemelo", "script", 20), ("tools/cli", "operator", 15),
 )  # fmt: skip
 
 

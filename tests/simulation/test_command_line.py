@@ -7,8 +7,8 @@ import threading
 
 import pytest
 
-from gemelo.services.cli.errors import ExitCode
-from gemelo.services.cli.main import run
+from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.main import run
 
 
 @pytest.fixture(autouse=True)

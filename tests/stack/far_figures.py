@@ -24,9 +24,9 @@ from gemelo.services.bench.figures import quantile
 from gemelo.services.bench.handshake import joins
 from gemelo.services.bench.latency import follow, sharp_start
 from gemelo.services.bench.stack import Running, has_mosquitto
-from gemelo.services.cli.text_table import table
 from gemelo.services.hosts.checks import load_site
 from gemelo.services.stack.stack import Stack
+from gemelo.tools.cli.text_table import table
 from tests.stack.links import SITE
 from tests.stack.namespaces import Hosts, Lab
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from gemelo.services.cli.errors import ExitCode
 from gemelo.services.stack.stack import Stack
+from gemelo.tools.cli.errors import ExitCode
 
 LONGEST = 120.0  # [s] of one command
-COMMAND = (sys.executable, "-m", "gemelo.services.cli.main")
+COMMAND = (sys.executable, "-m", "gemelo.tools.cli.main")
 
 
 def gemelo(stack: Stack, *words: str, code: ExitCode = ExitCode.OK) -> str:

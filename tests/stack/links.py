@@ -24,9 +24,9 @@ from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.chaos.slots import SlotFile, steps_in, violations
-from gemelo.services.cli.text_table import table
 from gemelo.services.hosts.checks import load_site
 from gemelo.services.hosts.layout import processes
+from gemelo.tools.cli.text_table import table
 from tests.stack.ethernet import Ethernet
 from tests.stack.link_cases import CASES, FINISHED, HELD, Case, expected, told_within
 from tests.stack.namespaces import Hosts, Lab

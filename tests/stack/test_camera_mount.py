@@ -18,8 +18,8 @@ from gemelo.libraries.vision.calibration.reprojection import Carrier
 from gemelo.libraries.vision.rigid import from_transform
 from gemelo.services.bench.vision.mount_images import FIRST
 from gemelo.services.bench.vision.mounting import tool_error
-from gemelo.services.cli.errors import ExitCode
 from gemelo.services.stack.stack import Stack
+from gemelo.tools.cli.errors import ExitCode
 from tests.stack.gemelo import gemelo
 
 ENOUGH = 1.5  # [mm] with 8 poses, of which some see nothing; with 15 `mount_images_mm` of the bench asks for 0.5

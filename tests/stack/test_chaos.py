@@ -30,7 +30,7 @@ def reported(tmp_path, pytestconfig, *options, minutes, ends):
 
 def test_a_minute_of_chaos_violates_nothing(tmp_path, pytestconfig):
     need("mosquitto")
-    command = [sys.executable, "-m", "gemelo.services.cli.main", "chaos", "--minutes", "1", "--seed", str(SEED)]
+    command = [sys.executable, "-m", "gemelo.tools.cli.main", "chaos", "--minutes", "1", "--seed", str(SEED)]
     done = subprocess.run(
         [*command, "--out", str(tmp_path / "out")],
         cwd=pytestconfig.rootpath, capture_output=True, text=True, timeout=240.0,

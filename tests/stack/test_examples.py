@@ -47,7 +47,7 @@ class OnAnArm:
     def test_the_programs_of_the_project_are_checked_and_run(self, twin: Stack, arm: gemelo.Arm) -> None:
         arm.move(named="ready")
         for words, end in (("check", "it can run, "), ("run", "done, 10 steps")):
-            command = [sys.executable, "-m", "gemelo.services.cli.main", "program", words, "tour"]
+            command = [sys.executable, "-m", "gemelo.tools.cli.main", "program", words, "tour"]
             programs = {"GEMELO_PATHS_PROGRAMS": str(twin.root / "programs")}
             done = subprocess.run(
                 command, cwd=twin.root, env={**os.environ, **twin.deployment, **programs}, capture_output=True,

@@ -70,7 +70,7 @@ def gemelo(hosts, *words: str, role: str = "operator") -> subprocess.CompletedPr
     keys = f"{lab.sites['desk'].config}/keys"
     shown = {"GEMELO_ROUTER_CERTIFICATE": f"{keys}/{role}.pem", "GEMELO_ROUTER_KEY": f"{keys}/{role}.key"}
     return subprocess.run(
-        made.command("desk", sys.executable, "-m", "gemelo.services.cli.main", *words), cwd=project_root(), text=True,
+        made.command("desk", sys.executable, "-m", "gemelo.tools.cli.main", *words), cwd=project_root(), text=True,
         env=lab.environment("desk", "rm1") | shown, capture_output=True, timeout=60.0,
     )  # fmt: skip
 

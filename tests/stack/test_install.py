@@ -56,7 +56,7 @@ class Lab:
         """`gemelo deploy` here."""
         command, *more = words
         return subprocess.run(
-            [sys.executable, "-m", "gemelo.services.cli.main", "deploy", command, str(self.file), *more],
+            [sys.executable, "-m", "gemelo.tools.cli.main", "deploy", command, str(self.file), *more],
             cwd=project_root(), env=os.environ | {"PATH": self.host.path, "GEMELO_PATHS_OUT": str(self.out)},
             capture_output=True, text=True, timeout=120.0, check=False,
         )  # fmt: skip

@@ -66,7 +66,7 @@ def cell(arm: gemelo.Arm, tmp_path: Path) -> Iterator[Cell]:
 
 def cli(twin: Stack, folder: Path, *words: str) -> subprocess.Popen[str]:
     environment = {**twin.environment, "GEMELO_PATHS_PROGRAMS": str(folder)}
-    command = [sys.executable, "-u", "-m", "gemelo.services.cli.main", "program", *words]
+    command = [sys.executable, "-u", "-m", "gemelo.tools.cli.main", "program", *words]
     return subprocess.Popen(
         command, cwd=twin.root, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )

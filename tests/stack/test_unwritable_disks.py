@@ -14,8 +14,8 @@ from gemelo.schemas.device import DeviceStopRequest
 from gemelo.schemas.topics import DEVICE_STOP
 from gemelo.services.chaos.descriptors import give_descriptors, take_descriptors
 from gemelo.services.chaos.small_disk import SmallDisk
-from gemelo.services.cli.errors import ExitCode
 from gemelo.services.stack.stack import Stack
+from gemelo.tools.cli.errors import ExitCode
 from tests.optional import need_mounts
 from tests.stack.gemelo import gemelo
 from tests.stack.person import Operator, jumps

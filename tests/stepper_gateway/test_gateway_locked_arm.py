@@ -38,7 +38,7 @@ def lock(tmp_path: Path) -> Path:
 
 
 def secured(folder: Path, *words: str, port: int = 8883) -> str:
-    command = [sys.executable, "-m", "gemelo.services.cli.main", "broker", "secure", "--folder", str(folder), *words]
+    command = [sys.executable, "-m", "gemelo.tools.cli.main", "broker", "secure", "--folder", str(folder), *words]
     command += ["--host", "127.0.0.1", "--device", "rm1", "--port", str(port)]
     environment = {**os.environ, "GEMELO_WIFI_PASSWORD": "correct horse"}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60)

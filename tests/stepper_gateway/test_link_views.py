@@ -9,11 +9,11 @@ import pytest
 from gemelo.schemas.device import DeviceState, DeviceStatus
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS
-from gemelo.services.cli import device_status, doctor, state
-from gemelo.services.cli.device_snapshot import device_snapshot
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
 from gemelo.services.visualizer.content.panel import PanelInputs, panel
+from gemelo.tools.cli import device_status, doctor, state
+from gemelo.tools.cli.device_snapshot import device_snapshot
 from tests.stepper_gateway.test_gateway_twins import Twins
 from tests.stepper_gateway.test_gateway_two_devices import TwoDevices
 

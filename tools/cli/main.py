@@ -1,0 +1,120 @@
+"""The `gemelo` command: finds the command in the table and runs it. There is no daemon."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from gemelo.libraries.runtime.process.leaving import end_process
+from gemelo.tools.cli.commands import COMMANDS, GROUPS
+from gemelo.tools.cli.errors import CommandError, ExitCode, unknown, usage
+from gemelo.tools.cli.output import escaped_output
+from gemelo.tools.cli.parser import Options, build
+
+ABOUT = "The twin's command line: move the arm, and see everything that is said about it."
+EPILOG = (
+    "A command is for the robot that runs. `gemelo --robot NAME COMMAND` is for one of several, for another arm of\n"
+    "urdf/, or for a recording that is played; `gemelo use NAME` chooses one of several for this folder.\n"
+    "`gemelo --simulate COMMAND` is for a twin of its own in virtual time, for which nothing needs to run;\n"
+    "`--simulate=START` has it stand in a named state, or unreferenced."
+)
+
+
+def parse(arguments: Sequence[str]) -> Options:
+    """The options of one command line; ends the process with a sentence if it cannot be understood."""
+    return build(COMMANDS, GROUPS, ABOUT, EPILOG, arguments).parse_args(arguments)
+
+
+def with_simulation(arguments: list[str]) -> list[str]:
+    """Without `--simulate` or `--simulate=START` before the command, which is for a twin of its own then."""
+    if not arguments or arguments[0].partition("=")[0] != "--simulate":
+        return arguments
+    from gemelo.tools.cli.simulated import choose  # slow to load, for --simulate alone
+
+    choose(arguments[0])
+    return arguments[1:]
+
+
+def with_robot(arguments: list[str]) -> list[str]:
+    """Without `--robot NAME` before the command, which chooses the robot for this process."""
+    if arguments[:1] != ["--robot"]:
+        return arguments
+    if len(arguments) < 2:
+        raise usage("--robot NAME: the name of an arm in urdf/, of a recording that is played, or its folder")
+    choose_robot(arguments[1])
+    return arguments[2:]
+
+
+def choose_robot(name: str) -> None:
+    """One of several arms that were started together has a deployment of its own; any other has that of this process.
+
+    Raises `CommandError` where there is no such robot.
+    """
+    from gemelo.libraries.runtime.deployment import overriding  # slow to load, for --robot alone
+    from gemelo.libraries.runtime.started import deployment_of_arm
+
+    file = deployment_of_arm(name)
+    if file is None:
+        os.environ["GEMELO_ROBOT"] = robot_folder(name)
+        return
+    for variable in overriding(os.environ):  # what they said when it was started stands in the file
+        del os.environ[variable]
+    os.environ["GEMELO_CONFIG"] = str(file)
+
+
+def robot_folder(name: str) -> str:
+    """The folder of an arm, of a shadow that `gemelo bag play` has made, or of a robot that runs with files elsewhere;
+    raises `CommandError` for none of them."""
+    from gemelo.libraries.runtime.deployment import project_root  # slow to load, for --robot alone
+    from gemelo.libraries.runtime.running import files_of, running_robots
+    from gemelo.libraries.runtime.started import load_started
+
+    root, deployment = project_root(), load_started()
+    out = Path(deployment.paths.out)
+    for folder in (root / "urdf" / name, out / "shadows" / name, Path(name)):
+        if (folder / "robot.toml").is_file():
+            return str(folder.resolve())
+    running = running_robots(deployment.router)
+    if name in running and (elsewhere := files_of(deployment.router, name, running[name])):
+        return elsewhere
+    known = [path.parent.name for where in (root / "urdf", out / "shadows") for path in where.glob("*/robot.toml")]
+    raise unknown("robot", name, sorted({*known, *running}))
+
+
+def run(arguments: Sequence[str] | None = None) -> ExitCode:
+    """Runs one command line, by default that of the process; prints every failure as one sentence on stderr, and
+    nothing with control characters of others."""
+    with escaped_output():
+        return _run(list(sys.argv[1:] if arguments is None else arguments))
+
+
+def _run(given: list[str]) -> ExitCode:
+    try:
+        options = parse(with_simulation(with_robot(with_simulation(given))))
+        code: ExitCode = options.command.load("run")(options)
+        sys.stdout.flush()
+        return code
+    except CommandError as error:
+        print(f"gemelo: {error}", file=sys.stderr)
+        return error.code
+    except KeyboardInterrupt:
+        return ExitCode.CANCELLED
+    except BrokenPipeError:
+        # The reader (as `head`) has enough; without this the interpreter complains again at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return ExitCode.OK
+    finally:
+        if (simulated := sys.modules.get("gemelo.tools.cli.simulated")) is not None:
+            simulated.end()
+
+
+def main() -> NoReturn:
+    """The console script."""
+    end_process(run())
+
+
+if __name__ == "__main__":
+    main()
