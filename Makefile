@@ -83,7 +83,7 @@ coverage: setup ## lines of the firmware core that its tests reach, and why not 
 	@deploy/coverage
 
 bench: setup ## the figures: out/bench.json
-	@$(bin)/python -m gemelo.services.bench
+	@$(bin)/python -m gemelo.tools.bench
 
 recordings: setup ## the recordings that `make test` replays, made anew: tests/replay/recordings
 	@$(bin)/python -m gemelo.services.replay.make_recordings

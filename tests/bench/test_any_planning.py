@@ -10,14 +10,14 @@ import pytest
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.schemas.planning import PlanCode, Refusal
-from gemelo.services.bench.any_arm.drawn_problems import ProblemDrawer, problems
-from gemelo.services.bench.any_arm.families import FAMILIES, FEWEST, MOST, settings
-from gemelo.services.bench.any_arm.generated_arms import ArmSketch, SketchSolid, generated_arm, seven_joints, six_joints
-from gemelo.services.bench.planner import any_planning, near_planning, refusing
-from gemelo.services.bench.planner.any_planning import AnyTrial, has_contact, planned, trial
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
+from gemelo.tools.bench.any_arm.drawn_problems import ProblemDrawer, problems
+from gemelo.tools.bench.any_arm.families import FAMILIES, FEWEST, MOST, settings
+from gemelo.tools.bench.any_arm.generated_arms import ArmSketch, SketchSolid, generated_arm, seven_joints, six_joints
+from gemelo.tools.bench.planner import any_planning, near_planning, refusing
+from gemelo.tools.bench.planner.any_planning import AnyTrial, has_contact, planned, trial
 
 PLAIN = ("six", "seven")  # without meshes, for which spheres are fitted for a quarter of a minute
 FEW = 2

@@ -8,8 +8,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from gemelo.services.bench import main
-from gemelo.services.bench.figures import (
+from gemelo.tools.bench import main
+from gemelo.tools.bench.figures import (
     Figure,
     FigureGoal,
     NotMeasured,
@@ -19,9 +19,9 @@ from gemelo.services.bench.figures import (
     report_of,
     text_of,
 )
-from gemelo.services.bench.main import FIGURES, function_of
-from gemelo.services.bench.panel import DRAG_GOAL, judged_cpu
-from gemelo.services.bench.stack import Stacks
+from gemelo.tools.bench.main import FIGURES, function_of
+from gemelo.tools.bench.panel import DRAG_GOAL, judged_cpu
+from gemelo.tools.bench.stack import Stacks
 from tests.table import table
 
 OF_THE_ISSUES = (
@@ -65,7 +65,7 @@ def test_both_brokers_are_measured():
 def test_a_figure_without_planning_loads_no_planning_library(name):
     slow = {"pinocchio", "coal", "ompl", "toppra", "yourdfpy"}
     program = (
-        "import sys; from gemelo.services.bench.main import FIGURES, function_of; "
+        "import sys; from gemelo.tools.bench.main import FIGURES, function_of; "
         f"function_of(FIGURES[{name!r}]); print({slow} & set(sys.modules))"
     )
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout

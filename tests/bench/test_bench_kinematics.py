@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
-from gemelo.services.bench.planner.kinematics import is_solved, random_problems, solve
-from gemelo.services.bench.scenes import parol6, rm1
 from gemelo.services.planner.kinematics.ik import InverseKinematics
 from gemelo.services.planner.request.deadline import NEVER
+from gemelo.tools.bench.planner.kinematics import is_solved, random_problems, solve
+from gemelo.tools.bench.scenes import parol6, rm1
 
 
 def test_a_solution_counts_and_what_is_off_does_not():

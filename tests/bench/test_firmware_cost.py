@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from gemelo.services.bench import firmware_cost
-from gemelo.services.bench.figures import NotMeasured
+from gemelo.tools.bench import firmware_cost
+from gemelo.tools.bench.figures import NotMeasured
 
 
 @pytest.fixture

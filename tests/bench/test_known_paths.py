@@ -8,11 +8,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gemelo.services.bench.problems import known_paths
-from gemelo.services.bench.problems.known_paths import JointGrid, islands, tightened
-from gemelo.services.bench.problems.problem_sets import path_length
-from gemelo.services.bench.scenes import rm1
 from gemelo.services.planner.path.validity import ValidityChecker
+from gemelo.tools.bench.problems import known_paths
+from gemelo.tools.bench.problems.known_paths import JointGrid, islands, tightened
+from gemelo.tools.bench.problems.problem_sets import path_length
+from gemelo.tools.bench.scenes import rm1
 
 ONES = np.ones(2)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gemelo.services.bench.ledger import LEVEL, POPULATIONS, SEED, StateAfterMove, simulate, text_of
+from gemelo.tools.bench.ledger import LEVEL, POPULATIONS, SEED, StateAfterMove, simulate, text_of
 
 MOVES = 150
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from gemelo.services.bench import many_arms
-from gemelo.services.bench.figures import NotMeasured
-from gemelo.services.bench.many_arms import Load, arms_on_one_router, loads_of
+from gemelo.tools.bench import many_arms
+from gemelo.tools.bench.figures import NotMeasured
+from gemelo.tools.bench.many_arms import Load, arms_on_one_router, loads_of
 from tests.optional import need
 
 

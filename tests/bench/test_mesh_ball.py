@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 
-from gemelo.services.bench.planner.mesh_planning import DENTS, RADIUS, dented_ball, triangles
+from gemelo.tools.bench.planner.mesh_planning import DENTS, RADIUS, dented_ball, triangles
 
 
 def test_the_rock_has_a_hundred_thousand_triangles_and_is_closed():

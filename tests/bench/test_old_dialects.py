@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gemelo.services.bench import old_dialects
+from gemelo.tools.bench import old_dialects
 
 
 def test_no_step_remains_of_random_messages(monkeypatch) -> None:

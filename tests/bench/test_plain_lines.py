@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gemelo.services.bench.planner.tool_motion import STEP, PlainLines, line_requests
-from gemelo.services.bench.scenes import parol6, rm1
 from gemelo.services.planner.core import Planner
+from gemelo.tools.bench.planner.tool_motion import STEP, PlainLines, line_requests
+from gemelo.tools.bench.scenes import parol6, rm1
 
 
 @pytest.mark.parametrize("arm", [rm1(), parol6()], ids=lambda arm: arm.name)

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from gemelo.schemas.planning import PlanCode, Refusal
-from gemelo.services.bench.figures import NotMeasured
-from gemelo.services.bench.planner import path_quality, planning
-from gemelo.services.bench.planner.path_quality import joints_time, least_time
-from gemelo.services.bench.planner.planning import runs_without_core
-from gemelo.services.bench.planner.trials import PHASES, Trial, trials
-from gemelo.services.bench.scenes import parol6
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.timing.profile import joint_limits
+from gemelo.tools.bench.figures import NotMeasured
+from gemelo.tools.bench.planner import path_quality, planning
+from gemelo.tools.bench.planner.path_quality import joints_time, least_time
+from gemelo.tools.bench.planner.planning import runs_without_core
+from gemelo.tools.bench.planner.trials import PHASES, Trial, trials
+from gemelo.tools.bench.scenes import parol6
 
 LIMITS = joint_limits(parol6())
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
-from gemelo.services.bench.figures import NotMeasured
-from gemelo.services.bench.planner import references
-from gemelo.services.bench.planner.references import CoalChecker, PlainOmpl, Roboplan
-from gemelo.services.bench.problems.problem_sets import problem_set
-from gemelo.services.bench.scenes import SCENES, parol6, random_configurations, rm1
 from gemelo.services.planner.collision.world import World
+from gemelo.tools.bench.figures import NotMeasured
+from gemelo.tools.bench.planner import references
+from gemelo.tools.bench.planner.references import CoalChecker, PlainOmpl, Roboplan
+from gemelo.tools.bench.problems.problem_sets import problem_set
+from gemelo.tools.bench.scenes import SCENES, parol6, random_configurations, rm1
 
 ARMS = {arm.name: arm for arm in (rm1(), parol6())}
 

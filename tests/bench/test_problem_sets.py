@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
-from gemelo.services.bench.problems.problem_sets import (
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision.world import World
+from gemelo.tools.bench.problems.problem_sets import (
     COUNT,
     FILE,
     PlanningProblem,
@@ -18,9 +20,7 @@ from gemelo.services.bench.problems.problem_sets import (
     request_of,
     text_of,
 )
-from gemelo.services.bench.scenes import SCENES, parol6, rm1
-from gemelo.services.planner.collision.clearance import CLEARANCE
-from gemelo.services.planner.collision.world import World
+from gemelo.tools.bench.scenes import SCENES, parol6, rm1
 
 ARMS = {arm.name: arm for arm in (rm1(), parol6())}
 KINEMATICS = {name: Kinematics(arm) for name, arm in ARMS.items()}

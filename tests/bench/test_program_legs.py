@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo.schemas.device import DeviceState
-from gemelo.services.bench.figures import NotMeasured
-from gemelo.services.bench.program_legs import standing_between
+from gemelo.tools.bench.figures import NotMeasured
+from gemelo.tools.bench.program_legs import standing_between
 
 PERIOD = 0.02  # [s] between two states
 

@@ -3,9 +3,9 @@
 import pytest
 
 from gemelo.firmware.bindings.frames import PinChange
-from gemelo.services.bench import pulses
-from gemelo.services.bench.figures import NotMeasured
-from gemelo.services.bench.probe import Pulse, WireKnot, pulses_of
+from gemelo.tools.bench import pulses
+from gemelo.tools.bench.figures import NotMeasured
+from gemelo.tools.bench.probe import Pulse, WireKnot, pulses_of
 
 
 def test_pulses_are_counted_by_dir():

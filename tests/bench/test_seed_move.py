@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from gemelo.firmware.platform.host.sketch import AustinStepper
-from gemelo.services.bench.old_dialects import RelativeMove, pulses, relative_moves, seed_move_percent
+from gemelo.tools.bench.old_dialects import RelativeMove, pulses, relative_moves, seed_move_percent
 
 
 def end_of(stepper: AustinStepper, messages: list[RelativeMove], until: float = 30.0) -> int:

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from gemelo.services.bench import stops
+from gemelo.tools.bench import stops
 
 
 class LateClock:

@@ -20,7 +20,7 @@ from gemelo.libraries.vision.rigid import from_transform, step, to_transform
 from gemelo.libraries.vision.tags import GreyImage
 from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import TagRecord
-from gemelo.services.bench.vision.mount_images import (
+from gemelo.tools.bench.vision.mount_images import (
     OFF,
     Setup,
     Sight,
@@ -30,7 +30,7 @@ from gemelo.services.bench.vision.mount_images import (
     standing,
     tag_on_level_tool,
 )
-from gemelo.services.bench.vision.mounting import tool_error
+from gemelo.tools.bench.vision.mounting import tool_error
 from gemelo.tools.cli import camera_poses
 from gemelo.tools.cli.errors import ExitCode
 from gemelo.tools.cli.main import run

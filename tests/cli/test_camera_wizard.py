@@ -28,10 +28,10 @@ from gemelo.libraries.vision.rigid import apply, from_transform, inverse, rigid,
 from gemelo.libraries.vision.tags import GreyImage
 from gemelo.schemas.cell import VirtualSource
 from gemelo.schemas.joints import JointState
-from gemelo.services.bench.vision import images
-from gemelo.services.bench.vision.images import Surface, render
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
 from gemelo.services.camera.virtual.world import CameraWorld
+from gemelo.tools.bench.vision import images
+from gemelo.tools.bench.vision.images import Surface, render
 from gemelo.tools.cli import camera_mount
 from gemelo.tools.cli.camera_boards import CHESS_BOARD, TAG_BOARD, tag_board
 from gemelo.tools.cli.camera_calibrate import take

@@ -31,8 +31,8 @@ from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.planning import FkRequest, FkResponse, PlanCode
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS, DEVICE_STOP, FK, JOINT_STATES, SCENE, STEP_ERRORS
-from gemelo.services.bench.bare_browser import BareBrowser, Said, bare_browser
 from gemelo.services.panel.main import TEXTS, Panel
+from gemelo.tools.bench.bare_browser import BareBrowser, Said, bare_browser
 from tests.runtime.support import free_port, spinning, until
 
 ROOT = Path(__file__).parents[2]

@@ -11,12 +11,12 @@ import gemelo
 from gemelo.libraries.runtime.deployment import load_deployment
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.joints import JointState
-from gemelo.services.bench.bare_browser import BareBrowser, Said, bare_browser
 from gemelo.services.panel.main import Panel
 from gemelo.services.panel.view.browser import STOP_SIGN
 from gemelo.services.panel.view.page import Page
 from gemelo.services.panel.view.world import DrawnWorld
 from gemelo.services.panel.words.en import ENGLISH
+from gemelo.tools.bench.bare_browser import BareBrowser, Said, bare_browser
 from tests.panel.person import until
 
 HELD_RATE = 20.0  # [Hz]

@@ -11,8 +11,8 @@ import pytest
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
-from gemelo.services.bench.bare_browser import CAMERA, PROTOCOL, Said, messages_in
 from gemelo.services.panel.view.own_pace import UNREAD
+from gemelo.tools.bench.bare_browser import CAMERA, PROTOCOL, Said, messages_in
 from tests.panel.memory_page import MemoryPage, memory_page
 from tests.runtime.support import until
 

@@ -7,8 +7,8 @@ from math import degrees
 import pytest
 
 import gemelo
-from gemelo.services.bench.bare_browser import bare_browser
 from gemelo.services.stack.stack import Stack
+from gemelo.tools.bench.bare_browser import bare_browser
 from tests.panel.person import until
 from tests.simulated import make_ready
 

@@ -12,7 +12,6 @@ from ruckig import InputParameter, Result, Ruckig, Trajectory
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import load_arm
-from gemelo.services.bench.scenes import SCENES
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.path.curve import smooth_runs
 from gemelo.services.planner.path.smoothing import smooth, stopping
@@ -22,6 +21,7 @@ from gemelo.services.planner.timing.profile import joint_limits, trajectory_of
 from gemelo.services.planner.timing.time_optimal import time_optimal_path
 from gemelo.services.planner.timing.timing import timed_path, timed_path_in_python
 from gemelo.services.planner.verification.verify import limit_shares, require_ends, sample
+from gemelo.tools.bench.scenes import SCENES
 from tests.profiles import examples
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")

@@ -10,9 +10,9 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from gemelo.services.bench.any_arm.generated_arms import generated_arm
 from gemelo.services.planner.collision_geometry.link_shapes import hull_mesh
 from gemelo.services.planner.collision_geometry.solids import polytope_around
+from gemelo.tools.bench.any_arm.generated_arms import generated_arm
 
 STEPS = np.linspace(-0.05, 0.05, 6)
 LATTICE = np.stack(np.meshgrid(STEPS, STEPS, STEPS), axis=-1).reshape(-1, 3)

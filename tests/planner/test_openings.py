@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from gemelo.services.bench.fit_quality import heavy_part
 from gemelo.services.collision_fitting import mesh_fit
 from gemelo.services.collision_fitting.excess import SHARE, depth_in, excess_of
 from gemelo.services.collision_fitting.mesh_surface import MeshSurface
@@ -18,6 +17,7 @@ from gemelo.services.collision_fitting.openings import closed
 from gemelo.services.collision_fitting.parts import shapes_around
 from gemelo.services.planner.collision_geometry.coal_shapes import is_inside
 from gemelo.services.planner.collision_geometry.shapes import TriangleMesh
+from gemelo.tools.bench.fit_quality import heavy_part
 
 WITHIN = 0.005
 

@@ -18,8 +18,6 @@ from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, Timing
 from gemelo.schemas.scene import MeshShape, PlanningScene, SceneObject
-from gemelo.services.bench.problems.problem_sets import path_length
-from gemelo.services.bench.scenes import SCENES, box
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.native_scene import native_scene
 from gemelo.services.planner.collision.world import World
@@ -32,6 +30,8 @@ from gemelo.services.planner.request.deadline import Deadline, Stopwatch
 from gemelo.services.planner.timing.profile import joint_limits
 from gemelo.services.planner.timing.toppra_speeds import load_toppra
 from gemelo.services.planner.verification.verify import limit_shares, require_ends, sample
+from gemelo.tools.bench.problems.problem_sets import path_length
+from gemelo.tools.bench.scenes import SCENES, box
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.scenes import star_mesh, stl_of
 from tests.profiles import count

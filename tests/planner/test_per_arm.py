@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from gemelo.services.bench.scenes import parol6, rm1
 from gemelo.services.planner.request.per_arm import once_per_arm
+from gemelo.tools.bench.scenes import parol6, rm1
 
 
 def test_the_result_is_kept_until_another_arm_is_asked_about():

@@ -15,11 +15,11 @@ from gemelo.libraries.arm.kinematics.self_collisions import driver_of, shape_rea
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import AllowedPair, MeshShape, PlanningScene, SceneObject
-from gemelo.services.bench.planner.scene_intake import drawn_scene
 from gemelo.services.planner.collision import arm_geometry
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.collision_geometry.coal_shapes import geometry_of
 from gemelo.services.planner.collision_geometry.shapes import SIZES, CollisionShape, ShapeKind
+from gemelo.tools.bench.planner.scene_intake import drawn_scene
 from tests.planner.test_world import configurations, stl_box
 
 SEVEN = Path(__file__).parent / "arms" / "seven"

@@ -22,7 +22,7 @@ from gemelo.libraries.runtime.deployment import load_deployment
 from gemelo.libraries.runtime.permissions import permissions
 from gemelo.schemas.roles import role
 from gemelo.schemas.topics import FK, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, JOINT_TARGETS, LOG, PLAN, TOPICS
-from gemelo.services.bench.traffic import GOAL
+from gemelo.tools.bench.traffic import GOAL
 
 RATE = 10_000  # [1/s]
 BURST = 0.005  # [s]

@@ -16,9 +16,9 @@ from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.vision.boards import TagBoard
 from gemelo.libraries.vision.calibration.reprojection import Carrier
 from gemelo.libraries.vision.rigid import from_transform
-from gemelo.services.bench.vision.mount_images import FIRST
-from gemelo.services.bench.vision.mounting import tool_error
 from gemelo.services.stack.stack import Stack
+from gemelo.tools.bench.vision.mount_images import FIRST
+from gemelo.tools.bench.vision.mounting import tool_error
 from gemelo.tools.cli.errors import ExitCode
 from tests.stack.gemelo import gemelo
 

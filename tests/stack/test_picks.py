@@ -13,7 +13,7 @@ import pytest
 import gemelo
 from gemelo.programs import Go, Pick, Program, ProgramRun, RunStatus, check_program
 from gemelo.schemas.topics import camera_truth
-from gemelo.services.bench.vision.picks import FLOOR, picks
+from gemelo.tools.bench.vision.picks import FLOOR, picks
 from gemelo.tools.cli.errors import ExitCode
 from tests.stack import gemelo as command
 

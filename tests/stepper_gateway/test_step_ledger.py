@@ -14,7 +14,6 @@ from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode
 from gemelo.schemas.ledger import StepLedger, VerifiedBy
 from gemelo.schemas.topics import STEP_LEDGER
-from gemelo.services.bench.stopping import smooth_move
 from gemelo.services.stepper_gateway.ledger.confidence import REBOOT
 from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile, read_ledger, write_ledger
 from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
@@ -22,6 +21,7 @@ from gemelo.services.stepper_gateway.ledger.step_ledger import KEEP_EVERY, KEEP_
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.virtual_arm.sketch_arm import SketchArm
 from gemelo.services.virtual_arm.virtual_arm import BOOTED, VirtualArm, rm1
+from gemelo.tools.bench.stopping import smooth_move
 from tests.runtime.support import until
 from tests.stepper_gateway.harness import ROOT, move
 from tests.stepper_gateway.test_ra_sketch import HOME as AT_HOME

@@ -10,7 +10,7 @@ import numpy as np
 from gemelo.libraries.vision.camera_model import CameraModel, of_field_of_view
 from gemelo.libraries.vision.rigid import Array, apply
 from gemelo.libraries.vision.tag_pose import flat, square
-from gemelo.services.bench.vision.images import Conditions, Image, looking_down, render, tag_surface
+from gemelo.tools.bench.vision.images import Conditions, Image, looking_down, render, tag_surface
 
 MODEL = of_field_of_view(np.radians(60.0), 640, 480)
 BARREL = CameraModel(MODEL.matrix, np.array([-0.28, 0.09, 0.001, -0.0008, 0.0]), 640, 480)

@@ -9,7 +9,7 @@ import pytest
 from gemelo.libraries.vision.boxes import colour_strength, coloured_regions, fit_box, region_centre
 from gemelo.libraries.vision.rigid import Array, rigid
 from gemelo.libraries.vision.tag_pose import flat
-from gemelo.services.bench.vision.images import Conditions, Image, Surface, box_surfaces, looking_down, render
+from gemelo.tools.bench.vision.images import Conditions, Image, Surface, box_surfaces, looking_down, render
 from tests.vision.tag_views import MODEL
 
 RED = np.array([200.0, 40.0, 35.0])

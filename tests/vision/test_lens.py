@@ -8,7 +8,7 @@ import pytest
 from gemelo.libraries.vision.boards import ChessBoard, Sighting, picture
 from gemelo.libraries.vision.calibration.lens import fit_lens, tilts
 from gemelo.libraries.vision.rigid import Array, apply, rigid, turn
-from gemelo.services.bench.vision.images import Surface, render
+from gemelo.tools.bench.vision.images import Surface, render
 from tests.vision.tag_views import BARREL
 
 BOARD = ChessBoard()

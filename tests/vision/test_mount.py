@@ -16,7 +16,7 @@ from gemelo.libraries.vision.calibration.reprojection import Carrier
 from gemelo.libraries.vision.calibration.touches import fit_touches, spread_points
 from gemelo.libraries.vision.camera_model import of_field_of_view
 from gemelo.libraries.vision.rigid import apply, inverse, rigid
-from gemelo.services.bench.vision.mounting import (
+from gemelo.tools.bench.vision.mounting import (
     MountingTrial,
     closed_form,
     level_trial,

@@ -21,7 +21,7 @@ from gemelo.libraries.vision.calibration.shots import one_of, without_hidden
 from gemelo.libraries.vision.camera_model import of_field_of_view
 from gemelo.libraries.vision.rigid import Array, from_transform, inverse, rigid, turn
 from gemelo.libraries.vision.tag_pose import square
-from gemelo.services.bench.vision.mount_images import (
+from gemelo.tools.bench.vision.mount_images import (
     Setup,
     Sight,
     Taken,
@@ -32,7 +32,7 @@ from gemelo.services.bench.vision.mount_images import (
     tag_on_level_tool,
     take,
 )
-from gemelo.services.bench.vision.mounting import looking, tool_error
+from gemelo.tools.bench.vision.mounting import looking, tool_error
 
 MODEL = of_field_of_view(np.radians(66.0), 640, 480)
 WAYS = {

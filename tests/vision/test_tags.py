@@ -8,8 +8,8 @@ import pytest
 from gemelo.libraries.vision.rigid import angle_between, rigid
 from gemelo.libraries.vision.tag_pose import flat, plane_pose, tag_pose
 from gemelo.libraries.vision.tags import doubled, find_tags
-from gemelo.services.bench.vision.images import Conditions, Surface, looking_down, render, tag_surface
-from gemelo.services.bench.vision.naive import opencv_corners, opencv_pose
+from gemelo.tools.bench.vision.images import Conditions, Surface, looking_down, render, tag_surface
+from gemelo.tools.bench.vision.naive import opencv_corners, opencv_pose
 from tests.vision.tag_views import BARREL, MODEL, SIZE, off_by, outward, views
 
 COUNT = 30

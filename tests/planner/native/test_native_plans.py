@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
-from gemelo.services.bench.scenes import SCENES
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.sphere_check import NativeCheck
 from gemelo.services.planner.collision.world import World
@@ -18,6 +17,7 @@ from gemelo.services.planner.collision_geometry.shapes import CollisionShape, Sh
 from gemelo.services.planner.native.binding import CancelFlag
 from gemelo.services.planner.native.native_planner import NativePlanner
 from gemelo.services.planner.native.paths import FailureReason, FreePath, NoPath
+from gemelo.tools.bench.scenes import SCENES
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.conftest import load
 

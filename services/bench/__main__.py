@@ -1,5 +1,0 @@
-"""`python -m gemelo.services.bench`."""
-
-from gemelo.services.bench.main import main
-
-main()
