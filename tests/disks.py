@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from gemelo.services.chaos.small_disk import SmallDisk
+from gemelo.tools.chaos.small_disk import SmallDisk
 from tests.optional import need_mounts
 
 WAYS = ("full", "read-only", "replaced by a file")

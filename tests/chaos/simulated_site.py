@@ -10,8 +10,8 @@ from gemelo.libraries.runtime.requests.exchanges import exchange_topic
 from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.device import DeviceState
 from gemelo.schemas.topics import DEVICE_STATE, FOLLOW_JOINT_TRAJECTORY
-from gemelo.services.chaos.site import ChaosSite
-from gemelo.services.chaos.slots import SlotFile
+from gemelo.tools.chaos.site import ChaosSite
+from gemelo.tools.chaos.slots import SlotFile
 
 
 class SeenSteps:

@@ -3,8 +3,8 @@
 import pytest
 
 from gemelo.services.broker import mosquitto
-from gemelo.services.chaos.site import installed_broker
-from gemelo.services.chaos.soak import ProcessSample, progress
+from gemelo.tools.chaos.site import installed_broker
+from gemelo.tools.chaos.soak import ProcessSample, progress
 
 
 @pytest.mark.parametrize(("is_installed", "broker"), [(True, "mosquitto"), (False, "embedded")])

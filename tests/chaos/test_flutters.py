@@ -8,7 +8,7 @@ from random import Random
 import pytest
 
 import gemelo
-from gemelo.services.chaos.flutters import LONG, fluttering_holds, fluttering_stops, goal_and_stop, long_goal, unended
+from gemelo.tools.chaos.flutters import LONG, fluttering_holds, fluttering_stops, goal_and_stop, long_goal, unended
 from tests.chaos.simulated_site import SimulatedSite
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceState
-from gemelo.services.chaos.invariants import jerks, jumps, misses, missing_records, moved, segments
+from gemelo.tools.chaos.invariants import jerks, jumps, misses, missing_records, moved, segments
 
 SLOT = 20_000  # [us] between two states
 BASE = 7  # boot id

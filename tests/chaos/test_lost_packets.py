@@ -7,7 +7,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.chaos.lost_packets import PacketLoss
+from gemelo.tools.chaos.lost_packets import PacketLoss
 
 PACKETS = st.lists(
     st.tuples(st.sampled_from((0x10, 0x30, 0x31, 0x32, 0x34, 0x40, 0xC0)), st.binary(max_size=300)), max_size=20

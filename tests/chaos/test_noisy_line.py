@@ -11,7 +11,7 @@ from random import Random
 
 import pytest
 
-from gemelo.services.chaos.noisy_line import NoisyLine, spoiled
+from gemelo.tools.chaos.noisy_line import NoisyLine, spoiled
 from tests.runtime.support import until
 
 FRAME = bytes(range(200))

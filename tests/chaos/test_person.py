@@ -7,7 +7,7 @@ import pytest
 
 from gemelo import DeviceMode
 from gemelo.schemas.device import DeviceConfiguration
-from gemelo.services.chaos.person import Person
+from gemelo.tools.chaos.person import Person
 
 SILENT = 'device "rm1" is silent for more than 0.5 s: check its power and network'
 

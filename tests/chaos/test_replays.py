@@ -9,14 +9,14 @@ import pytest
 
 import gemelo
 from gemelo.schemas.actions import GoalRequest
-from gemelo.services.chaos.replays import (
+from gemelo.tools.chaos.replays import (
     by_the_same_client,
     disturbed,
     replayed_after_a_stop,
     replayed_during_another_move,
     replayed_later,
 )
-from gemelo.services.chaos.site import ChaosSite
+from gemelo.tools.chaos.site import ChaosSite
 from tests.chaos.simulated_site import SimulatedSite
 
 
@@ -38,7 +38,7 @@ def by_none_other(site: ChaosSite, request: GoalRequest) -> str:
 @pytest.fixture
 def with_one_client(monkeypatch: pytest.MonkeyPatch) -> None:
     """A simulated site has no stranger on the bus."""
-    monkeypatch.setattr("gemelo.services.chaos.replays.by_another_client", by_the_same_client)
+    monkeypatch.setattr("gemelo.tools.chaos.replays.by_another_client", by_the_same_client)
 
 
 def test_a_goal_that_is_sent_again_after_its_end_moves_nothing(site: SimulatedSite) -> None:

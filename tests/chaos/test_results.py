@@ -11,8 +11,8 @@ from gemelo.services.stack.stack import StackError
 
 BEGUN = 60.0  # [s] in which a run that does not refuse its folder would have emptied it
 COMMANDS = (
-    ("gemelo.services.chaos", "--broker", "embedded", "--minutes", "0.1"),
-    ("gemelo.services.chaos.soak", "--broker", "embedded", "--hours", "0.001"),
+    ("gemelo.tools.chaos", "--broker", "embedded", "--minutes", "0.1"),
+    ("gemelo.tools.chaos.soak", "--broker", "embedded", "--hours", "0.001"),
     ("gemelo.services.demo", "--broker", "embedded", "--no-picture"),
 )
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from gemelo.firmware.platform.host.slot_record import STOOD, row
 from gemelo.libraries.arm.device.device_config import device_config
-from gemelo.services.chaos import slots
+from gemelo.tools.chaos import slots
 
 
 def written(config, counts: list[int], boots: list[int] | None = None) -> np.ndarray:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.chaos.soak import (
+from gemelo.tools.chaos.soak import (
     EVERY,
     FEW,
     FEWEST,

@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from gemelo.services.chaos import clocks
-from gemelo.services.chaos.clocks import ClockError, SteppingClocks
+from gemelo.tools.chaos import clocks
+from gemelo.tools.chaos.clocks import ClockError, SteppingClocks
 
 TELLS = """
 import sys, time

@@ -10,7 +10,7 @@ import zenoh
 from gemelo.libraries.runtime.bus.branches import read_under
 from gemelo.libraries.runtime.bus.zenoh_config import client_config
 from gemelo.schemas.topics import TOPICS
-from gemelo.services.chaos.strangers import BusStranger
+from gemelo.tools.chaos.strangers import BusStranger
 from tests.runtime.support import RouterProcess, until
 
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from gemelo.services.chaos import twins
-from gemelo.services.chaos.twins import TwinClient, TwinProcess
+from gemelo.tools.chaos import twins
+from gemelo.tools.chaos.twins import TwinClient, TwinProcess
 from tests.broker.running import Client, RunningBroker
 
 GIVES_WAY = "print('another node is alive')"

@@ -19,7 +19,7 @@ from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.libraries.runtime.deployment import when_silent
 from gemelo.schemas.device import DeviceState, DeviceStatus
 from gemelo.schemas.system import NodeInfo
-from gemelo.services.chaos.descriptors import give_descriptors, take_descriptors
+from gemelo.tools.chaos.descriptors import give_descriptors, take_descriptors
 from gemelo.tools.cli import doctor
 from gemelo.tools.cli.errors import ExitCode
 from gemelo.tools.cli.main import run

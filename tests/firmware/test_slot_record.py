@@ -5,7 +5,7 @@ from __future__ import annotations
 from bench_firmware import Bench, heartbeat, rm1_config
 
 from gemelo.firmware.platform.host.slot_record import SLOT, STOOD, SlotRecord
-from gemelo.services.chaos.slots import SlotFile, steps_in, violations
+from gemelo.tools.chaos.slots import SlotFile, steps_in, violations
 
 GOAL = (900, -40, 25)
 END = 2_500_000  # [us] when it rests

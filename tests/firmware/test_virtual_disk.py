@@ -14,7 +14,7 @@ from gemelo.firmware.platform.host.memory import PositionStore, StoredPosition
 from gemelo.libraries.runtime.process import unwritten as attempts
 from gemelo.libraries.runtime.process.readiness import says_ready
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
-from gemelo.services.chaos.descriptors import give_descriptors, take_descriptors
+from gemelo.tools.chaos.descriptors import give_descriptors, take_descriptors
 from tests.disks import WAYS, Disk, refusing_disk
 
 REFERENCE = (0, 0, 0)

@@ -12,8 +12,8 @@ import pytest
 from paho.mqtt.enums import CallbackAPIVersion
 
 from gemelo.schemas.device_topics import topic
-from gemelo.services.chaos.slow_link import client_id_in
 from gemelo.services.stepper_gateway.links.frames import Sync, encode
+from gemelo.tools.chaos.slow_link import client_id_in
 from tests.mqtt.packet_proxy import PacketProxy
 from tests.stepper_gateway.processes import DEVICE, Processes
 

@@ -12,7 +12,7 @@ from gemelo.schemas.device import GatewayInputs
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import GATEWAY, GATEWAY_INPUTS, JOINT_STATES, LOG
-from gemelo.services.chaos.slow_link import SlowLink
+from gemelo.tools.chaos.slow_link import SlowLink
 from tests.runtime.support import RouterProcess, free_port, hear, until
 
 MINUTE = range(2, 122)  # two batches of what the gateway was given a second

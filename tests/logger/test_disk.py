@@ -11,10 +11,10 @@ from gemelo.schemas.frames import RobotDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import COMMAND_ACKS, COMMANDS, DESCRIPTION, JOINT_STATES, LOG
-from gemelo.services.chaos.small_disk import BALLAST, SIZE
 from gemelo.services.logger.core import Logger
 from gemelo.services.logger.disk import RETRY, SHARE, LoggerParameters, RecordingWriter
 from gemelo.services.logger.files import is_due, stem_of, surplus
+from gemelo.tools.chaos.small_disk import BALLAST, SIZE
 from tests.disks import refusing_disk
 
 START = 1_795_000_000_000_000_000

@@ -11,10 +11,10 @@ from playwright.sync_api import Browser
 from playwright.sync_api import Page as Window
 
 from gemelo.schemas.device import StopKind
-from gemelo.services.chaos.slow_link import SlowLink
 from gemelo.services.panel.view.browser import STILL_MEANT, STOP_SIGN, Stops
 from gemelo.services.panel.view.browser import Browser as Told
 from gemelo.services.panel.view.page import Page
+from gemelo.tools.chaos.slow_link import SlowLink
 from tests.panel.memory_page import MemoryPage, memory_page
 from tests.panel.person import OPENING, until
 from tests.runtime.support import free_port

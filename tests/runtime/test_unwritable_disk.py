@@ -24,7 +24,7 @@ from gemelo.libraries.runtime.process.readiness import Readiness, is_fresh, says
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.deployment import MqttSection, RouterSection
 from gemelo.services.broker.replacement import OwnClient
-from gemelo.services.chaos.descriptors import give_descriptors, take_descriptors
+from gemelo.tools.chaos.descriptors import give_descriptors, take_descriptors
 from tests.descriptors import few_descriptors
 from tests.disks import WAYS, Disk, refusing_disk
 from tests.optional import need

@@ -19,7 +19,7 @@ SEED = 1
 
 def reported(tmp_path, pytestconfig, *options, minutes, ends):
     """The report of a run of chaos that exits with 0 within `ends` [s]."""
-    command = [sys.executable, "-m", "gemelo.services.chaos", *options, "--seed", str(SEED), "--minutes", str(minutes)]
+    command = [sys.executable, "-m", "gemelo.tools.chaos", *options, "--seed", str(SEED), "--minutes", str(minutes)]
     done = subprocess.run(
         [*command, "--out", str(tmp_path / "out")],
         cwd=pytestconfig.rootpath, capture_output=True, text=True, timeout=ends,
@@ -54,7 +54,7 @@ def test_the_clocks_of_the_host_and_of_single_processes_step_in_the_middle_of_mo
 @pytest.mark.parametrize(
     "command",
     [
-        ("gemelo.services.chaos.soak", "--broker", "embedded", "--out"),
+        ("gemelo.tools.chaos.soak", "--broker", "embedded", "--out"),
         ("gemelo.tools.bench", "--only", "move_accept_to_first_step_ms", "--out"),
         ("gemelo.services.demo", "--broker", "embedded", "--no-picture", "--out"),
     ],

@@ -15,9 +15,9 @@ from gemelo.schemas.device import DeviceStopRequest
 from gemelo.schemas.message import encode
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.topics import DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY
-from gemelo.services.chaos.invariants import is_starved
-from gemelo.services.chaos.person import random_goal
-from gemelo.services.chaos.site import ChaosSite
+from gemelo.tools.chaos.invariants import is_starved
+from gemelo.tools.chaos.person import random_goal
+from gemelo.tools.chaos.site import ChaosSite
 
 HOLDS, STOPS, BREATHS = (8, 30), (4, 8), (2, 5)  # how many, from and to
 TURN, RUN, BREATH = 0.06, 0.4, 0.03  # [s] at most: between hold and resume; of a move; between a goal and its stop

@@ -8,8 +8,8 @@ from enum import Enum
 from random import Random
 from typing import NamedTuple
 
-from gemelo.services.chaos.lost_packets import PacketLoss
-from gemelo.services.chaos.proxy import ProxyThread
+from gemelo.tools.chaos.lost_packets import PacketLoss
+from gemelo.tools.chaos.proxy import ProxyThread
 
 PIECE = 16 * 1024  # [B] that are read at once
 LOOK_EVERY = 0.01  # [s] while the link stalls

@@ -6,8 +6,8 @@ import signal
 from dataclasses import dataclass
 
 from gemelo.schemas.deployment import Wire
-from gemelo.services.chaos.flutters import fluttering_holds, fluttering_stops, goal_and_stop
-from gemelo.services.chaos.injections import (
+from gemelo.tools.chaos.flutters import fluttering_holds, fluttering_stops, goal_and_stop
+from gemelo.tools.chaos.injections import (
     Begin,
     Heal,
     changed_frames,
@@ -56,7 +56,7 @@ from gemelo.services.chaos.injections import (
     without_descriptors,
     worker_killed,
 )
-from gemelo.services.chaos.replays import (
+from gemelo.tools.chaos.replays import (
     by_another_client,
     by_the_same_client,
     replayed_after_a_restart,

@@ -10,7 +10,7 @@ from statistics import median
 
 import msgspec
 
-from gemelo.services.chaos.campaign import Episode
+from gemelo.tools.chaos.campaign import Episode
 
 WIDTH, ROW = 720, 18  # [px] of the drawing, and of one fault's line
 LONGEST = 25.0  # [s] at its right end

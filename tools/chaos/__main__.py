@@ -1,0 +1,5 @@
+"""`python -m gemelo.tools.chaos`."""
+
+from gemelo.tools.chaos.main import main
+
+main()
