@@ -77,7 +77,7 @@ docs: setup ## docs/api.md from the docstrings of gemelo
 	@$(bin)/python docs/make_api.py
 
 demo: setup ## a sine and a tour, without a display: out/demo.json, recording, picture
-	@$(bin)/python -m gemelo.services.demo
+	@$(bin)/python -m gemelo.tools.demo
 
 coverage: setup ## lines of the firmware core that its tests reach, and why not the others
 	@deploy/coverage

@@ -13,7 +13,7 @@ BEGUN = 60.0  # [s] in which a run that does not refuse its folder would have em
 COMMANDS = (
     ("gemelo.tools.chaos", "--broker", "embedded", "--minutes", "0.1"),
     ("gemelo.tools.chaos.soak", "--broker", "embedded", "--hours", "0.001"),
-    ("gemelo.services.demo", "--broker", "embedded", "--no-picture"),
+    ("gemelo.tools.demo", "--broker", "embedded", "--no-picture"),
 )
 
 

@@ -5,8 +5,8 @@ import pytest
 
 from gemelo.schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState
 from gemelo.schemas.joints import StepErrors
-from gemelo.services.demo.ledger import StepTotals, nearest_step
-from gemelo.services.demo.report import FOLLOWING_LIMIT, DemoReport, Move, complaints, report_of, text_of
+from gemelo.tools.demo.ledger import StepTotals, nearest_step
+from gemelo.tools.demo.report import FOLLOWING_LIMIT, DemoReport, Move, complaints, report_of, text_of
 
 NAMES = ("brazo_joint", "efector_joint")
 

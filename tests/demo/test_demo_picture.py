@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import rerun
 
-from gemelo.services.demo import main
 from gemelo.services.visualizer.program import screenshot
+from gemelo.tools.demo import main
 from tests.optional import lack
 
 LACK = "Vulkan missing: sudo apt-get install mesa-vulkan-drivers"

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo.libraries.arm.model.description import load_arm
-from gemelo.services.demo.script import SINE_PERIOD, sine_of, tour
+from gemelo.tools.demo.script import SINE_PERIOD, sine_of, tour
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 

@@ -29,7 +29,7 @@ KEPT = {
     "gemelo.libraries.runtime.process.freed_memory": "the C library's heap, apart from the main of services",
     "gemelo.services.stepper_gateway.ledger.reasons": "the sentences, apart from the arithmetic",
 }
-LOOKERS = ("tests/", "tools/bench/", "tools/chaos/", "services/demo/", "docs/", "examples/")
+LOOKERS = ("tests/", "tools/bench/", "tools/chaos/", "tools/demo/", "docs/", "examples/")
 CLAUSES = {"What", "Where", "How", "Whether", "Who", "When", "Which", "Why", "Whatever", "True", "From", "By", "For"}
 
 

@@ -56,7 +56,7 @@ def test_the_clocks_of_the_host_and_of_single_processes_step_in_the_middle_of_mo
     [
         ("gemelo.tools.chaos.soak", "--broker", "embedded", "--out"),
         ("gemelo.tools.bench", "--only", "move_accept_to_first_step_ms", "--out"),
-        ("gemelo.services.demo", "--broker", "embedded", "--no-picture", "--out"),
+        ("gemelo.tools.demo", "--broker", "embedded", "--no-picture", "--out"),
     ],
     ids=lambda command: command[0],
 )

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import msgspec
 
-from gemelo.services.demo.ledger import StepTotals
 from gemelo.tools.cli.text_table import table
+from gemelo.tools.demo.ledger import StepTotals
 
 # Half a step is what rounding to whole steps alone makes; the path itself is known to 1/256 step.
 FOLLOWING_LIMIT = 0.5 + 1.0 / 256.0  # [steps]

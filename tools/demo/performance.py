@@ -8,9 +8,9 @@ from collections.abc import Callable
 import gemelo
 from gemelo import topics
 from gemelo.schemas.device import DeviceMode, DeviceState
-from gemelo.services.demo.ledger import StepTotals
-from gemelo.services.demo.report import Move
-from gemelo.services.demo.script import SINE_RATE, SINE_TIME, Sine, TourMove, sine_of, tour
+from gemelo.tools.demo.ledger import StepTotals
+from gemelo.tools.demo.report import Move
+from gemelo.tools.demo.script import SINE_RATE, SINE_TIME, Sine, TourMove, sine_of, tour
 
 REST = 5.0  # [s] that the arm may take to come to rest after the stream
 SINE_REACHED = 0.9  # of both amplitudes, or the sine was not followed

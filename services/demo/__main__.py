@@ -1,5 +1,0 @@
-"""`python -m gemelo.services.demo`."""
-
-from gemelo.services.demo.main import main
-
-main()

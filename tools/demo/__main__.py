@@ -1,0 +1,5 @@
+"""`python -m gemelo.tools.demo`."""
+
+from gemelo.tools.demo.main import main
+
+main()
