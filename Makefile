@@ -86,7 +86,7 @@ bench: setup ## the figures: out/bench.json
 	@$(bin)/python -m gemelo.tools.bench
 
 recordings: setup ## the recordings that `make test` replays, made anew: tests/replay/recordings
-	@$(bin)/python -m gemelo.services.replay.make_recordings
+	@$(bin)/python -m gemelo.tools.replay.make_recordings
 
 lock: setup ## resolve pyproject.toml anew into requirements.lock
 	@deploy/lock

@@ -8,11 +8,11 @@ import pytest
 from mcap.writer import CompressionType, Writer
 
 from gemelo.libraries.recordings.reader import BadRecording
-from gemelo.services.replay.main import CANNOT
-from gemelo.services.replay.main import main as replay
-from gemelo.services.replay.recorded import Recorded
 from gemelo.tools.cli.errors import ExitCode
 from gemelo.tools.cli.main import run
+from gemelo.tools.replay.main import CANNOT
+from gemelo.tools.replay.main import main as replay
+from gemelo.tools.replay.recorded import Recorded
 from tests.runtime.support import free_port
 
 ROS2 = "is a recording of ROS 2 (CDR messages)"

@@ -14,8 +14,8 @@ from gemelo.libraries.recordings.table import recorded_topics
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.topics import DESCRIPTION
-from gemelo.services.replay.planner import PLANS, TOPICS
 from gemelo.services.state_publisher.main import describe
+from gemelo.tools.replay.planner import PLANS, TOPICS
 from tests.planner.planning_node import beside_a_planner
 
 PATIENCE = 60.0  # [s]

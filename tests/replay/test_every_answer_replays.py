@@ -27,10 +27,10 @@ from gemelo.schemas.planning import (
 from gemelo.schemas.scene import BoxShape, SceneAdd, SceneAttach, SceneMove, SceneObject, SceneRemove, SceneRequest
 from gemelo.schemas.topics import FK, IK, JOG, JOINT_STATES, JOINT_TARGETS, SCENE_EDIT, STATE_VALIDITY
 from gemelo.services.planner.jog.jog import SILENCE
-from gemelo.services.replay import planner_jog
-from gemelo.services.replay.main import Replayed, replay, text_of
-from gemelo.services.replay.planner_answers import UNKNOWN
-from gemelo.services.replay.planner_jog import EARLIER, PERIODS
+from gemelo.tools.replay import planner_jog
+from gemelo.tools.replay.main import Replayed, replay, text_of
+from gemelo.tools.replay.planner_answers import UNKNOWN
+from gemelo.tools.replay.planner_jog import EARLIER, PERIODS
 from tests.replay.recorded_bus import PATIENCE, Recorder
 
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

@@ -11,13 +11,13 @@ import pytest
 
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import GRIPPER_STATE
-from gemelo.services.replay.main import replay
-from gemelo.services.replay.recorded import NotReplayable
 from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.inputs import FrameInput, Given, give, packed, unpacked
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.outputs import GoalFinished, LogLine, Publish
 from gemelo.services.stepper_gateway.shell import Shell
+from gemelo.tools.replay.main import replay
+from gemelo.tools.replay.recorded import NotReplayable
 from tests.replay.conftest import RECORDINGS, Messages
 
 GATEWAY = "stepper_gateway"

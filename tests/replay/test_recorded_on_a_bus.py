@@ -12,8 +12,8 @@ from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest
 from gemelo.schemas.scene import SceneAdd, SceneClear, SceneObject, SceneRequest, SphereShape
 from gemelo.schemas.topics import GRIPPER_STATE, PLAN, SCENE_EDIT
-from gemelo.services.replay.main import replay, text_of
-from gemelo.services.replay.planner import PLANS, UNPLANNED
+from gemelo.tools.replay.main import replay, text_of
+from gemelo.tools.replay.planner import PLANS, UNPLANNED
 from tests.replay.recorded_bus import PATIENCE, Recorder
 
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

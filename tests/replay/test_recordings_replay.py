@@ -9,7 +9,7 @@ import sys
 import msgspec
 import pytest
 
-from gemelo.services.replay.main import SERVICES, Replayed, replay, text_of
+from gemelo.tools.replay.main import SERVICES, Replayed, replay, text_of
 from tests.replay.conftest import RECORDINGS
 
 LEAST = {  # messages that are compared, by topic
@@ -51,7 +51,7 @@ def test_it_does_not_depend_on_the_order_of_sets(service: str):
 
 
 def _in_a_process(service: str, seed: str) -> Replayed:
-    command = [sys.executable, "-m", "gemelo.services.replay", str(RECORDINGS / f"{service}.mcap"), service, "--json"]
+    command = [sys.executable, "-m", "gemelo.tools.replay", str(RECORDINGS / f"{service}.mcap"), service, "--json"]
     done = subprocess.run(command, env={**os.environ, "PYTHONHASHSEED": seed}, capture_output=True, timeout=300)
     assert done.returncode in (0, 1), done.stderr
     return msgspec.json.decode(done.stdout, type=Replayed)

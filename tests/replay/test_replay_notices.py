@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from gemelo.services.planner import core as planner_core
-from gemelo.services.replay.main import replay, text_of
 from gemelo.services.state_publisher import core as publisher_core
+from gemelo.tools.replay.main import replay, text_of
 from tests.replay.conftest import RECORDINGS, Messages
 
 

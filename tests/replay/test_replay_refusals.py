@@ -10,8 +10,8 @@ import pytest
 from mcap.records import Channel, Metadata, Schema
 
 from gemelo.libraries.recordings.reader import BadRecording
-from gemelo.services.replay.main import replay, text_of
-from gemelo.services.replay.recorded import NotReplayable
+from gemelo.tools.replay.main import replay, text_of
+from gemelo.tools.replay.recorded import NotReplayable
 from tests.replay.conftest import RECORDINGS, Messages
 
 

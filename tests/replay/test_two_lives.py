@@ -9,9 +9,6 @@ import pytest
 from gemelo.libraries.recordings.channels import Entry
 from gemelo.libraries.recordings.mcap_file import McapFile
 from gemelo.schemas.topics import DESCRIPTION, GATEWAY_INPUTS
-from gemelo.services.replay.main import replay, text_of
-from gemelo.services.replay.recorded import NotReplayable
-from gemelo.services.replay.stepper_gateway import EARLIER, OUTSIDE
 from gemelo.services.state_publisher.main import describe
 from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.input_log import InputLog
@@ -20,6 +17,9 @@ from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.outputs import Publish
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
 from gemelo.services.virtual_arm.virtual_arm import UNIX, rm1
+from gemelo.tools.replay.main import replay, text_of
+from gemelo.tools.replay.recorded import NotReplayable
+from gemelo.tools.replay.stepper_gateway import EARLIER, OUTSIDE
 from tests.replay.conftest import Messages
 
 PERIOD = 0.02  # [s]

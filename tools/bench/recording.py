@@ -16,11 +16,11 @@ from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.device import DeviceFault, DeviceMode, DeviceState
 from gemelo.schemas.topics import DEVICE_STATE
 from gemelo.services.logger.black_box import BlackBox, write_black_box
-from gemelo.services.replay.main import SERVICES, replay, text_of
-from gemelo.services.replay.make_recordings import FOLDER
 from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
 from gemelo.tools.bench.latency import swing
 from gemelo.tools.bench.stack import Running, Stacks, cpu_seconds, families
+from gemelo.tools.replay.main import SERVICES, replay, text_of
+from gemelo.tools.replay.make_recordings import FOLDER
 
 SETTLE = 3.0  # [s] of motion that are not counted
 WINDOW, WINDOWS = 5.0, 4  # [s]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import sys
 
-from gemelo.services.replay.options import add_options
 from gemelo.tools.cli.errors import ExitCode
 from gemelo.tools.cli.parser import Options
+from gemelo.tools.replay.options import add_options
 
 __all__ = ["add_options", "run"]
 
 
 def run(options: Options) -> ExitCode:
-    """Becomes `python -m gemelo.services.replay` with the same options."""
-    os.execv(sys.executable, [sys.executable, "-m", "gemelo.services.replay", *sys.argv[2:]])
+    """Becomes `python -m gemelo.tools.replay` with the same options."""
+    os.execv(sys.executable, [sys.executable, "-m", "gemelo.tools.replay", *sys.argv[2:]])

@@ -19,10 +19,10 @@ from gemelo.libraries.recordings.origin import PACKAGES, processor, version_of
 from gemelo.libraries.recordings.reader import BadRecording
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.topics import Topic
-from gemelo.services.replay import planner, state_publisher, stepper_gateway
-from gemelo.services.replay.comparison import Comparison, Difference
-from gemelo.services.replay.options import add_options
-from gemelo.services.replay.recorded import NotReplayable, Recorded
+from gemelo.tools.replay import planner, state_publisher, stepper_gateway
+from gemelo.tools.replay.comparison import Comparison, Difference
+from gemelo.tools.replay.options import add_options
+from gemelo.tools.replay.recorded import NotReplayable, Recorded
 
 CANNOT = 2  # the exit code of a recording that cannot be replayed
 

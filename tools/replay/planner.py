@@ -18,12 +18,12 @@ from gemelo.libraries.recordings.table import exchanges_of
 from gemelo.schemas.planning import PlanCode, PlanInputs, PlanningTimes, PlanRequest, PlanResponse, SceneVersion
 from gemelo.schemas.topics import JOG_INPUTS, PLAN, PLAN_INPUTS, PLANNED_PATH, SCENE
 from gemelo.services.planner.core import LONGEST, Planner
-from gemelo.services.replay import planner_answers, planner_jog
-from gemelo.services.replay.comparison import Comparison
-from gemelo.services.replay.planner_answers import AnswersAgain
-from gemelo.services.replay.planner_jog import JogAgain
-from gemelo.services.replay.recorded import Heard, NotReplayable, Recorded
-from gemelo.services.replay.scenes import Scenes
+from gemelo.tools.replay import planner_answers, planner_jog
+from gemelo.tools.replay.comparison import Comparison
+from gemelo.tools.replay.planner_answers import AnswersAgain
+from gemelo.tools.replay.planner_jog import JogAgain
+from gemelo.tools.replay.recorded import Heard, NotReplayable, Recorded
+from gemelo.tools.replay.scenes import Scenes
 
 PLANS = exchanges_of(PLAN)
 TOPICS = tuple(dict.fromkeys((PLANS, PLAN_INPUTS, SCENE, PLANNED_PATH, *planner_answers.TOPICS, *planner_jog.TOPICS)))

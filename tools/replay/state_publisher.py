@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from gemelo.schemas.topics import FRAMES, JOINT_STATES, STATIC_FRAMES
-from gemelo.services.replay.comparison import Comparison
-from gemelo.services.replay.recorded import NotReplayable, Recorded
 from gemelo.services.state_publisher.core import StatePublisher
+from gemelo.tools.replay.comparison import Comparison
+from gemelo.tools.replay.recorded import NotReplayable, Recorded
 
 TOPICS = (JOINT_STATES, FRAMES, STATIC_FRAMES)
 UNHEARD = "joint_states without recorded frames: of a LATEST topic a reader may leave messages out"

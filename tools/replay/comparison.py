@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from gemelo.schemas.message import Message, encode
-from gemelo.services.replay.recorded import Heard
+from gemelo.tools.replay.recorded import Heard
 
 ABSENT = "(nothing)"
 LONGEST = 200  # characters of a value that are shown

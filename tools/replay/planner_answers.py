@@ -19,9 +19,9 @@ from gemelo.schemas.topics import ANSWER_INPUTS, FK, IK, SCENE, SCENE_EDIT, STAT
 from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
 from gemelo.services.planner.scene.scene_store import SceneStore, changed
 from gemelo.services.planner.scene.standing import link_poses, standing
-from gemelo.services.replay.comparison import Comparison
-from gemelo.services.replay.recorded import Heard, Recorded
-from gemelo.services.replay.scenes import Scenes
+from gemelo.tools.replay.comparison import Comparison
+from gemelo.tools.replay.recorded import Heard, Recorded
+from gemelo.tools.replay.scenes import Scenes
 
 REQUESTS = (FK, IK, STATE_VALIDITY, SCENE_EDIT)
 EXCHANGES = {request: exchanges_of(request) for request in REQUESTS}

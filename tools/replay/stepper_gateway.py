@@ -24,11 +24,11 @@ from gemelo.schemas.topics import (
     Delivery,
     Topic,
 )
-from gemelo.services.replay.comparison import ABSENT, Comparison
-from gemelo.services.replay.recorded import AGAIN, Heard, NotReplayable, Recorded
 from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.inputs import BeganInput, Given, Input, Reply, digest_of, give, unpacked
 from gemelo.services.stepper_gateway.outputs import GoalFinished, GripperFinished, Output, Publish, SendFrame
+from gemelo.tools.replay.comparison import ABSENT, Comparison
+from gemelo.tools.replay.recorded import AGAIN, Heard, NotReplayable, Recorded
 
 SAID = tuple(
     topic for topic in recorded_topics() if topic in TOPICS and topic.writer == GATEWAY and topic is not GATEWAY_INPUTS

@@ -13,7 +13,7 @@ from gemelo.schemas.scene_meshes import with_meshes
 from gemelo.schemas.topics import SCENE
 from gemelo.services.planner.collision.scene_shapes import SceneError
 from gemelo.services.planner.collision.world import World
-from gemelo.services.replay.recorded import Heard, NotReplayable, Recorded
+from gemelo.tools.replay.recorded import Heard, NotReplayable, Recorded
 
 
 class Scenes:

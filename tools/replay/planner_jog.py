@@ -11,9 +11,9 @@ from gemelo.schemas.planning import JogTaken, JogTick
 from gemelo.schemas.topics import JOG_INPUTS, JOG_STATUS, JOINT_TARGETS, SCENE
 from gemelo.services.planner.jog.jog import Jog, signed
 from gemelo.services.planner.jog.jog_log import digest_of
-from gemelo.services.replay.comparison import ABSENT, Comparison
-from gemelo.services.replay.recorded import Heard, Recorded
-from gemelo.services.replay.scenes import Scenes
+from gemelo.tools.replay.comparison import ABSENT, Comparison
+from gemelo.tools.replay.recorded import Heard, Recorded
+from gemelo.tools.replay.scenes import Scenes
 
 TOPICS = (JOG_INPUTS, JOINT_TARGETS, JOG_STATUS, SCENE)
 PERIODS = "targets and statuses of one period of a jog"

@@ -1,0 +1,5 @@
+"""`python -m gemelo.tools.replay`."""
+
+from gemelo.tools.replay.main import main
+
+main()
