@@ -18,7 +18,7 @@ from paho.mqtt.properties import Properties
 
 from gemelo.libraries.mqtt.client import stop_loop
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.stack.stack import free_ports
+from gemelo.tools.stack.stack import free_ports
 from tests.optional import need
 
 BROKERS = ("embedded", "mosquitto")

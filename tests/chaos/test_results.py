@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.stack.results import MARK, new_results
-from gemelo.services.stack.stack import StackError
+from gemelo.tools.stack.results import MARK, new_results
+from gemelo.tools.stack.stack import StackError
 
 BEGUN = 60.0  # [s] in which a run that does not refuse its folder would have emptied it
 COMMANDS = (

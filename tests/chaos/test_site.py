@@ -8,8 +8,8 @@ import pytest
 from gemelo.libraries.runtime.deployment import DEFAULT_FILE, load_deployment, project_root
 from gemelo.libraries.runtime.saved_parameters import SavedParameters
 from gemelo.schemas.deployment import Wire
-from gemelo.services.stack.stack import PROCESSES
 from gemelo.tools.chaos.site import ChaosSite, processes_of, with_wire
+from gemelo.tools.stack.stack import PROCESSES
 
 
 def test_everything_that_a_stack_may_run_runs_in_chaos_and_less_in_a_soak(tmp_path: Path):

@@ -12,8 +12,8 @@ from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
 from gemelo.libraries.mqtt.client import stop_loop
-from gemelo.services.stack.stack import free_ports
 from gemelo.tools.chaos.slow_link import OneWay, SlowLink, Way, client_id_in
+from gemelo.tools.stack.stack import free_ports
 from tests.broker.running import VERSIONS
 
 SHORTLY = 0.3  # [s] in which an echo would be back many times

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.stack.several_arms import words
-from gemelo.services.stack.stack import free_ports
+from gemelo.tools.stack.several_arms import words
+from gemelo.tools.stack.stack import free_ports
 from tests.deploy.test_paths_in_words import tracked
 from tests.optional import need
 
@@ -87,10 +87,10 @@ def test_a_twin_can_be_started_from_there(folder):
         "GEMELO_ROBOT": str(folder / "urdf/rm1"), "GEMELO_CELL": str(folder / "urdf/rm1/cell.toml"),
         "GEMELO_PATHS_RUN": str(folder / "run"), "GEMELO_PATHS_OUT": str(folder / "out"), **ports,
     }  # fmt: skip
-    run(ROOT, sys.executable, "-m", "gemelo.services.stack.start_check", **own)
+    run(ROOT, sys.executable, "-m", "gemelo.tools.stack.start_check", **own)
     said = run(folder, "deploy/welcome", **own)
     assert "move --named ready" in said
-    made = run(ROOT, sys.executable, "-m", "gemelo.services.stack.several_arms", f"'{folder}/urdf/rm1' parol6", **own)
+    made = run(ROOT, sys.executable, "-m", "gemelo.tools.stack.several_arms", f"'{folder}/urdf/rm1' parol6", **own)
     assert Path(made.strip()).is_file()
     (folder / "run").mkdir(exist_ok=True)
     (folder / "run/planner.ready").touch()

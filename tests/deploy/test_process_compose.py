@@ -9,7 +9,7 @@ import yaml
 
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.topics import ACTIONS, REQUESTS, TOPICS
-from gemelo.services.stack.stack import PROCESSES
+from gemelo.tools.stack.stack import PROCESSES
 
 ROOT = project_root()
 COMPOSE = yaml.safe_load((ROOT / "process-compose.yaml").read_text())

@@ -24,9 +24,9 @@ from gemelo.libraries.runtime.deployment import (
 from gemelo.libraries.runtime.started import deployment_of_arm
 from gemelo.schemas.deployment import Deployment, DeviceKind, MqttSection, PanelSection, PathsSection, ViewerMode, Wire
 from gemelo.schemas.errors import ConfigurationError
-from gemelo.services.stack.arms import deployment_file, file_of, stacked_arms
-from gemelo.services.stack.several_arms import compose_of, main, write
-from gemelo.services.stack.start_check import main as start_check
+from gemelo.tools.stack.arms import deployment_file, file_of, stacked_arms
+from gemelo.tools.stack.several_arms import compose_of, main, write
+from gemelo.tools.stack.start_check import main as start_check
 
 ROOT = project_root()
 SINGLE = yaml.safe_load((ROOT / "process-compose.yaml").read_text())

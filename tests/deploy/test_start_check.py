@@ -20,8 +20,8 @@ from gemelo.schemas.deployment import (
     ViewerMode,
     ViewerSection,
 )
-from gemelo.services.stack.stack import free_ports
-from gemelo.services.stack.start_check import main, start_problems
+from gemelo.tools.stack.stack import free_ports
+from gemelo.tools.stack.start_check import main, start_problems
 from tests.arm.bare_arm import write_bare_arm
 from tests.optional import need
 from tests.stepper_gateway.locked import Mosquitto, external, locked
@@ -105,7 +105,7 @@ def test_an_arm_without_motors_starts_with_a_virtual_device_and_is_refused_a_boa
     folder = write_bare_arm(tmp_path / "bare")
     bare = msgspec.structs.replace(free, robot=str(folder))
     assert start_problems(bare) == []
-    monkeypatch.setattr("gemelo.services.stack.start_check.load_deployment", lambda: bare)
+    monkeypatch.setattr("gemelo.tools.stack.start_check.load_deployment", lambda: bare)
     assert main() == 0
     assert "no motors: to plan and look at only; a virtual device is generated, at" in capsys.readouterr().out
     (problem,) = start_problems(msgspec.structs.replace(bare, device=DeviceKind.BOARD))

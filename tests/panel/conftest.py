@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser
 
 import gemelo
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.panel.person import Person
 from tests.panel.served import Served, served_page
 from tests.simulated import make_ready

@@ -13,9 +13,9 @@ from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.deployment import Deployment, PanelSection, PathsSection
 from gemelo.services.panel.view.arm_pages import ArmPage, arm_pages, arms_line
 from gemelo.services.panel.words.words import Words
-from gemelo.services.stack.arms import stacked_arms
-from gemelo.services.stack.several_arms import write
-from gemelo.services.stack.stack import free_ports
+from gemelo.tools.stack.arms import stacked_arms
+from gemelo.tools.stack.several_arms import write
+from gemelo.tools.stack.stack import free_ports
 from tests.stacks.browser import new_context
 
 ENGLISH = Words("en")

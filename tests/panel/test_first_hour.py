@@ -10,7 +10,7 @@ from playwright.sync_api import Browser
 
 import gemelo
 from gemelo.services.panel.words.words import TABLES
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.panel.person import Person, until
 from tests.panel.test_page import is_moving, rests
 from tests.stacks.browser import SIZE

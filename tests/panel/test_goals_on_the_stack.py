@@ -14,8 +14,8 @@ import gemelo
 from gemelo.schemas.scene import CylinderShape, SphereShape
 from gemelo.services.panel.view.world import configuration_at
 from gemelo.services.panel.words.en import ENGLISH
-from gemelo.services.stack.stack import Stack
 from gemelo.tools.bench.bare_browser import bare_browser
+from gemelo.tools.stack.stack import Stack
 from tests.panel.person import until
 from tests.panel.served import Served, passed, rests
 from tests.stacks.shared import found_by_scripts

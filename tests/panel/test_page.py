@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, expect
 
 import gemelo
 from gemelo.schemas.joints import JointState
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.panel.person import BLUE, Person, until
 from tests.stacks.browser import SIZE
 

@@ -9,7 +9,7 @@ from playwright.sync_api import TimeoutError as NotSeen
 from playwright.sync_api import expect
 
 from gemelo.schemas.topics import camera_detections
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.panel.person import OPENING, PATIENCE, Person, place_in_image, until
 from tests.stacks.shared import found_by_scripts
 

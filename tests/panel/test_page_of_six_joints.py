@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import gemelo
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.panel.person import Person, until
 from tests.stacks.shared import found_by_scripts
 

@@ -11,7 +11,7 @@ import pytest
 import gemelo
 from gemelo.programs import Go, Program
 from gemelo.services.panel.words.en import ENGLISH
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.panel.person import until
 from tests.panel.served import Served, passed, rests
 from tests.simulated import make_ready

@@ -7,8 +7,8 @@ from math import degrees
 import pytest
 
 import gemelo
-from gemelo.services.stack.stack import Stack
 from gemelo.tools.bench.bare_browser import bare_browser
+from gemelo.tools.stack.stack import Stack
 from tests.panel.person import until
 from tests.simulated import make_ready
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from playwright.sync_api import Browser
 
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.panel.test_first_hour import walk
 
 

@@ -13,7 +13,7 @@ from gemelo.libraries.arm.frames.transforms import from_rpy, multiply
 from gemelo.programs import Go, Line, Program
 from gemelo.services.panel.model.tool_turns import ALL_RINGS
 from gemelo.services.panel.words.en import ENGLISH
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.panel.person import until
 from tests.panel.served import Served, rests
 from tests.stacks.shared import found_by_scripts

@@ -10,7 +10,7 @@ import pytest
 
 from gemelo.libraries.runtime import router
 from gemelo.libraries.runtime.deployment import DeploymentError, exposure, is_loopback, load_deployment
-from gemelo.services.stack.start_check import exposed
+from gemelo.tools.stack.start_check import exposed
 from tests.runtime.locks import Lock
 from tests.runtime.support import ROOT, free_port, until
 

@@ -19,8 +19,8 @@ from gemelo.libraries.runtime.errors import BusError
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.device import DeviceCommandResponse
 from gemelo.schemas.topics import DEVICE_STOP
-from gemelo.services.stack.stack import free_ports
 from gemelo.tools.chaos.proxy import ProxyThread
+from gemelo.tools.stack.stack import free_ports
 from tests.runtime.support import RouterProcess, until
 
 LENGTH = struct.Struct("<H")  # before every batch of Zenoh over TCP

@@ -12,7 +12,7 @@ import pytest
 import gemelo
 from gemelo.libraries.recordings.reader import MAGIC, RecordingReader
 from gemelo.schemas.topics import DEVICE_STATE, JOINT_STATES, STEP_ERRORS
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.optional import lack, need
 from tests.panel.person import Person, until
 from tests.stacks.browser import SIZE

@@ -5,8 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from gemelo.services.stack.stack import Stack
 from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.stack.stack import Stack
 
 LONGEST = 120.0  # [s] of one command
 COMMAND = (sys.executable, "-m", "gemelo.tools.cli.main")

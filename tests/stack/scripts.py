@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 
 LONGEST = 60.0  # [s]
 

@@ -16,10 +16,10 @@ from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.vision.boards import TagBoard
 from gemelo.libraries.vision.calibration.reprojection import Carrier
 from gemelo.libraries.vision.rigid import from_transform
-from gemelo.services.stack.stack import Stack
 from gemelo.tools.bench.vision.mount_images import FIRST
 from gemelo.tools.bench.vision.mounting import tool_error
 from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.stack.stack import Stack
 from tests.stack.gemelo import gemelo
 
 ENOUGH = 1.5  # [mm] with 8 poses, of which some see nothing; with 15 `mount_images_mm` of the bench asks for 0.5

@@ -12,9 +12,9 @@ import gemelo as api
 from gemelo.libraries.recordings.mcap_file import CLOCKS
 from gemelo.libraries.recordings.reader import RecordingReader
 from gemelo.schemas.topics import camera_truth
-from gemelo.services.stack.stack import Stack
 from gemelo.tools.bench.vision.picks import FLOOR, PROCESSES
 from gemelo.tools.chaos.clocks import shifted
+from gemelo.tools.stack.stack import Stack
 from tests.stack.gemelo import gemelo
 
 AHEAD = {

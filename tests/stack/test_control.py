@@ -14,8 +14,8 @@ import pytest
 import gemelo
 from gemelo.schemas.control import ControlState
 from gemelo.schemas.joints import JointState
-from gemelo.services.stack.stack import Stack
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.tools.stack.stack import Stack
 from tests.stack.person import jumps
 from tests.stack.scripts import said, script
 

@@ -13,7 +13,7 @@ import pytest
 import gemelo
 from gemelo.firmware.platform.host.flash import Flash, NetworkCredentials
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.mqtt.packet_proxy import PacketProxy
 from tests.stack.gemelo import COMMAND
 from tests.stack.person import Operator

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import pytest
 
 import gemelo
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.stacks.shared import found_by_scripts
 
 LONGEST = 90.0  # [s] of one example

@@ -9,9 +9,9 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest
 from gemelo.schemas.topics import PLAN
-from gemelo.services.stack.stack import Stack
 from gemelo.tools.cli.errors import ExitCode
 from gemelo.tools.cli.main import run
+from gemelo.tools.stack.stack import Stack
 from tests.robot_import.exports import solidworks
 from tests.stack.gemelo import gemelo
 from tests.stack.person import Operator

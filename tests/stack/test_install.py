@@ -17,7 +17,7 @@ from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.hosts.checks import load_site
 from gemelo.services.hosts.layout import processes
 from gemelo.services.hosts.render import rendered
-from gemelo.services.stack.stack import free_ports
+from gemelo.tools.stack.stack import free_ports
 from tests.optional import need
 from tests.runtime.support import until
 from tests.stack.other_host import OtherHost

@@ -15,7 +15,7 @@ from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, Tr
 from gemelo.schemas.scene import MeshShape, SceneMesh
 from gemelo.schemas.system import Empty
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, scene_mesh
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.simulation.test_large_scenes import tube
 from tests.stack import gemelo as command
 

@@ -9,7 +9,7 @@ import psutil
 from mcap.reader import make_reader
 
 from gemelo.libraries.mqtt import secure_folder
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.optional import need
 from tests.stack.gemelo import gemelo
 

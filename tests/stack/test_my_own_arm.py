@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.stack.gemelo import COMMAND, gemelo
 
 ROOT = Path(__file__).parents[2]

@@ -8,7 +8,7 @@ import socket
 
 import pytest
 
-from gemelo.services.stack.stack import Stack, StackError, free_ports
+from gemelo.tools.stack.stack import Stack, StackError, free_ports
 from tests.runtime.support import until
 
 

@@ -12,7 +12,7 @@ import pytest
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.stack.gemelo import COMMAND, gemelo
 
 PROCESSES = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher")

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.stack.guard import Guard
+from gemelo.tools.stack.guard import Guard
 
 LAST = 40.0  # [s] that a busy machine may need to end two processes
 OWNER = """
 import sys, time
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 stack = Stack(processes=("router", "broker"))
 stack.start()
 print(stack.server.pid, *stack.pids().values(), stack.folder, flush=True)

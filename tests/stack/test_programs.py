@@ -27,7 +27,7 @@ from gemelo.programs import (
     export_script,
 )
 from gemelo.programs.steps import AnyStep
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.simulated import make_ready
 from tests.stack.test_unwatched import is_moving, rests
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gemelo.services.stack.stack import Stack
 from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.stack.stack import Stack
 from tests.optional import need
 from tests.stack.gemelo import gemelo
 

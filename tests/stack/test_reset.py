@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 import gemelo
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.stack.gemelo import gemelo as command
 from tests.stacks.shared import SharedStacks
 

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 import gemelo
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.gemelo.test_docstrings import ON_THE_STACK, OPTIONS, PUBLIC
 from tests.stack.scripts import ended, said, script
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 
 LONGEST = 60.0  # [s] of one command
 STARTED = {"GEMELO_ROBOT": "urdf/parol6", "GEMELO_CELL": "urdf/parol6/cell.toml"}

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.stack.gemelo import gemelo
 
 PROCESSES = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner")

@@ -16,8 +16,8 @@ from gemelo.libraries.recordings.reader import RecordingReader
 from gemelo.libraries.runtime.robots import robots_on
 from gemelo.libraries.runtime.started import deployment_of_arm
 from gemelo.schemas.actions import GoalStatusCode
-from gemelo.services.stack.stack import Stack, free_ports
 from gemelo.services.visualizer.program.rerun_program import rerun_binary
+from gemelo.tools.stack.stack import Stack, free_ports
 from tests.stack.gemelo import gemelo
 from tests.stack.person import Operator, jumps
 

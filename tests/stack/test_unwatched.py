@@ -10,7 +10,7 @@ import pytest
 
 import gemelo
 from gemelo.schemas.planning import JointGoal
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.planner.walled import WALLED, past_the_wall
 from tests.stack.scripts import ended, said, script
 

@@ -12,10 +12,10 @@ from gemelo.libraries.runtime.errors import NoAnswer, ServerLost
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceStopRequest
 from gemelo.schemas.topics import DEVICE_STOP
-from gemelo.services.stack.stack import Stack
 from gemelo.tools.chaos.descriptors import give_descriptors, take_descriptors
 from gemelo.tools.chaos.small_disk import SmallDisk
 from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.stack.stack import Stack
 from tests.optional import need_mounts
 from tests.stack.gemelo import gemelo
 from tests.stack.person import Operator, jumps

@@ -16,7 +16,7 @@ import pytest
 import gemelo as api
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from gemelo.services.stack.stack import PROCESSES, Stack
+from gemelo.tools.stack.stack import PROCESSES, Stack
 from tests.stack.person import jumps
 from tests.stacks.shared import found_by_scripts
 

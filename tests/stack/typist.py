@@ -11,7 +11,7 @@ import termios
 import time
 from collections.abc import Callable
 
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.stack.gemelo import COMMAND
 
 REPEAT = 0.03  # [s] between two of a key that is held

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import gemelo
 from gemelo.libraries.runtime.bus.zenoh_bus import router_answers
-from gemelo.services.stack.stack import PROCESSES, Stack, free_ports
+from gemelo.tools.stack.stack import PROCESSES, Stack, free_ports
 from tests.runtime.support import until, zenohd
 
 LEFT_OUT = ("router", "viewer", "panel", "camera", "detector")

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 
 STARTS: Counter[str] = Counter()  # of this process and, in a run on several, of those that have ended
 

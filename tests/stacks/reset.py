@@ -16,7 +16,7 @@ import gemelo
 from gemelo.libraries.runtime.endpoints import parameter_request, parameters_request
 from gemelo.schemas import system
 from gemelo.schemas.topics import DEVICE_SHAFT, camera_truth
-from gemelo.services.stack.stack import Stack
+from gemelo.tools.stack.stack import Stack
 from tests.simulated import put_right, where_it_stands
 
 READY = 60.0  # [s] in which a process that a test has killed is there again

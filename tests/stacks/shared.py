@@ -12,7 +12,7 @@ import pytest
 
 import gemelo
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.stack.stack import PROCESSES, Stack
+from gemelo.tools.stack.stack import PROCESSES, Stack
 from tests.optional import need
 from tests.stacks.reset import Reset
 

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import psutil
 
-from gemelo.services.stack.stack import free_ports
 from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from gemelo.tools.bench.stack import has_mosquitto
+from gemelo.tools.stack.stack import free_ports
 
 BROKERS = ("embedded", "mosquitto")
 BYTES, RATE, COUNT = 208, 100.0, 300  # of each echo [bytes], [Hz], [messages]

@@ -18,8 +18,8 @@ from gemelo.libraries.runtime.bus.zenoh_config import locked_router
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.permissions import access_control
 from gemelo.schemas.deployment import RouterSection
-from gemelo.services.stack.stack import free_ports
 from gemelo.tools.bench.figures import Figure, NotMeasured, of_samples, quantile
+from gemelo.tools.stack.stack import free_ports
 
 ROUNDS = 40
 ROBOT, ROLE, HOST = "rm1", "viewer", "127.0.0.1"

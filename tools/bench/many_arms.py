@@ -26,9 +26,9 @@ from gemelo.schemas.deployment import RouterSection
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import decode
 from gemelo.schemas.topics import JOINT_STATES
-from gemelo.services.stack.stack import free_ports
 from gemelo.tools.bench.figures import Figure, NotMeasured, quantile, rounded
 from gemelo.tools.bench.stack import cpu_seconds, has_mosquitto, rss_mb
+from gemelo.tools.stack.stack import free_ports
 
 COUNTS = (1, 2, 4, 8, 12, 16, 20, 24, 32, 40, 50)
 ROBOT = "urdf/rm1"

@@ -25,11 +25,11 @@ from gemelo.schemas.joints import JointState
 from gemelo.services.panel.model.goal import GoalSolver
 from gemelo.services.panel.model.pace import UNSEEN
 from gemelo.services.panel.view.browser import STOP_SIGN
-from gemelo.services.stack.stack import Stack
 from gemelo.tools.bench.bare_browser import Said, bare_browser
 from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from gemelo.tools.bench.stack import Stacks, has_mosquitto
 from gemelo.tools.bench.stops import StopWire
+from gemelo.tools.stack.stack import Stack
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 SIZE = {"width": 1280, "height": 720}

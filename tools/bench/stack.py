@@ -16,8 +16,8 @@ from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.runtime.deployment import load_deployment, project_root
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.deployment import Deployment
-from gemelo.services.stack.stack import Stack
 from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
+from gemelo.tools.stack.stack import Stack
 
 IDLE_GOAL = FigureGoal(median=25.0)  # [% of one core]
 SETTLE, WINDOW, WINDOWS = 3.0, 2.0, 5  # [s], [s]

@@ -10,13 +10,13 @@ import msgspec
 
 import gemelo
 from gemelo.libraries.arm.device.device_config import device_config
-from gemelo.services.stack.stack import StackError
 from gemelo.tools.chaos.faults import BYSTANDERS, FAULTS, READY, Fault
 from gemelo.tools.chaos.invariants import is_starved, jerks, jumps, misses, moved, segments
 from gemelo.tools.chaos.person import quietly_cancel
 from gemelo.tools.chaos.site import ChaosSite
 from gemelo.tools.chaos.slots import steps_in
 from gemelo.tools.chaos.slots import violations as slot_violations
+from gemelo.tools.stack.stack import StackError
 
 TO_END = 25.0  # [s] beyond the move's own time in which its client must know its end
 TO_BEGIN = 5.0  # [s] for a move to get under way

@@ -13,12 +13,12 @@ from random import Random
 import psutil
 
 import gemelo
-from gemelo.services.stack.stack import StackError
 from gemelo.tools.chaos.descriptors import give_descriptors, take_descriptors
 from gemelo.tools.chaos.noisy_line import NoisyLine
 from gemelo.tools.chaos.site import ChaosSite, program
 from gemelo.tools.chaos.slow_link import OneWay, Way
 from gemelo.tools.chaos.twins import TwinClient, TwinProcess
+from gemelo.tools.stack.stack import StackError
 
 Begin = Callable[[ChaosSite, Random], str]  # does it; the words for what was chosen
 Heal = Callable[[ChaosSite], None]

@@ -22,14 +22,14 @@ from gemelo.libraries.runtime.deployment import load_deployment
 from gemelo.libraries.runtime.process.ending import ended_by_signals
 from gemelo.schemas.deployment import DeviceKind
 from gemelo.schemas.topics import JOINT_STATES
-from gemelo.services.stack.results import new_results
-from gemelo.services.stack.stack import StackError
 from gemelo.tools.chaos.campaign import Campaign, Episode, order
 from gemelo.tools.chaos.faults import FAULTS, Fault
 from gemelo.tools.chaos.invariants import missing_records
 from gemelo.tools.chaos.options import add_chaos_options
 from gemelo.tools.chaos.report import ChaosReport, page_of, text_of
 from gemelo.tools.chaos.site import ChaosSite, installed_broker, processes_of
+from gemelo.tools.stack.results import new_results
+from gemelo.tools.stack.stack import StackError
 
 Order = Iterator[tuple[int, Fault, Random]]  # number, fault and chance of each episode
 LAST_WORDS = 2.0  # [s] at the end of a run of which records may still be on their way

@@ -12,9 +12,9 @@ from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
 from gemelo.schemas.actions import GoalRequest, GoalResponse
 from gemelo.schemas.message import decode, encode
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
-from gemelo.services.stack.stack import StackError
 from gemelo.tools.chaos.invariants import STEPS, is_starved
 from gemelo.tools.chaos.site import ChaosSite
+from gemelo.tools.stack.stack import StackError
 
 Send = Callable[[ChaosSite, GoalRequest], str]  # again; how it was answered
 

@@ -27,7 +27,6 @@ from gemelo.schemas.system import Exchange
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
 from gemelo.services.broker import mosquitto
 from gemelo.services.broker.replacement import NotInstalled
-from gemelo.services.stack.stack import PROCESSES, Stack, StackError, free_ports
 from gemelo.tools.chaos.clocks import ClockError, SteppingClocks
 from gemelo.tools.chaos.noisy_line import NoisyLine
 from gemelo.tools.chaos.person import Person
@@ -36,6 +35,7 @@ from gemelo.tools.chaos.slow_link import SlowLink
 from gemelo.tools.chaos.small_disk import SmallDisk, may_mount
 from gemelo.tools.chaos.strangers import BusStranger, WireStranger
 from gemelo.tools.chaos.twins import TwinClient, TwinProcess
+from gemelo.tools.stack.stack import PROCESSES, Stack, StackError, free_ports
 
 EYES = ("camera", "detector")
 KEPT_GOALS = 20  # that can be sent again

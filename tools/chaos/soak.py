@@ -27,10 +27,10 @@ from gemelo.libraries.runtime.errors import NoAnswer
 from gemelo.libraries.runtime.process.ending import ended_by_signals
 from gemelo.schemas.deployment import DeviceKind
 from gemelo.schemas.system import SetParameter
-from gemelo.services.stack.results import new_results
-from gemelo.services.stack.stack import StackError
 from gemelo.tools.chaos.options import add_soak_options
 from gemelo.tools.chaos.site import ChaosSite, installed_broker
+from gemelo.tools.stack.results import new_results
+from gemelo.tools.stack.stack import StackError
 
 EVERY = 5.0  # [s] between two samples
 TOLD_EVERY = 300.0  # [s] between two lines about how far it is

@@ -12,7 +12,7 @@ from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
 from gemelo.libraries.mqtt.client import stop_loop
-from gemelo.services.stack.stack import Stack, StackError
+from gemelo.tools.stack.stack import Stack, StackError
 
 TO_BEGIN = 60.0  # [s] until a second process has loaded all and shows itself, on a machine without time
 TO_GIVE_WAY = 20.0  # [s] from there until it has looked around and ended

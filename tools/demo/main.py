@@ -19,10 +19,10 @@ import msgspec
 import gemelo
 from gemelo.libraries.runtime.deployment import load_deployment, project_root
 from gemelo.libraries.runtime.process.ending import ended_by_signals
-from gemelo.services.stack.results import new_results
-from gemelo.services.stack.stack import Stack, StackError
 from gemelo.tools.demo.performance import Performance
 from gemelo.tools.demo.report import complaints, report_of, text_of
+from gemelo.tools.stack.results import new_results
+from gemelo.tools.stack.stack import Stack, StackError
 
 DRIVER = "sudo apt-get install mesa-vulkan-drivers libvulkan1"
 MOSQUITTO = (shutil.which("mosquitto"), shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin"))

@@ -26,8 +26,8 @@ from gemelo.libraries.recordings.mcap_file import DEPLOYMENT
 from gemelo.libraries.recordings.reader import RecordingReader
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.topics import Topic
-from gemelo.services.stack.stack import Stack, StackError
 from gemelo.tools.replay.main import SERVICES, Replayed, replay, text_of
+from gemelo.tools.stack.stack import Stack, StackError
 
 FOLDER = "tests/replay/recordings"
 CHUNK = 256 * 1024  # [B] uncompressed: larger ones are smaller together

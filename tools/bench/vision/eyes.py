@@ -29,10 +29,10 @@ from gemelo.schemas.system import SetParameter
 from gemelo.schemas.topics import camera_detections, camera_image
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
 from gemelo.services.camera.virtual.world import CameraWorld
-from gemelo.services.stack.stack import Stack
 from gemelo.tools.bench.figures import Figure, NotMeasured, of_samples, quantile
 from gemelo.tools.bench.scenes import rm1
 from gemelo.tools.bench.stack import Stacks, cpu_seconds, families
+from gemelo.tools.stack.stack import Stack
 
 SET_RATE = parameter_request("detector")
 PROCESSES = ("router", "camera", "detector")

@@ -20,8 +20,8 @@ from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.cell import PosePlace
 from gemelo.schemas.detections import Detections
 from gemelo.schemas.topics import camera_truth
-from gemelo.services.stack.stack import Stack
 from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
+from gemelo.tools.stack.stack import Stack
 
 PROCESSES = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner", "camera", "detector")
 CAMERA = "overhead"

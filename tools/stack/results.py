@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from gemelo.services.stack.stack import StackError
+from gemelo.tools.stack.stack import StackError
 
 MARK = ".gemelo-results"  # in every such folder: what lies beside it may be removed by the next run
 

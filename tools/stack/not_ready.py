@@ -9,7 +9,7 @@ from typing import NamedTuple
 import psutil
 
 from gemelo.libraries.runtime.process.readiness import says_ready
-from gemelo.services.stack.compose import ProcessState
+from gemelo.tools.stack.compose import ProcessState
 
 LINES = 8  # of a log that are shown
 

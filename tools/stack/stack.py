@@ -17,9 +17,9 @@ from types import TracebackType
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.process.readiness import says_ready
-from gemelo.services.stack.compose import Compose, ComposeError
-from gemelo.services.stack.guard import Guard
-from gemelo.services.stack.not_ready import NotReady, not_ready
+from gemelo.tools.stack.compose import Compose, ComposeError
+from gemelo.tools.stack.guard import Guard
+from gemelo.tools.stack.not_ready import NotReady, not_ready
 
 PROCESSES = (
     "router",

@@ -85,7 +85,7 @@ def broker_problems(deployment: Deployment, device: str) -> list[str]:
 
 
 def main() -> int:
-    """`python -m gemelo.services.stack.start_check`: prints every problem to stderr; 0 if there is none, else 1."""
+    """`python -m gemelo.tools.stack.start_check`: prints every problem to stderr; 0 if there is none, else 1."""
     try:
         deployment = load_deployment()
         found = start_problems(deployment)

@@ -1,4 +1,4 @@
-"""`python -m gemelo.services.stack.several_arms "NAME ..."`: what `make up ARMS="rm1 parol6"` starts, as files.
+"""`python -m gemelo.tools.stack.several_arms "NAME ..."`: what `make up ARMS="rm1 parol6"` starts, as files.
 
 Prints the path of a process-compose file: router, broker and viewer once, and every other process of
 process-compose.yaml once for each arm, named <robot>-<process>. What cannot run together is refused before anything is
@@ -21,8 +21,8 @@ from gemelo.libraries.runtime.deployment import forget_arms, load_deployment, ov
 from gemelo.libraries.runtime.started import keep_started
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.errors import ConfigurationError
-from gemelo.services.stack.arms import SHARED, StackedArm, deployment_file, file_of, left_out, stacked_arms
-from gemelo.services.stack.start_check import say_virtual, start_problems
+from gemelo.tools.stack.arms import SHARED, StackedArm, deployment_file, file_of, left_out, stacked_arms
+from gemelo.tools.stack.start_check import say_virtual, start_problems
 
 ABOUT = "about"
 OUT = "${GEMELO_PATHS_OUT:-out}"  # as process-compose.yaml writes it
