@@ -33,10 +33,10 @@ from gemelo.schemas.robot import Motor
 from gemelo.schemas.simulation import WireConditions
 
 if TYPE_CHECKING:
-    from gemelo.services.simulation.twin import Twin
-    from gemelo.services.simulation.virtual_clock import VirtualClock
+    from gemelo.tools.simulation.twin import Twin
+    from gemelo.tools.simulation.virtual_clock import VirtualClock
 
-ROOM = "gemelo.services.simulation"  # imported when a simulation begins: it stands on all services
+ROOM = "gemelo.tools.simulation"  # imported when a simulation begins: it stands on all services
 PROGRAM = "program"  # the node of a connection, if it is not named
 UNREFERENCED = "unreferenced"  # a start of which the board does not know where the joints stand
 

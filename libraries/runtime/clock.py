@@ -2,7 +2,7 @@
 
 Everything in `gemelo.libraries.runtime` and `gemelo` takes them from the clock of its bus. `SYSTEM` is that of
 every real process; a simulation has one of virtual time, in which the same seed gives the same bytes
-(`services/simulation/virtual_clock.py`).
+(`tools/simulation/virtual_clock.py`).
 """
 
 from __future__ import annotations

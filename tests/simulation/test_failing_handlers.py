@@ -40,8 +40,8 @@ from gemelo.schemas.topics import (
     SCENE_EDIT,
     Request,
 )
-from gemelo.services.simulation import twin
-from gemelo.services.simulation.twin import ServiceNode
+from gemelo.tools.simulation import twin
+from gemelo.tools.simulation.twin import ServiceNode
 
 ROOT = Path(__file__).parents[2]
 AT_ONCE = -1  # fails where it begins; 0, 1, ...: at the first, second ... message that it encodes

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from gemelo.services.simulation.virtual_clock import GRACE, VirtualClock
+from gemelo.tools.simulation.virtual_clock import GRACE, VirtualClock
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e9])

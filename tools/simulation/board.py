@@ -17,8 +17,8 @@ from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.runtime.process.readiness import Readiness
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.robot import Motor
-from gemelo.services.simulation.memory_wire import MemoryWire
-from gemelo.services.simulation.virtual_clock import VirtualClock
+from gemelo.tools.simulation.memory_wire import MemoryWire
+from gemelo.tools.simulation.virtual_clock import VirtualClock
 
 NAME = "virtual_esp32"
 PERIOD = 0.02  # [s] between two turns of a board to which nothing comes: as often its state is due

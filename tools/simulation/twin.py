@@ -19,9 +19,9 @@ from gemelo.schemas.deployment import Deployment, PathsSection, RouterSection
 from gemelo.schemas.robot import Motor
 from gemelo.schemas.simulation import WireConditions
 from gemelo.schemas.system import ParameterValue
-from gemelo.services.simulation.board import SimulatedBoard, keep_position
-from gemelo.services.simulation.memory_wire import MemoryWire
-from gemelo.services.simulation.virtual_clock import VirtualClock
+from gemelo.tools.simulation.board import SimulatedBoard, keep_position
+from gemelo.tools.simulation.memory_wire import MemoryWire
+from gemelo.tools.simulation.virtual_clock import VirtualClock
 
 EXTRAS = {"planner": "planner", "camera": "eyes", "detector": "eyes"}  # of pyproject.toml, by service
 UNRECORDED: dict[str, ParameterValue] = {"record_inputs": False}  # nobody replays them, and they cost a fifth

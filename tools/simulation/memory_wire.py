@@ -11,9 +11,9 @@ from gemelo.firmware.platform.host.flash import NetworkCredentials
 from gemelo.firmware.platform.host.link import REPORTS, Connected, Item, MqttMessage
 from gemelo.firmware.platform.host.network import offline_status
 from gemelo.schemas.simulation import WireConditions
-from gemelo.services.simulation.virtual_clock import VirtualClock
 from gemelo.services.stepper_gateway.links.connection import ReceiveQueue
 from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.tools.simulation.virtual_clock import VirtualClock
 
 # A broker keeps status, event and configuration until they are delivered. Heartbeats are spared because two lost ones
 # hold the device, as they should: who wants that cuts the wire.

@@ -23,8 +23,8 @@ from types import FrameType
 from typing import TypeVar
 
 from gemelo.libraries.runtime.clock import DrivenLoop
-from gemelo.services.simulation.baton import Baton, VirtualCondition
-from gemelo.services.simulation.participants import IdleTime, Participant, Wait
+from gemelo.tools.simulation.baton import Baton, VirtualCondition
+from gemelo.tools.simulation.participants import IdleTime, Participant, Wait
 
 T = TypeVar("T")
 
