@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, packages_distributions, req
 import pytest
 
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.hosts.layout import BROKER, SERVICES, extras
+from gemelo.tools.hosts.layout import BROKER, SERVICES, extras
 from tests.hosts.sites import EXAMPLE, site
 
 ROOT = project_root()

@@ -10,9 +10,9 @@ from gemelo.libraries.runtime.bus.zenoh_config import locked_router
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.permissions import access_control
 from gemelo.schemas.deployment import RouterSection
-from gemelo.services.hosts.checks import load_site
-from gemelo.services.hosts.keys import make_keys
-from gemelo.services.hosts.layout import principals
+from gemelo.tools.hosts.checks import load_site
+from gemelo.tools.hosts.keys import make_keys
+from gemelo.tools.hosts.layout import principals
 from tests.runtime.locks import HOST
 from tests.runtime.support import RouterProcess, free_port
 

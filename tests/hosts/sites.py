@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.site import Site
-from gemelo.services.hosts.checks import load_site
+from gemelo.tools.hosts.checks import load_site
 
 EXAMPLE = project_root() / "deploy/hosts/example.toml"
 

@@ -18,8 +18,8 @@ from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Broker, MqttSection
 from gemelo.schemas.device import DeviceStatus
 from gemelo.schemas.topics import DEVICE_STATUS
-from gemelo.services.hosts.certificates import Certificate, days_by_host, endings, older, shown_at
 from gemelo.tools.cli.main import run
+from gemelo.tools.hosts.certificates import Certificate, days_by_host, endings, older, shown_at
 from tests.hosts.site_router import SiteRouter
 from tests.runtime.locks import HOST, Lock, LockedRouter
 from tests.runtime.support import free_port, spinning

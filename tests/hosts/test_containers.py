@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.hosts.layout import extras
-from gemelo.services.hosts.render import rendered
+from gemelo.tools.hosts.layout import extras
+from gemelo.tools.hosts.render import rendered
 from tests.hosts.sites import site
 
 

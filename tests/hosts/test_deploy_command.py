@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.hosts.install import commands
 from gemelo.tools.cli.main import run
+from gemelo.tools.hosts.install import commands
 from tests.hosts.sites import EXAMPLE, changed, site
 
 RECORDER = """#!{python}

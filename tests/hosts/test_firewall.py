@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.runtime.bus.zenoh_config import locked_router
-from gemelo.services.hosts import firewall
-from gemelo.services.hosts.install import commands
-from gemelo.services.hosts.render import rendered
+from gemelo.tools.hosts import firewall
+from gemelo.tools.hosts.install import commands
+from gemelo.tools.hosts.render import rendered
 from tests.hosts.sites import EXAMPLE, site
 from tests.optional import need, need_root
 from tests.runtime.locks import Lock

@@ -12,9 +12,9 @@ import msgspec
 import pytest
 
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.hosts.checks import load_site
-from gemelo.services.hosts.keys import make_keys
-from gemelo.services.hosts.render import write
+from gemelo.tools.hosts.checks import load_site
+from gemelo.tools.hosts.keys import make_keys
+from gemelo.tools.hosts.render import write
 from tests.runtime.support import free_port, until
 
 SITE = """

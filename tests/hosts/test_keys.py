@@ -11,8 +11,8 @@ from gemelo.libraries.credentials.common_name import common_name
 from gemelo.libraries.credentials.expiry import expiry
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.roles import ROLE_OF_NODE, ROLES
-from gemelo.services.hosts.checks import load_site
-from gemelo.services.hosts.keys import authority_in, make_keys
+from gemelo.tools.hosts.checks import load_site
+from gemelo.tools.hosts.keys import authority_in, make_keys
 from tests.hosts.sites import EXAMPLE, site
 
 DAY = 86_400.0

@@ -6,8 +6,8 @@ import re
 import shlex
 
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.hosts.layout import extras
 from gemelo.tools.cli.main import parse
+from gemelo.tools.hosts.layout import extras
 from tests.hosts.sites import site
 
 SECTION = re.compile(r"^## Several machines\n.*?```\n(.*?)```", re.DOTALL | re.MULTILINE)

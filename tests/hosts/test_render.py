@@ -17,13 +17,13 @@ from hypothesis import strategies as st
 from gemelo.libraries.runtime.deployment import load_deployment, project_root
 from gemelo.libraries.runtime.process.readiness import GOES_ON
 from gemelo.schemas.site import Site
-from gemelo.services.hosts import install
-from gemelo.services.hosts.checks import load_site
-from gemelo.services.hosts.containers import IN_IMAGE
-from gemelo.services.hosts.firewall import UNIT_NAME, ports
-from gemelo.services.hosts.layout import Process, processes, robots
-from gemelo.services.hosts.render import rendered, write
-from gemelo.services.hosts.site_file import SiteError
+from gemelo.tools.hosts import install
+from gemelo.tools.hosts.checks import load_site
+from gemelo.tools.hosts.containers import IN_IMAGE
+from gemelo.tools.hosts.firewall import UNIT_NAME, ports
+from gemelo.tools.hosts.layout import Process, processes, robots
+from gemelo.tools.hosts.render import rendered, write
+from gemelo.tools.hosts.site_file import SiteError
 from tests.hosts.sites import EXAMPLE, changed, escaped, site
 from tests.profiles import examples
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.hosts.checks import load_site
-from gemelo.services.hosts.layout import processes, roles
-from gemelo.services.hosts.site_file import SiteError
+from gemelo.tools.hosts.checks import load_site
+from gemelo.tools.hosts.layout import processes, roles
+from gemelo.tools.hosts.site_file import SiteError
 from tests.hosts.sites import EXAMPLE, changed, site
 from tests.table import table
 

@@ -20,9 +20,9 @@ from gemelo.programs import Points
 from gemelo.programs.reading import read_program
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.text_file import NotUtf8, decode_text
-from gemelo.services.hosts.site_file import read_site
 from gemelo.services.state_publisher.main import describe
 from gemelo.tools.cli.plan_file import read_plan
+from gemelo.tools.hosts.site_file import read_site
 
 ROOT = Path(__file__).parents[2]
 MARK = b"\xef\xbb\xbf"

@@ -20,12 +20,12 @@ from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.device import DeviceEvent
 from gemelo.schemas.frames import FrameTransforms
 from gemelo.schemas.topics import DEVICE_EVENTS, FRAMES, JOINT_STATES
-from gemelo.services.hosts.checks import load_site
 from gemelo.tools.bench.figures import quantile
 from gemelo.tools.bench.handshake import joins
 from gemelo.tools.bench.latency import follow, sharp_start
 from gemelo.tools.bench.stack import Running, has_mosquitto
 from gemelo.tools.cli.text_table import table
+from gemelo.tools.hosts.checks import load_site
 from gemelo.tools.stack.stack import Stack
 from tests.stack.links import SITE
 from tests.stack.namespaces import Hosts, Lab

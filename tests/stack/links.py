@@ -23,10 +23,10 @@ from gemelo.firmware.platform.host.slot_record import ROW, VARIABLE
 from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.hosts.checks import load_site
-from gemelo.services.hosts.layout import processes
 from gemelo.tools.chaos.slots import SlotFile, steps_in, violations
 from gemelo.tools.cli.text_table import table
+from gemelo.tools.hosts.checks import load_site
+from gemelo.tools.hosts.layout import processes
 from tests.stack.ethernet import Ethernet
 from tests.stack.link_cases import CASES, FINISHED, HELD, Case, expected, told_within
 from tests.stack.namespaces import Hosts, Lab

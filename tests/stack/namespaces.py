@@ -14,9 +14,9 @@ import msgspec
 
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.site import Site
-from gemelo.services.hosts.keys import make_keys
-from gemelo.services.hosts.layout import processes
-from gemelo.services.hosts.render import write
+from gemelo.tools.hosts.keys import make_keys
+from gemelo.tools.hosts.layout import processes
+from gemelo.tools.hosts.render import write
 from tests.stack.ethernet import Ethernet
 
 READY = 60.0  # [s] for all processes of all hosts

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.hosts.checks import load_site
+from gemelo.tools.hosts.checks import load_site
 from tests.optional import need, need_root
 from tests.stack.namespaces import Hosts, Lab
 

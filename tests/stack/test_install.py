@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.services.hosts.checks import load_site
-from gemelo.services.hosts.layout import processes
-from gemelo.services.hosts.render import rendered
+from gemelo.tools.hosts.checks import load_site
+from gemelo.tools.hosts.layout import processes
+from gemelo.tools.hosts.render import rendered
 from gemelo.tools.stack.stack import free_ports
 from tests.optional import need
 from tests.runtime.support import until

@@ -15,7 +15,7 @@ from gemelo.tools.cli.parser import Options, Parser, positive_number
 from gemelo.tools.cli.text_table import table
 
 if TYPE_CHECKING:
-    from gemelo.services.hosts.certificates import Certificate
+    from gemelo.tools.hosts.certificates import Certificate
 
 FOLDER = "deploy/hosts"
 
@@ -58,8 +58,8 @@ def install_options(parser: Parser) -> None:
 
 def run_check(options: Options) -> ExitCode:
     """Says what runs where and how long certificates last, or everything that is wrong, with lines."""
-    from gemelo.services.hosts.certificates import authority_told, days_by_host, endings, renewal  # slow to load
-    from gemelo.services.hosts.layout import extras, processes
+    from gemelo.tools.hosts.certificates import authority_told, days_by_host, endings, renewal  # slow to load
+    from gemelo.tools.hosts.layout import extras, processes
 
     site = site_named(options.site)
     made = made_here(site)
@@ -80,7 +80,7 @@ def run_check(options: Options) -> ExitCode:
 
 def run_render(options: Options) -> ExitCode:
     """Writes the files of some hosts below out/."""
-    from gemelo.services.hosts.render import write  # slow to load
+    from gemelo.tools.hosts.render import write  # slow to load
 
     site = site_named(options.site)
     for host in options.hosts:
@@ -101,8 +101,8 @@ def run_render(options: Options) -> ExitCode:
 
 def run_keys(options: Options) -> ExitCode:
     """Makes and renews certificates and passwords below out/."""
-    from gemelo.services.hosts.certificates import authority_told  # slow to load: cryptography comes with it
-    from gemelo.services.hosts.keys import authority_in, make_keys
+    from gemelo.tools.hosts.certificates import authority_told  # slow to load: cryptography comes with it
+    from gemelo.tools.hosts.keys import authority_in, make_keys
 
     site = site_named(options.site)
     try:
@@ -127,8 +127,8 @@ def run_keys(options: Options) -> ExitCode:
 
 def run_install(options: Options) -> ExitCode:
     """Gives a host its folder over ssh, and starts what does not run there yet."""
-    from gemelo.services.hosts import install  # slow to load, as is all of gemelo.services.hosts
-    from gemelo.services.hosts.render import outdated
+    from gemelo.tools.hosts import install  # slow to load, as is all of gemelo.tools.hosts
+    from gemelo.tools.hosts.render import outdated
 
     site = site_named(options.site)
     if options.host not in site.hosts:
@@ -150,7 +150,7 @@ def run_install(options: Options) -> ExitCode:
 
 def site_named(name: str) -> Site:
     """The site of that name or file, checked; raises `CommandError`."""
-    from gemelo.services.hosts.checks import load_site  # slow to load: it reads robots
+    from gemelo.tools.hosts.checks import load_site  # slow to load: it reads robots
 
     root = project_root()
     file = Path(name) if name.endswith(".toml") else root / FOLDER / f"{name}.toml"
@@ -162,7 +162,7 @@ def site_named(name: str) -> Site:
 
 def made_here(site: Site) -> tuple[Certificate, ...]:
     """The certificates of the site made here, if they may be read; raises `CommandError` for a file that is none."""
-    from gemelo.services.hosts.certificates import made  # slow to load
+    from gemelo.tools.hosts.certificates import made  # slow to load
 
     try:
         return made(site, site_folder(site))

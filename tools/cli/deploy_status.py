@@ -19,15 +19,15 @@ from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.roles import ROLE_OF_NODE
 from gemelo.schemas.site import Site
 from gemelo.schemas.topics import DEVICE_STATUS
-from gemelo.services.hosts.certificates import Certificate, days_by_host, endings, in_days, older, renewal, shown_at
-from gemelo.services.hosts.layout import BROKER, ROUTER
-from gemelo.services.hosts.status import SeenNode, SeenRobot, ServiceState, ServiceStatus, is_well, site_status
 from gemelo.tools.cli.deploy import made_here, said_folder, site_named, site_option
 from gemelo.tools.cli.errors import CommandError, ExitCode, usage
 from gemelo.tools.cli.node import is_command
 from gemelo.tools.cli.parser import Options, Parser, json_option
 from gemelo.tools.cli.session import own_name, require_router
 from gemelo.tools.cli.text_table import table
+from gemelo.tools.hosts.certificates import Certificate, days_by_host, endings, in_days, older, renewal, shown_at
+from gemelo.tools.hosts.layout import BROKER, ROUTER
+from gemelo.tools.hosts.status import SeenNode, SeenRobot, ServiceState, ServiceStatus, is_well, site_status
 
 HEADINGS = ("host", "robot", "service", "is", "machine", "version", "clock", "certificate", "why")
 TO_ANSWER = 2.0  # [s] of one node

@@ -14,7 +14,7 @@ from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.runtime.deployment import ARMS
 from gemelo.schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
 from gemelo.schemas.errors import ConfigurationError
-from gemelo.services.hosts.quoting import Value, toml
+from gemelo.tools.hosts.quoting import Value, toml
 
 HEADER = "# Written by `make up ARMS=...`, of deploy/local.toml and of the environment then.\n\n"
 SHARED = ("router", "broker", "viewer")  # processes that serve all arms

@@ -14,7 +14,7 @@ from gemelo.libraries.credentials.authority import FORMER
 from gemelo.libraries.credentials.expiry import WARN_WITHIN, days_left, ending, expiry, not_after
 from gemelo.libraries.mqtt.secure_folder import CERTIFICATE
 from gemelo.schemas.site import Site
-from gemelo.services.hosts.layout import BROKER, ROUTER, roles
+from gemelo.tools.hosts.layout import BROKER, ROUTER, roles
 
 HANDSHAKE = 2.0  # [s]
 AUTHORITY_FOLDER = "authority"  # below the site's; it stays where it was made

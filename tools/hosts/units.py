@@ -5,11 +5,11 @@ from __future__ import annotations
 from gemelo.libraries.runtime.process.priority import AHEAD
 from gemelo.schemas.deployment import Wire
 from gemelo.schemas.site import Site
-from gemelo.services.hosts import firewall
-from gemelo.services.hosts.deployments import environment
-from gemelo.services.hosts.firewall import FILE, UNIT_NAME, ports
-from gemelo.services.hosts.layout import FILES, TASKS, Process, processes
-from gemelo.services.hosts.quoting import systemd
+from gemelo.tools.hosts import firewall
+from gemelo.tools.hosts.deployments import environment
+from gemelo.tools.hosts.firewall import FILE, UNIT_NAME, ports
+from gemelo.tools.hosts.layout import FILES, TASKS, Process, processes
+from gemelo.tools.hosts.quoting import systemd
 
 TARGET = "gemelo.target"
 UNIT = """\

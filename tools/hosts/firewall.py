@@ -11,7 +11,7 @@ import ipaddress
 from collections.abc import Iterable, Iterator
 
 from gemelo.schemas.site import Site
-from gemelo.services.hosts.layout import processes
+from gemelo.tools.hosts.layout import processes
 
 FILE, UNIT_NAME = "gemelo.nft", "gemelo-firewall.service"
 # Chosen. All services of a host that come back together, each trying twice a second, find place within some seconds;

@@ -8,8 +8,8 @@ from typing import Any
 
 from gemelo.schemas.deployment import Wire
 from gemelo.schemas.site import Site
-from gemelo.services.hosts.deployments import HOST, environment
-from gemelo.services.hosts.layout import FILES, TASKS, Process, extras, processes
+from gemelo.tools.hosts.deployments import HOST, environment
+from gemelo.tools.hosts.layout import FILES, TASKS, Process, extras, processes
 
 IN_IMAGE = "/opt/gemelo"  # where the Containerfile puts the project
 CONTAINERFILE = """\

@@ -17,10 +17,10 @@ from gemelo.schemas.deployment import DeviceKind, Wire
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.roles import ROLES
 from gemelo.schemas.site import Site
-from gemelo.services.hosts.certificates import AUTHORITY_FOLDER
-from gemelo.services.hosts.deployments import HOST
-from gemelo.services.hosts.layout import BROKER, OF_A_ROBOT, ROUTER
-from gemelo.services.hosts.site_file import Problems, nearest, read_site
+from gemelo.tools.hosts.certificates import AUTHORITY_FOLDER
+from gemelo.tools.hosts.deployments import HOST
+from gemelo.tools.hosts.layout import BROKER, OF_A_ROBOT, ROUTER
+from gemelo.tools.hosts.site_file import Problems, nearest, read_site
 
 USER = re.compile(r"[a-z_][a-z0-9_-]{0,31}")  # as useradd takes it
 ZONE = re.compile(r"[A-Za-z0-9_.-]{1,15}")  # an interface's name after the % of an IPv6 address (RFC 4007)

@@ -8,10 +8,10 @@ import subprocess
 from pathlib import Path, PurePosixPath
 
 from gemelo.schemas.site import Site
-from gemelo.services.hosts.firewall import UNIT_NAME, ports
-from gemelo.services.hosts.layout import robots
-from gemelo.services.hosts.site_file import SiteError
-from gemelo.services.hosts.units import TARGET
+from gemelo.tools.hosts.firewall import UNIT_NAME, ports
+from gemelo.tools.hosts.layout import robots
+from gemelo.tools.hosts.site_file import SiteError
+from gemelo.tools.hosts.units import TARGET
 
 Command = tuple[str, ...]
 # Keys of roles and units of services that have left a host go from it; all else that stands there stays.

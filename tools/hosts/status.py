@@ -13,7 +13,7 @@ from gemelo.schemas.device import DeviceStatus
 from gemelo.schemas.roles import SERVICES
 from gemelo.schemas.site import Site
 from gemelo.schemas.system import NodeInfo
-from gemelo.services.hosts.layout import BROKER, ROUTER, processes
+from gemelo.tools.hosts.layout import BROKER, ROUTER, processes
 
 DEVICE, VIEWER, VISUALIZER, GATEWAY = "virtual_esp32", "viewer", "visualizer", "stepper_gateway"
 

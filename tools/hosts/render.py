@@ -9,11 +9,11 @@ from gemelo.libraries.mqtt.secure_folder import lines, mosquitto_conf
 from gemelo.libraries.runtime.bus.zenoh_config import locked_router
 from gemelo.libraries.runtime.permissions import access_control
 from gemelo.schemas.site import Site
-from gemelo.services.hosts import deployments
-from gemelo.services.hosts.containers import compose, containerfile, process_compose
-from gemelo.services.hosts.firewall import FILE, firewall, ports
-from gemelo.services.hosts.layout import listening, principals, robots
-from gemelo.services.hosts.units import units
+from gemelo.tools.hosts import deployments
+from gemelo.tools.hosts.containers import compose, containerfile, process_compose
+from gemelo.tools.hosts.firewall import FILE, firewall, ports
+from gemelo.tools.hosts.layout import listening, principals, robots
+from gemelo.tools.hosts.units import units
 
 OF_A_PLACE = ("router.json5", "mosquitto.conf", FILE)  # of a host where router or broker run
 

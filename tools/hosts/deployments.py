@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from gemelo.schemas.deployment import Broker, ViewerMode
 from gemelo.schemas.site import Site
-from gemelo.services.hosts.layout import Process, listening, processes
-from gemelo.services.hosts.quoting import Value, toml
+from gemelo.tools.hosts.layout import Process, listening, processes
+from gemelo.tools.hosts.quoting import Value, toml
 
 WRITTEN = "# Written by `gemelo deploy render "
 HEADER = WRITTEN + "{site} {host}`; what it is made of is deploy/hosts/{site}.toml.\n\n"

@@ -17,8 +17,8 @@ from gemelo.libraries.credentials.private_files import write
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.mqtt.access import AUTHORITY, GATEWAY
 from gemelo.schemas.site import Site
-from gemelo.services.hosts.certificates import AUTHORITY_FOLDER, Certificate
-from gemelo.services.hosts.layout import listening, principal, processes, roles
+from gemelo.tools.hosts.certificates import AUTHORITY_FOLDER, Certificate
+from gemelo.tools.hosts.layout import listening, principal, processes, roles
 
 LOOPBACK = ("localhost", "127.0.0.1")
 UNSPECIFIED = ("0.0.0.0", "::")
