@@ -15,17 +15,17 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.collision_fitting.clipping import clipped, common_corners
-from gemelo.services.collision_fitting.enclosing_hull import MOST_SIDES, enclosing_hull
-from gemelo.services.collision_fitting.excess import SHARE, Excess, depth_in, excess_of
-from gemelo.services.collision_fitting.fitted_shape import Fitted
-from gemelo.services.collision_fitting.mesh_fit import LinkFit, beyond_bound
-from gemelo.services.collision_fitting.mesh_surface import MeshSurface
-from gemelo.services.collision_fitting.parts import shapes_around
 from gemelo.services.planner.collision_geometry.coal_shapes import is_inside, tree_of
 from gemelo.services.planner.collision_geometry.link_shapes import hull_mesh
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from gemelo.services.planner.collision_geometry.solids import polytope_around
+from gemelo.tools.collision_fitting.clipping import clipped, common_corners
+from gemelo.tools.collision_fitting.enclosing_hull import MOST_SIDES, enclosing_hull
+from gemelo.tools.collision_fitting.excess import SHARE, Excess, depth_in, excess_of
+from gemelo.tools.collision_fitting.fitted_shape import Fitted
+from gemelo.tools.collision_fitting.mesh_fit import LinkFit, beyond_bound
+from gemelo.tools.collision_fitting.mesh_surface import MeshSurface
+from gemelo.tools.collision_fitting.parts import shapes_around
 from tests.profiles import examples
 
 WITHIN = 0.005  # [m]

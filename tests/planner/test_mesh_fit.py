@@ -18,22 +18,22 @@ from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.arm.model.srdf_edit import with_pairs
 from gemelo.libraries.arm.model.urdf_edit import with_collisions
-from gemelo.services.collision_fitting import cuts
-from gemelo.services.collision_fitting.excess import SHARE, depth_in, depths
-from gemelo.services.collision_fitting.fit_writing import HULLS, touching_states, write_fits
-from gemelo.services.collision_fitting.fitted_shape import Fitted, FittedKind
-from gemelo.services.collision_fitting.fitting import fitted
-from gemelo.services.collision_fitting.hull import smallest_ball
-from gemelo.services.collision_fitting.link_meshes import visual_mesh
-from gemelo.services.collision_fitting.mesh_fit import fit_links, usual_bound
-from gemelo.services.collision_fitting.mesh_part import MeshPart
-from gemelo.services.collision_fitting.mesh_surface import MeshSurface
-from gemelo.services.collision_fitting.parts import shapes_around
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision_geometry.coal_shapes import is_inside
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.collision_geometry.shapes import ShapeKind, TriangleMesh
 from gemelo.tools.cli.robot_folder import plan_of
+from gemelo.tools.collision_fitting import cuts
+from gemelo.tools.collision_fitting.excess import SHARE, depth_in, depths
+from gemelo.tools.collision_fitting.fit_writing import HULLS, touching_states, write_fits
+from gemelo.tools.collision_fitting.fitted_shape import Fitted, FittedKind
+from gemelo.tools.collision_fitting.fitting import fitted
+from gemelo.tools.collision_fitting.hull import smallest_ball
+from gemelo.tools.collision_fitting.link_meshes import visual_mesh
+from gemelo.tools.collision_fitting.mesh_fit import fit_links, usual_bound
+from gemelo.tools.collision_fitting.mesh_part import MeshPart
+from gemelo.tools.collision_fitting.mesh_surface import MeshSurface
+from gemelo.tools.collision_fitting.parts import shapes_around
 from tests.profiles import examples
 
 URDF = Path(__file__).parents[2] / "urdf"

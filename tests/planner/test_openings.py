@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from gemelo.services.collision_fitting import mesh_fit
-from gemelo.services.collision_fitting.excess import SHARE, depth_in, excess_of
-from gemelo.services.collision_fitting.mesh_surface import MeshSurface
-from gemelo.services.collision_fitting.openings import closed
-from gemelo.services.collision_fitting.parts import shapes_around
 from gemelo.services.planner.collision_geometry.coal_shapes import is_inside
 from gemelo.services.planner.collision_geometry.shapes import TriangleMesh
 from gemelo.tools.bench.fit_quality import heavy_part
+from gemelo.tools.collision_fitting import mesh_fit
+from gemelo.tools.collision_fitting.excess import SHARE, depth_in, excess_of
+from gemelo.tools.collision_fitting.mesh_surface import MeshSurface
+from gemelo.tools.collision_fitting.openings import closed
+from gemelo.tools.collision_fitting.parts import shapes_around
 
 WITHIN = 0.005
 
@@ -108,7 +108,7 @@ def test_links_are_fitted_alike_by_one_process_and_by_several(alone: float, monk
 
 FORKED = """
 import numpy as np
-from gemelo.services.collision_fitting import mesh_fit
+from gemelo.tools.collision_fitting import mesh_fit
 from tests.planner.test_openings import as_mesh, cup
 mesh_fit.ALONE["fork"] = 0.0
 wanted = [(name, as_mesh(cup(sections)), mesh_fit.WITHIN, 4) for name, sections in (("a", 24), ("b", 32))]

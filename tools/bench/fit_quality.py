@@ -24,11 +24,11 @@ from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanRequest
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
-from gemelo.services.collision_fitting.fit_writing import write_fits
-from gemelo.services.collision_fitting.mesh_fit import LinkFit, fit_links
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
 from gemelo.tools.bench.figures import Figure, FigureGoal, of_samples
+from gemelo.tools.collision_fitting.fit_writing import write_fits
+from gemelo.tools.collision_fitting.mesh_fit import LinkFit, fit_links
 
 PROBLEMS, SEED = 8, 6
 ALLOWED = 1.0  # [s] for a plan

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from gemelo.libraries.arm.checks.findings import Finding
     from gemelo.libraries.arm.kinematics.collision_matrix import LinkPairData
 
-FIT = "gemelo.services.collision_fitting.main"  # in a process of its own: the command line loads no planner
+FIT = "gemelo.tools.collision_fitting.main"  # in a process of its own: the command line loads no planner
 BULGE = 0.005  # [m] that a sphere may reach beyond its link
 MOST = 40  # shapes of a link
 FIT_EXAMPLES = """examples:

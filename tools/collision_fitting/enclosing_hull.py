@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from gemelo.libraries.arm.model.urdf import Origin
-from gemelo.services.collision_fitting.fitted_shape import Fitted, FittedKind
-from gemelo.services.collision_fitting.hull import corners_and_sides
+from gemelo.tools.collision_fitting.fitted_shape import Fitted, FittedKind
+from gemelo.tools.collision_fitting.hull import corners_and_sides
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.libraries.arm.model.urdf import Origin, Triple
-from gemelo.services.collision_fitting.fitted_shape import Fitted, FittedKind
-from gemelo.services.collision_fitting.hull import corners_and_sides, smallest_ball, smallest_rectangle
 from gemelo.services.planner.collision_geometry.shapes import matrix_of
+from gemelo.tools.collision_fitting.fitted_shape import Fitted, FittedKind
+from gemelo.tools.collision_fitting.hull import corners_and_sides, smallest_ball, smallest_rectangle
 
 Array = NDArray[np.float64]
 

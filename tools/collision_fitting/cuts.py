@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from gemelo.services.collision_fitting.fitting import axes_of, spread
-from gemelo.services.collision_fitting.mesh_part import MeshPart
+from gemelo.tools.collision_fitting.fitting import axes_of, spread
+from gemelo.tools.collision_fitting.mesh_part import MeshPart
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]

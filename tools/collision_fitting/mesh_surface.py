@@ -10,9 +10,9 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gemelo.services.collision_fitting.openings import closed, places_numbered
 from gemelo.services.planner.collision_geometry.coal_shapes import is_inside, tree_of
 from gemelo.services.planner.collision_geometry.shapes import TriangleMesh
+from gemelo.tools.collision_fitting.openings import closed, places_numbered
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]

@@ -14,11 +14,11 @@ from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.arm.model.urdf import Triple
 from gemelo.libraries.arm.model.urdf_edit import with_collisions
-from gemelo.services.collision_fitting.excess import depth_in
-from gemelo.services.collision_fitting.link_meshes import HULLS
-from gemelo.services.collision_fitting.mesh_fit import LinkFit
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
+from gemelo.tools.collision_fitting.excess import depth_in
+from gemelo.tools.collision_fitting.link_meshes import HULLS
+from gemelo.tools.collision_fitting.mesh_fit import LinkFit
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 OUTSIDE = 1e-6  # [m] that a corner may be outside the shapes as they are loaded again: a rounding

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.collision_fitting.clipping import clipped, common_corners, heights_of
-from gemelo.services.collision_fitting.enclosing_hull import enclosing_hull
-from gemelo.services.collision_fitting.excess import SHARE, ShapeSurface, depth_in
-from gemelo.services.collision_fitting.fitted_shape import Fitted
-from gemelo.services.collision_fitting.fitting import fitted
-from gemelo.services.collision_fitting.hull import corners_and_sides
-from gemelo.services.collision_fitting.mesh_surface import MeshSurface
+from gemelo.tools.collision_fitting.clipping import clipped, common_corners, heights_of
+from gemelo.tools.collision_fitting.enclosing_hull import enclosing_hull
+from gemelo.tools.collision_fitting.excess import SHARE, ShapeSurface, depth_in
+from gemelo.tools.collision_fitting.fitted_shape import Fitted
+from gemelo.tools.collision_fitting.fitting import fitted
+from gemelo.tools.collision_fitting.hull import corners_and_sides
+from gemelo.tools.collision_fitting.mesh_surface import MeshSurface
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]

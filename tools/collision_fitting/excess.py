@@ -11,10 +11,10 @@ import trimesh
 from numpy.typing import NDArray
 
 from gemelo.libraries.arm.model.urdf import Triple
-from gemelo.services.collision_fitting.fitted_shape import Fitted
-from gemelo.services.collision_fitting.mesh_surface import MeshSurface
 from gemelo.services.planner.collision_geometry.link_shapes import solid_of
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
+from gemelo.tools.collision_fitting.fitted_shape import Fitted
+from gemelo.tools.collision_fitting.mesh_surface import MeshSurface
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -16,7 +16,7 @@ from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.native.sphere_cover import BULGE, link_cover
 
 if TYPE_CHECKING:
-    from gemelo.services.collision_fitting.mesh_fit import LinkFit
+    from gemelo.tools.collision_fitting.mesh_fit import LinkFit
 
 
 def report(folder: Path, bulge: float = BULGE) -> str:
@@ -34,8 +34,8 @@ def fit_meshes(folder: Path, within: float | None, most: int, only: Sequence[str
     """What is fitted to each link, to within so many [m] or what is usual, and its elements for the URDF, or that they
     are written."""
     # Not above: trimesh takes half a second.
-    from gemelo.services.collision_fitting.fit_writing import elements_of, touching_states, write_fits
-    from gemelo.services.collision_fitting.mesh_fit import beyond_bound, fit_links
+    from gemelo.tools.collision_fitting.fit_writing import elements_of, touching_states, write_fits
+    from gemelo.tools.collision_fitting.mesh_fit import beyond_bound, fit_links
 
     arm = load_arm(folder)
     fits = fit_links(arm, within, most, only, lambda said: print(said, file=sys.stderr, flush=True))

@@ -12,11 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.services.collision_fitting.cuts import best_cut
-from gemelo.services.collision_fitting.excess import SHARE, outer_places
-from gemelo.services.collision_fitting.fitted_shape import Fitted
-from gemelo.services.collision_fitting.mesh_part import MeshPart
-from gemelo.services.collision_fitting.mesh_surface import MeshSurface
+from gemelo.tools.collision_fitting.cuts import best_cut
+from gemelo.tools.collision_fitting.excess import SHARE, outer_places
+from gemelo.tools.collision_fitting.fitted_shape import Fitted
+from gemelo.tools.collision_fitting.mesh_part import MeshPart
+from gemelo.tools.collision_fitting.mesh_surface import MeshSurface
 
 Array = NDArray[np.float64]
 

@@ -16,12 +16,12 @@ import numpy as np
 
 from gemelo.libraries.arm.errors import DescriptionError, suggestion
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.services.collision_fitting.excess import SHARE, Excess, excess_of
-from gemelo.services.collision_fitting.fitted_shape import Fitted
-from gemelo.services.collision_fitting.link_meshes import link_mesh
-from gemelo.services.collision_fitting.mesh_surface import MeshSurface
-from gemelo.services.collision_fitting.parts import shapes_around
 from gemelo.services.planner.collision_geometry.shapes import TriangleMesh
+from gemelo.tools.collision_fitting.excess import SHARE, Excess, excess_of
+from gemelo.tools.collision_fitting.fitted_shape import Fitted
+from gemelo.tools.collision_fitting.link_meshes import link_mesh
+from gemelo.tools.collision_fitting.mesh_surface import MeshSurface
+from gemelo.tools.collision_fitting.parts import shapes_around
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 WITHIN = 0.005  # [m] of the mesh, where `SHARE` of the shapes' outer surface is to be
