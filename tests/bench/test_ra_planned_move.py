@@ -6,7 +6,7 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanRequest
 from gemelo.services.planner.core import Planner
-from gemelo.services.virtual_arm.sketch_arm import SketchArm, ra_arm
+from gemelo.tools.virtual_arm.sketch_arm import SketchArm, ra_arm
 
 
 def test_a_planned_move_and_back_arrive_at_the_shaft_to_the_step() -> None:

@@ -10,8 +10,8 @@ from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.planning import JointGoal, PlanRequest
 from gemelo.services.planner.core import Planner
-from gemelo.services.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire
 from gemelo.tools.bench.virtual_time import Tally, swinging
+from gemelo.tools.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 PLANNER = Planner(ARM)

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
 from gemelo.tools.cli.ra_intake import RaIntake, RefusedMessage
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.profiles import examples
 
 STANDS = (0, 0, 0)

@@ -6,7 +6,7 @@ import pytest
 
 from gemelo.firmware.platform.host.board import DeviceClock
 from gemelo.schemas.actions import GoalStatusCode
-from gemelo.services.virtual_arm.virtual_arm import BOOTED, VirtualArm, VirtualWire
+from gemelo.tools.virtual_arm.virtual_arm import BOOTED, VirtualArm, VirtualWire
 from tests.stepper_gateway.harness import move
 
 

@@ -16,10 +16,10 @@ from gemelo.services.stepper_gateway.inputs import BeganInput, LinkInput, StepIn
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.outputs import Publish
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
-from gemelo.services.virtual_arm.virtual_arm import UNIX, rm1
 from gemelo.tools.replay.main import replay, text_of
 from gemelo.tools.replay.recorded import NotReplayable
 from gemelo.tools.replay.stepper_gateway import EARLIER, OUTSIDE
+from gemelo.tools.virtual_arm.virtual_arm import UNIX, rm1
 from tests.replay.conftest import Messages
 
 PERIOD = 0.02  # [s]

@@ -11,7 +11,7 @@ from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
 from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
 from gemelo.services.stepper_gateway.motion.paths import profile
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 
 ROOT = Path(__file__).resolve().parents[2]
 

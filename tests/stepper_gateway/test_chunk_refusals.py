@@ -6,7 +6,7 @@ import pytest
 
 from gemelo.services.stepper_gateway.links.frames import NO_JOINT, Ack, Code
 from gemelo.services.stepper_gateway.motion.stream import refusal
-from gemelo.services.virtual_arm.virtual_arm import rm1
+from gemelo.tools.virtual_arm.virtual_arm import rm1
 
 
 def refused(code: int, joint: int = 1) -> str:

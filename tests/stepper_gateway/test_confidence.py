@@ -23,7 +23,7 @@ from gemelo.services.stepper_gateway.ledger.confidence import (
 )
 from gemelo.services.stepper_gateway.ledger.joint_watch import WATCHED, JointSample, JointWatch
 from gemelo.services.stepper_gateway.ledger.tool_error import CERTAIN, bounds, tool_shift
-from gemelo.services.virtual_arm.virtual_arm import rm1
+from gemelo.tools.virtual_arm.virtual_arm import rm1
 
 NOW = 1_800_000_000_000_000_000  # [ns]
 SECOND = 1_000_000_000

@@ -11,9 +11,9 @@ from gemelo.schemas.device import DeviceMode, DeviceState
 from gemelo.services.panel.model.availability import OF_THE_HOLDER, other_holder, reasons
 from gemelo.services.panel.model.readings import Readings
 from gemelo.services.panel.words.words import Words
-from gemelo.services.virtual_arm.virtual_arm import rm1
 from gemelo.services.visualizer.content.panel import PanelInputs, panel
 from gemelo.tools.cli.state import control_text, snapshot, text_of
+from gemelo.tools.virtual_arm.virtual_arm import rm1
 
 HELD = ControlState(held=True, name="ana `x`", node="cli-1", host="desk", members=("cli-1",))
 IDLE = DeviceState(mode=DeviceMode.IDLE, armed=True, referenced=(True, True, True), name=rm1().joint_names)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import types
 
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import move
 
 PLACES = ((0.0, 0.0, 0.0), (0.2, 0.1, 0.02), (0.1, 0.25, 0.01))

@@ -37,8 +37,8 @@ from gemelo.services.stepper_gateway.inputs import (
 )
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
-from gemelo.services.virtual_arm.gateway_driver import MotionCaller
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
+from gemelo.tools.virtual_arm.gateway_driver import MotionCaller
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.stepper_gateway.harness import move
 
 WAYS: dict[str, Any] = {  # of the core's methods: the input that stands for a call

@@ -13,7 +13,7 @@ from gemelo.schemas.device_config import config_crc, config_text
 from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATUS
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import move
 
 HOME = (0.0, 0.0, 0.0)

@@ -26,8 +26,8 @@ from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import CONTROL
 from gemelo.services.stepper_gateway.control.control import MOST_MEMBERS
-from gemelo.services.virtual_arm.gateway_driver import MotionCaller
-from gemelo.services.virtual_arm.virtual_arm import GatewayParameters, VirtualArm
+from gemelo.tools.virtual_arm.gateway_driver import MotionCaller
+from gemelo.tools.virtual_arm.virtual_arm import GatewayParameters, VirtualArm
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 

@@ -15,8 +15,8 @@ from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.topics import DEVICE_STATUS
 from gemelo.services.stepper_gateway.links.frames import Code, CommandReply, decode
 from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind
-from gemelo.services.virtual_arm.gateway_driver import asked
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
+from gemelo.tools.virtual_arm.gateway_driver import asked
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 from tests.profiles import examples
 from tests.stepper_gateway.harness import move
 

@@ -7,7 +7,7 @@ import pytest
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceMode
 from gemelo.services.stepper_gateway.links.link import TO_DEVICE
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import move
 
 HOME, READY = (0.0, 0.0, 0.0), (0.6, -1.2, 0.08)

@@ -14,7 +14,7 @@ from gemelo.schemas.deployment import MqttSection
 from gemelo.services.stepper_gateway.links.foreign.ra_link import RaLink
 from gemelo.services.stepper_gateway.links.mqtt import MqttLink
 from gemelo.services.stepper_gateway.links.serial import SerialLink
-from gemelo.services.virtual_arm.virtual_arm import rm1
+from gemelo.tools.virtual_arm.virtual_arm import rm1
 from tests.descriptors import few_descriptors
 from tests.runtime.support import until
 from tests.stepper_gateway.processes import Processes

@@ -12,7 +12,7 @@ from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.topics import DEVICE_STATUS, JOINT_STATES
 from gemelo.services.stepper_gateway.links.frames import Ack, CommandReply, StateFrame, SyncReply, encode
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 

@@ -13,7 +13,7 @@ from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.topics import COMMANDS, JOINT_STATES
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import assert_within_limits, move
 from tests.stepper_gateway.test_gateway_moves import HOME, READY, expected_steps
 

@@ -19,7 +19,7 @@ from gemelo.schemas.message import encode as encode_message
 from gemelo.schemas.topics import JOINT_STATES
 from gemelo.services.stepper_gateway.links.frames import SyncReply, decode, encode
 from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, Kind
-from gemelo.services.virtual_arm.virtual_arm import BOOTED, GATEWAY_ZERO, VirtualArm
+from gemelo.tools.virtual_arm.virtual_arm import BOOTED, GATEWAY_ZERO, VirtualArm
 from tests.stepper_gateway.harness import move
 
 HOME = (0.0, 0.0, 0.0)

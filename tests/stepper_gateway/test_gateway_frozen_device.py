@@ -9,7 +9,7 @@ from gemelo.schemas.device import DeviceCommandKind, DeviceMode
 from gemelo.schemas.topics import DEVICE_STATE, JOINT_STATES
 from gemelo.services.stepper_gateway.links.frames import CommandFrame, decode
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)

@@ -24,8 +24,8 @@ from gemelo.schemas.device import (
 from gemelo.schemas.message import BadMessage, decode
 from gemelo.schemas.topics import JOINT_STATES
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.gateway_driver import asked
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.tools.virtual_arm.gateway_driver import asked
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import ROOT, assert_within_limits, move
 
 ARM, DISARM, HOME = DeviceCommandKind.ARM, DeviceCommandKind.DISARM, DeviceCommandKind.HOME

@@ -11,7 +11,7 @@ from gemelo.schemas.device import DeviceMode, InjectKind, InjectRequest
 from gemelo.services.stepper_gateway.device.injection_handler import target_of
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.processes import Processes
 from tests.stepper_gateway.wired import WiredGateway
 

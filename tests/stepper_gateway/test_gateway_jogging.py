@@ -13,7 +13,7 @@ from gemelo.schemas.topics import DEVICE_EVENTS, JOINT_STATES
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.jog.jog import PERIOD, Jog
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 CALM = ("boot", "armed", "hold", "connected", "accepted", "started", "finished", "stopped")

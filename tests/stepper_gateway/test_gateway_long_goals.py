@@ -12,7 +12,7 @@ from gemelo.schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointT
 from gemelo.services.stepper_gateway.input_log import InputLog
 from gemelo.services.stepper_gateway.inputs import BeganInput, GoalInput, unpacked
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 
 
 def wave(points: int, arm: VirtualArm, with_velocities: bool) -> FollowJointTrajectoryGoal:

@@ -19,7 +19,7 @@ from gemelo.services.stepper_gateway.goals.goal_validator import GoalValidator
 from gemelo.services.stepper_gateway.links.frames import StateFrame
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)

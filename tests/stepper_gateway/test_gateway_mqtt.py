@@ -22,7 +22,7 @@ from gemelo.schemas.motion import FollowErrorCode
 from gemelo.services.stepper_gateway.links.frames import Chunk, CommandFrame, decode
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.links.mqtt import MqttLink
-from gemelo.services.virtual_arm.virtual_arm import rm1
+from gemelo.tools.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.processes import BROKER, DEVICE, Processes, free_port
 from tests.stepper_gateway.wired import WiredGateway, plain
 

@@ -16,7 +16,7 @@ from gemelo.schemas.motion import (
 from gemelo.schemas.topics import DEVICE_STATE, JOINT_STATES
 from gemelo.services.stepper_gateway.device.clock import ENOUGH, ClockSync
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)

@@ -26,7 +26,7 @@ from gemelo.services.stepper_gateway.motion.paths import (
     join_path,
     profile,
 )
-from gemelo.services.virtual_arm.virtual_arm import rm1
+from gemelo.tools.virtual_arm.virtual_arm import rm1
 from tests.profiles import examples
 from tests.stepper_gateway.harness import ROOT, move
 

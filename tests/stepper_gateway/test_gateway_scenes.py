@@ -9,7 +9,7 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from gemelo.schemas.scene import PlanningScene
 from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import move
 
 HOME, THERE = (0.0, 0.0, 0.0), (0.1, -0.2, 0.01)

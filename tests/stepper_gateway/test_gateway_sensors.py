@@ -8,7 +8,7 @@ import pytest
 
 from gemelo.schemas.topics import DEVICE_SHAFT, SENSORS
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 
 
 def warnings(rig: VirtualArm) -> list[str]:

@@ -14,8 +14,8 @@ from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.schemas.topics import JOINT_STATES
-from gemelo.services.virtual_arm.gateway_driver import asked
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
+from gemelo.tools.virtual_arm.gateway_driver import asked
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 

@@ -11,7 +11,7 @@ from gemelo.services.stepper_gateway.device.pending_commands import MOST_TICKETS
 from gemelo.services.stepper_gateway.links.frames import CommandFrame, decode
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.moment import Moment
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import assert_within_limits, move
 
 ZERO = (0.0, 0.0, 0.0)

@@ -23,7 +23,7 @@ from gemelo.services.stepper_gateway.links.frames import (
     encode,
 )
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import move
 
 HOME = (0.0, 0.0, 0.0)

@@ -16,7 +16,7 @@ from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DEVICE_EVENTS, JOINT_STATES
 from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
 from gemelo.services.stepper_gateway.motion.target_tracker import TargetTracker
-from gemelo.services.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
+from gemelo.tools.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 

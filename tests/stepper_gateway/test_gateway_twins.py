@@ -11,8 +11,8 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceMode, StopKind
 from gemelo.services.stepper_gateway.links.frames import Ack, Code, decode
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.gateway_driver import GatewayDriver, Moment
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, Moment
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.profiles import examples
 from tests.stepper_gateway.harness import move
 

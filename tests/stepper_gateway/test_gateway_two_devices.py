@@ -13,7 +13,7 @@ from gemelo.schemas.device import DeviceStatus, StopKind
 from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.topics import DEVICE_STATUS
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.virtual_arm import BOOT_ID, VirtualArm, rm1
+from gemelo.tools.virtual_arm.virtual_arm import BOOT_ID, VirtualArm, rm1
 from tests.stepper_gateway.harness import move
 
 HOME, READY = (0.0, 0.0, 0.0), (0.6, -1.2, 0.08)

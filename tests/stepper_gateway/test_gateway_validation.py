@@ -21,7 +21,7 @@ from gemelo.services.stepper_gateway.goals.goal_validator import GoalValidator, 
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected
 from gemelo.services.stepper_gateway.motion.knots import Knot
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
-from gemelo.services.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
+from gemelo.tools.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
 from tests.table import table

@@ -15,7 +15,7 @@ from gemelo.schemas.message import BadMessage, encode
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.services.stepper_gateway.goals.goal_reading import read_goal
 from gemelo.services.stepper_gateway.goals.pieces import PIECE, Pieces
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.test_gateway_long_goals import wave
 
 POINTS = 20_000

@@ -19,7 +19,7 @@ from gemelo.schemas.device import DeviceCommandKind, InjectKind, InjectRequest, 
 from gemelo.schemas.gripper import GripperCommandGoal, GripperState
 from gemelo.schemas.robot import ServoGripper
 from gemelo.schemas.topics import GRIPPER_STATE
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.profiles import examples
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -21,7 +21,7 @@ from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.outputs import SendFrame
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
-from gemelo.services.virtual_arm.virtual_arm import rm1
+from gemelo.tools.virtual_arm.virtual_arm import rm1
 
 BEGAN = BeganInput(7, GatewayParameters())
 

@@ -9,10 +9,10 @@ from xml.etree import ElementTree
 import pytest
 
 from gemelo.schemas.device import EchoResponse
-from gemelo.services.virtual_arm.gateway_driver import GatewayDriver
-from gemelo.services.virtual_arm.sketch_arm import SketchArm
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 from gemelo.tools.cli.link_bench import plot, result_of, text_of, write_csv
+from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver
+from gemelo.tools.virtual_arm.sketch_arm import SketchArm
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 
 
 def echo(arm: GatewayDriver, ticket: int = 1) -> EchoResponse:

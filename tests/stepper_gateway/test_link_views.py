@@ -10,10 +10,10 @@ from gemelo.schemas.device import DeviceState, DeviceStatus
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, rm1
 from gemelo.services.visualizer.content.panel import PanelInputs, panel
 from gemelo.tools.cli import device_status, doctor, state
 from gemelo.tools.cli.device_snapshot import device_snapshot
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.test_gateway_twins import Twins
 from tests.stepper_gateway.test_gateway_two_devices import TwoDevices
 

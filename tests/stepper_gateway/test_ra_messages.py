@@ -26,7 +26,7 @@ from gemelo.services.stepper_gateway.links.foreign.ra_messages import (
     read_states,
 )
 from gemelo.services.stepper_gateway.links.foreign.ra_sender import RaSender
-from gemelo.services.virtual_arm.sketch_arm import ra_arm
+from gemelo.tools.virtual_arm.sketch_arm import ra_arm
 from tests.stepper_gateway.harness import ROOT
 
 RAMPS = tuple(ramp_of(joint.drive) for joint in ra_arm().joints)

@@ -12,8 +12,8 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode, OutputCommand, StopKind
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import JointTrajectory
-from gemelo.services.virtual_arm.sketch_arm import SketchArm, ra_arm
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm
+from gemelo.tools.virtual_arm.sketch_arm import SketchArm, ra_arm
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import move
 
 HOME = (0.0, 0.0, 0.0)

@@ -19,9 +19,9 @@ from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile, read_
 from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
 from gemelo.services.stepper_gateway.ledger.step_ledger import KEEP_EVERY, KEEP_SOON
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.sketch_arm import SketchArm
-from gemelo.services.virtual_arm.virtual_arm import BOOTED, VirtualArm, rm1
 from gemelo.tools.bench.stopping import smooth_move
+from gemelo.tools.virtual_arm.sketch_arm import SketchArm
+from gemelo.tools.virtual_arm.virtual_arm import BOOTED, VirtualArm, rm1
 from tests.runtime.support import until
 from tests.stepper_gateway.harness import ROOT, move
 from tests.stepper_gateway.test_ra_sketch import HOME as AT_HOME

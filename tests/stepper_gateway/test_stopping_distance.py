@@ -10,10 +10,10 @@ from gemelo.schemas.device import DeviceCommandKind, DeviceMode
 from gemelo.schemas.ledger import StoppingDistance
 from gemelo.schemas.topics import STOPPING_DISTANCE
 from gemelo.services.stepper_gateway.motion.stopping import MARGIN, segment, stop_on
-from gemelo.services.virtual_arm.sketch_arm import SketchArm
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm
 from gemelo.tools.bench.figures import quantile
 from gemelo.tools.bench.stopping import MOST_CAREFUL, NEAR, lost_in_motion
+from gemelo.tools.virtual_arm.sketch_arm import SketchArm
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import move
 
 HOLDS = range(5000, 5050)  # seeds

@@ -23,7 +23,7 @@ from gemelo.services.stepper_gateway.links.foreign.text_exchange import RETRIES,
 from gemelo.services.stepper_gateway.links.foreign.text_link import TextLink
 from gemelo.services.stepper_gateway.links.foreign.text_messages import AnswerReader, LineAnswer, line_of, read_answer
 from gemelo.services.stepper_gateway.main import baud_of, open_device
-from gemelo.services.virtual_arm.virtual_arm import rm1
+from gemelo.tools.virtual_arm.virtual_arm import rm1
 from tests.profiles import examples
 from tests.stepper_gateway.dialects import robot_with
 from tests.stepper_gateway.processes import DEVICE, Processes

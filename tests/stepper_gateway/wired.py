@@ -13,8 +13,8 @@ from gemelo.libraries.mqtt.access import BrokerAccess
 from gemelo.schemas.device import InjectRequest, InjectResponse
 from gemelo.services.stepper_gateway.links.link import Link
 from gemelo.services.stepper_gateway.links.mqtt import MqttLink
-from gemelo.services.virtual_arm.gateway_driver import GatewayDriver, Kind, Moment
-from gemelo.services.virtual_arm.virtual_arm import rm1
+from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, Kind, Moment
+from gemelo.tools.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.harness import move
 
 

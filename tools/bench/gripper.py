@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, tcp_wire
 from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from gemelo.tools.bench.scenes import rm1
 from gemelo.tools.bench.virtual_time import until
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, tcp_wire
 
 TRIES = 40
 REACTION_GOAL = FigureGoal(p99=10.0)  # [ms] the slowest frame of the wire, 8 ms, and two slots

@@ -21,12 +21,12 @@ from msgspec.structs import replace
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.robot import Motor
 from gemelo.schemas.topics import STEP_LEDGER
-from gemelo.services.virtual_arm.gateway_driver import Kind
-from gemelo.services.virtual_arm.virtual_arm import BOOTED, PERIOD, VirtualArm
 from gemelo.tools.bench.figures import Figure, rounded
 from gemelo.tools.bench.scenes import rm1
 from gemelo.tools.bench.stopping import random_place, smooth_move
 from gemelo.tools.cli.text_table import table
+from gemelo.tools.virtual_arm.gateway_driver import Kind
+from gemelo.tools.virtual_arm.virtual_arm import BOOTED, PERIOD, VirtualArm
 
 MOVES = 10_000
 QUICK = 300  # moves of `make bench`

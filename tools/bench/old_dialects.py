@@ -34,9 +34,9 @@ from gemelo.services.stepper_gateway.links.foreign.ra_messages import joints_mes
 from gemelo.services.stepper_gateway.links.foreign.text_exchange import TextExchange
 from gemelo.services.stepper_gateway.links.foreign.text_messages import AnswerReader, line_of
 from gemelo.services.stepper_gateway.links.serial_port import open_port
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, tcp_wire
 from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
 from gemelo.tools.bench.scenes import rm1
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, tcp_wire
 
 MESSAGES = 10_000
 LARGEST_MOVE = 20_000  # [steps] more than a turn of rm1's first joint

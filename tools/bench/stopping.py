@@ -22,10 +22,10 @@ from gemelo.schemas.ledger import StoppingDistance
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
 from gemelo.schemas.topics import STOPPING_DISTANCE
-from gemelo.services.virtual_arm.gateway_driver import asked
-from gemelo.services.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 from gemelo.tools.bench.figures import Figure, NotMeasured, quantile, rounded
 from gemelo.tools.bench.scenes import rm1
+from gemelo.tools.virtual_arm.gateway_driver import asked
+from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 
 HOLDS = 1000
 QUICK = 100  # holds of `make bench`

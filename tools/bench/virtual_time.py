@@ -11,9 +11,9 @@ from gemelo.schemas.device import CommandAck, CommandChunk, DeviceMode
 from gemelo.schemas.message import Message
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.services.stepper_gateway.device.clock import ClockSync
-from gemelo.services.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire
 from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, quantile
 from gemelo.tools.bench.scenes import rm1
+from gemelo.tools.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire
 
 CHUNKS = 45_000
 SECONDS = 60.0  # of one goal; one after another until all chunks are sent

@@ -20,7 +20,7 @@ from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.device_config import DeviceConfig
 from gemelo.schemas.message import Message, Vector
 from gemelo.schemas.robot import Motor
-from gemelo.services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Kind, Moment
+from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Kind, Moment
 
 UNIX = 1_700_000_000_000_000_000  # [ns] at the start of virtual time
 GATEWAY_ZERO = 1000.0  # [s] of the gateway's monotonic clock at the start

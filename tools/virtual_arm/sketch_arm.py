@@ -17,8 +17,8 @@ from gemelo.schemas.robot import Dialect
 from gemelo.services.stepper_gateway.links.foreign import ra_messages
 from gemelo.services.stepper_gateway.links.foreign.ra_device import RaDevice
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Moment
-from gemelo.services.virtual_arm.virtual_arm import GATEWAY_ZERO, UNIX, rm1
+from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Moment
+from gemelo.tools.virtual_arm.virtual_arm import GATEWAY_ZERO, UNIX, rm1
 
 PERIOD = 0.02  # [s] of the gateway's loop
 STEP = 0.005  # [s] of virtual time
