@@ -114,7 +114,7 @@ def test_a_laptop_without_a_certificate_keeps_others_from_joining_only_without_t
     joining = own | {f"GEMELO_ROUTER_{name}": value for name, value in shown.items()}
     listening = own | {"GEMELO_ROUTER_CONFIGURATION": str(tmp_path / "router.json5"), "GEMELO_ROUTER_INSECURE": "true"}
     stranger = ("-m", "tests.runtime.stranger")
-    router = wire.start(wire.router, sys.executable, "-m", "gemelo.libraries.runtime.router", **listening)
+    router = wire.start(wire.router, sys.executable, "-m", "gemelo.services.router.main", **listening)
     knocks = joins = held = None
     try:
         assert until(lambda: (tmp_path / "run/router.ready").exists(), 20.0)

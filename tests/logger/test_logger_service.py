@@ -349,7 +349,7 @@ def process(module, environment, *arguments):
 def test_kill_9_of_the_service_leaves_a_file_that_can_be_read(environment, deployment, tmp_path):
     run_folder = tmp_path / "run"
     with (
-        process("gemelo.libraries.runtime.router", environment),
+        process("gemelo.services.router.main", environment),
         process("gemelo.services.logger.main", environment) as logger,
     ):
         wait_for(lambda: (run_folder / "logger.ready").exists())
@@ -382,7 +382,7 @@ def recorded_events(records):
 
 def test_sigterm_ends_it_with_a_finished_file(environment, deployment, tmp_path):
     with (
-        process("gemelo.libraries.runtime.router", environment),
+        process("gemelo.services.router.main", environment),
         process("gemelo.services.logger.main", environment) as logger,
     ):
         wait_for(lambda: (tmp_path / "run" / "logger.ready").exists(), HANGS)

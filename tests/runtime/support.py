@@ -72,7 +72,7 @@ class RouterProcess:
         self.start()
 
     def start(self) -> None:
-        command = [sys.executable, "-m", "gemelo.libraries.runtime.router"]
+        command = [sys.executable, "-m", "gemelo.services.router.main"]
         if os.environ.get(ZENOHD):
             command = zenohd(self.port, self.folder, self.environ.get("GEMELO_ROUTER_CONFIGURATION", ""))
         self.process = subprocess.Popen(command, cwd=ROOT, env=self.environ, stderr=subprocess.PIPE, text=True)

@@ -160,7 +160,7 @@ def a_day_is_short(module: str, log: Path, **environ: str) -> Iterator[Path]:
 def test_a_router_that_runs_says_it_again(lock: Lock, tmp_path: Path) -> None:
     port = free_port()
     settings = {"GEMELO_ROUTER_CONFIGURATION": str(lock.write_router(port)), "GEMELO_PATHS_RUN": str(tmp_path / "run")}
-    with a_day_is_short("gemelo.libraries.runtime.router", tmp_path / "log", **settings) as log:
+    with a_day_is_short("gemelo.services.router.main", tmp_path / "log", **settings) as log:
         assert until(lambda: log.read_text().count(f"router.pem {TOLD}") >= 2, 20.0), log.read_text()
 
 

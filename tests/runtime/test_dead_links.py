@@ -112,7 +112,7 @@ def far(tmp_path_factory) -> Iterator[tuple[Ethernet, dict[str, Far]]]:
     with ExitStack() as closing:
         hosts = closing.enter_context(Hosts(SITE, ethernet))
         server = closing.enter_context(subprocess.Popen(
-            hosts.command("router", sys.executable, "-m", "gemelo.libraries.runtime.router"), cwd=ROOT,
+            hosts.command("router", sys.executable, "-m", "gemelo.services.router.main"), cwd=ROOT,
             env=os.environ | paths | {f"GEMELO_ROUTER_{name}": value for name, value in own.items()},
         ))  # fmt: skip
         closing.callback(server.kill)

@@ -52,7 +52,7 @@ def test_make_up_names_every_open_port_that_others_reach(tmp_path, section, host
 
 @pytest.mark.parametrize(
     ("module", "section", "more"),
-    [("gemelo.libraries.runtime.router", "router", {}), ("gemelo.services.broker.main", "mqtt", {}),
+    [("gemelo.services.router.main", "router", {}), ("gemelo.services.broker.main", "mqtt", {}),
      ("gemelo.services.visualizer.viewer", "viewer", {"mode": "web"})],
 )  # fmt: skip
 def test_each_process_refuses_by_itself(tmp_path, module, section, more):
@@ -66,7 +66,7 @@ def test_each_process_refuses_by_itself(tmp_path, module, section, more):
 
 def test_an_insecure_router_starts_and_says_so(tmp_path):
     file = deployment_file(tmp_path, "router", listen_host=OPEN, port=free_port(), insecure=True)
-    command = [sys.executable, "-m", "gemelo.libraries.runtime.router", "--config", str(file)]
+    command = [sys.executable, "-m", "gemelo.services.router.main", "--config", str(file)]
     process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
     assert until((tmp_path / "run/router.ready").exists, 60.0)
     process.terminate()

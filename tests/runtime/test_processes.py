@@ -358,7 +358,7 @@ def test_the_router_stops_cleanly_and_says_when_its_port_is_taken(tmp_path: Path
     own = RouterProcess(tmp_path)
     ready = tmp_path / "run" / "router.ready"
     assert until(ready.exists)
-    command = [sys.executable, "-m", "gemelo.libraries.runtime.router"]
+    command = [sys.executable, "-m", "gemelo.services.router.main"]
     second = subprocess.run(command, cwd=ROOT, env=own.environ, capture_output=True, text=True, timeout=5.0)
     assert second.returncode == 1
     assert f"port {own.port} on 127.0.0.1 is taken by " in second.stderr

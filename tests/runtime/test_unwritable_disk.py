@@ -156,7 +156,7 @@ def started(process: str, folder: Path) -> Iterator[tuple[subprocess.Popen[bytes
         "GEMELO_MQTT_BROKER": broker or "embedded",
         "GEMELO_PATHS_RUN": str(folder),
     }
-    module = "gemelo.libraries.runtime.router" if name == "router" else "gemelo.services.broker.main"
+    module = "gemelo.services.router.main" if name == "router" else "gemelo.services.broker.main"
     running = subprocess.Popen([sys.executable, "-m", module], cwd=project_root(), env=environ)
     try:
         yield running, name, port

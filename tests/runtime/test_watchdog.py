@@ -32,7 +32,7 @@ def systemd(tmp_path, monkeypatch) -> Iterator[socket.socket]:
 
 def test_a_router_is_ready_beats_and_falls_silent_when_it_is_frozen(systemd, tmp_path):
     environ = os.environ | {"GEMELO_ROUTER_PORT": str(free_port()), "GEMELO_PATHS_RUN": str(tmp_path / "run")}
-    process = subprocess.Popen([sys.executable, "-m", "gemelo.libraries.runtime.router"], cwd=ROOT, env=environ)
+    process = subprocess.Popen([sys.executable, "-m", "gemelo.services.router.main"], cwd=ROOT, env=environ)
     try:
         assert systemd.recv(100) == b"READY=1\nSTATUS=ready"
         assert systemd.recv(100) == ALIVE

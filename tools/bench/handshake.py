@@ -69,7 +69,7 @@ def _router(folder: Path, port: int, more: Mapping[str, str]) -> Iterator[None]:
     """A router as a process of its own; raises `NotMeasured` where it does not start."""
     paths = {"GEMELO_PATHS_RUN": str(folder / "run"), "GEMELO_PATHS_OUT": str(folder / "out")}
     environment = os.environ | paths | {"GEMELO_ROUTER_PORT": str(port)} | dict(more)
-    command = [sys.executable, "-m", "gemelo.libraries.runtime.router"]
+    command = [sys.executable, "-m", "gemelo.services.router.main"]
     process = subprocess.Popen(command, cwd=project_root(), env=environment, stderr=subprocess.DEVNULL)
     try:
         end = time.monotonic() + READY

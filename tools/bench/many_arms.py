@@ -102,8 +102,7 @@ class ArmsOnOneRouter:
             self._closing = opened
             run = self._folder / "run"
             self._common = [
-                self._start(module, run)
-                for module in ("gemelo.libraries.runtime.router", "gemelo.services.broker.main")
+                self._start(module, run) for module in ("gemelo.services.router.main", "gemelo.services.broker.main")
             ]
             _wait(lambda: all((run / f"{name}.ready").exists() for name in ("router", "broker")), "router and broker")
             self._bus = opened.enter_context(closing(ZenohBus(RouterSection(port=self._router_port), "")))

@@ -1,0 +1,1 @@
+"""The Zenoh router of a local run."""
