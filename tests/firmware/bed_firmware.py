@@ -90,7 +90,7 @@ class Bed:
         before = self.status.get("boot_id")
         settings = {"MQTT_PORT": str(self.port), "PATHS_RUN": str(self.folder / "run"), "ROBOT": self._robot}
         environ = os.environ | {f"GEMELO_{key}": value for key, value in settings.items()}
-        command = [sys.executable, "-m", "gemelo.firmware.platform.host.main", *arguments]
+        command = [sys.executable, "-m", "gemelo.services.virtual_esp32.main", *arguments]
         with open(self.folder / "device.log", "ab") as log:
             self.process = subprocess.Popen(command, cwd=ROOT, env=environ, stdout=log, stderr=log)
         wait_for(lambda: self.status.get("online") is True and self.status["boot_id"] != before, "the device's status")

@@ -83,7 +83,7 @@ def test_where_no_slot_can_be_started_the_process_ends_with_one_sentence_and_a_r
         board.boot()
     assert remedy in str(error.value)
     ended = subprocess.run(
-        [sys.executable, "-m", "gemelo.firmware.platform.host.main"], cwd=ROOT, capture_output=True, text=True,
+        [sys.executable, "-m", "gemelo.services.virtual_esp32.main"], cwd=ROOT, capture_output=True, text=True,
         check=False, timeout=60.0, env={**os.environ, "GEMELO_PATHS_RUN": str(tmp_path / "run")},
     )  # fmt: skip
     assert ended.returncode == 1

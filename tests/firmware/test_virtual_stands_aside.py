@@ -17,7 +17,7 @@ def test_beside_a_board_the_virtual_device_stands_aside(tmp_path):
         environment = os.environ | {
             "GEMELO_DEVICE": "board", "GEMELO_MQTT_PORT": port, "GEMELO_PATHS_RUN": str(tmp_path),
         }  # fmt: skip
-        command = [sys.executable, "-m", "gemelo.firmware.platform.host.main"]
+        command = [sys.executable, "-m", "gemelo.services.virtual_esp32.main"]
         with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as process:
             deadline = time.monotonic() + 20.0
             while not (tmp_path / "virtual_esp32.ready").exists():

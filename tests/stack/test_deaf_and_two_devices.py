@@ -110,7 +110,7 @@ def test_a_forgotten_second_device_is_named_and_nothing_moves_until_it_is_gone(s
     site.moves_again()
     environment = {**site.stack.environment, "GEMELO_PATHS_RUN": str(tmp_path / "run")}
     second = subprocess.Popen(
-        [sys.executable, "-m", "gemelo.firmware.platform.host.main"], cwd=site.stack.root, env=environment,
+        [sys.executable, "-m", "gemelo.services.virtual_esp32.main"], cwd=site.stack.root, env=environment,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     try:

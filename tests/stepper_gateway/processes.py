@@ -16,7 +16,7 @@ from tests.optional import need
 from tests.stepper_gateway.harness import ROOT
 
 BROKER = "gemelo.services.broker.main"
-DEVICE = "gemelo.firmware.platform.host.main"
+DEVICE = "gemelo.services.virtual_esp32.main"
 
 
 def free_port() -> int:
