@@ -16,7 +16,7 @@ from gemelo.api.simulation import SimulatedArm
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.topics import DEVICE_SHAFT
 from gemelo.tools.cli import simulated
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 
 NUMBERS = itertools.count(2)

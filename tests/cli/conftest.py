@@ -42,7 +42,7 @@ from gemelo.schemas.topics import (
     STEP_ERRORS,
 )
 from gemelo.services.planner.core import Planner
-from gemelo.tools.cli.session import CommandSession
+from gemelo.tools.cli.common.session import CommandSession
 from tests.runtime.support import RouterProcess, spinning
 
 MOVE_TIME = 0.4  # [s] that every goal takes here

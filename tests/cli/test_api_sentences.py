@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from gemelo.tools.cli.errors import CommandError, ExitCode, in_commands
-from gemelo.tools.cli.home import home
-from gemelo.tools.cli.session import load_robot, reported
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands
+from gemelo.tools.cli.common.session import load_robot, reported
+from gemelo.tools.cli.motion.home import home
 from tests.table import table
 
 GEMELO = Path(__file__).parents[2] / "gemelo"

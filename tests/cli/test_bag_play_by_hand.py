@@ -19,7 +19,7 @@ from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DESCRIPTION, Delivery, Topic
 from gemelo.services.state_publisher.main import describe
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.runtime.support import ROOT, spinning, until
 

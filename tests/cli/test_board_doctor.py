@@ -10,9 +10,9 @@ import msgspec
 import pytest
 
 from gemelo.libraries.runtime.serial_frames import JsonFrame, json_frame, packet
-from gemelo.tools.cli import board_doctor
-from gemelo.tools.cli.board_doctor import MeasuredArrivals, diagnose
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
+from gemelo.tools.cli.device import board_doctor
+from gemelo.tools.cli.device.board_doctor import MeasuredArrivals, diagnose
 from gemelo.tools.cli.main import run
 
 ROM = b"ets Jul 29 2019 12:21:46\r\n\r\nrst:0x1 (POWERON_RESET),boot:0x13 (SPI_FAST_FLASH_BOOT)\r\n"

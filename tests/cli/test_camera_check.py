@@ -13,8 +13,8 @@ import pytest
 
 from gemelo import Pose, Seen
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
-from gemelo.tools.cli import camera_check
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.camera import camera_check
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 
 ROOT = Path(__file__).parents[2]

@@ -31,10 +31,10 @@ from gemelo.tools.bench.vision.mount_images import (
     tag_on_level_tool,
 )
 from gemelo.tools.bench.vision.mounting import tool_error
-from gemelo.tools.cli import camera_poses
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.camera import camera_poses
+from gemelo.tools.cli.common.errors import ExitCode
+from gemelo.tools.cli.common.session import reported
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.session import reported
 
 ROOT = Path(__file__).parents[2]
 

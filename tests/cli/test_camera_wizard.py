@@ -32,10 +32,10 @@ from gemelo.services.camera.virtual.virtual_camera import VirtualCamera
 from gemelo.services.camera.virtual.world import CameraWorld
 from gemelo.tools.bench.vision import images
 from gemelo.tools.bench.vision.images import Surface, render
-from gemelo.tools.cli import camera_mount
-from gemelo.tools.cli.camera_boards import CHESS_BOARD, TAG_BOARD, tag_board
-from gemelo.tools.cli.camera_calibrate import take
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.camera import camera_mount
+from gemelo.tools.cli.camera.camera_boards import CHESS_BOARD, TAG_BOARD, tag_board
+from gemelo.tools.cli.camera.camera_calibrate import take
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 
 BOARD_AT = np.array([0.28, -0.02, 0.0])  # [m] of the board with tags on the table

@@ -28,7 +28,7 @@ from gemelo.schemas.topics import DESCRIPTION, JOINT_STATES, Delivery, Topic
 from gemelo.services.state_publisher.main import describe
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.program.rerun_program import rerun_binary
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.runtime.support import spinning, until
 

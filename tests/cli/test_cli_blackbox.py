@@ -11,7 +11,7 @@ import pytest
 from gemelo.libraries.recordings.incidents import Happening, Incident, IncidentKind, is_saving, saving_mark
 from gemelo.libraries.recordings.mcap_file import McapFile
 from gemelo.services.logger.black_box import SavingMark, write_black_box
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 
 SECOND = 1_000_000_000

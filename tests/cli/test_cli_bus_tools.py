@@ -46,23 +46,22 @@ from gemelo.schemas.topics import (
     Delivery,
     Topic,
 )
-from gemelo.tools.cli import (
+from gemelo.tools.cli.bus import (
     action_watch,
     interface,
     living_topics,
     node_parameters,
     request,
-    tf,
-    top,
     topic,
     topic_ends,
     topic_rates,
 )
-from gemelo.tools.cli.errors import CommandError, ExitCode
-from gemelo.tools.cli.field_path import FieldPath, leaves
-from gemelo.tools.cli.forms import csv_lines, json_line, yaml_document
+from gemelo.tools.cli.bus.field_path import FieldPath, leaves
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.forms import csv_lines, json_line, yaml_document
+from gemelo.tools.cli.common.session import CommandSession
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.session import CommandSession
+from gemelo.tools.cli.watch import tf, top
 from tests.runtime.support import hear, spinning
 
 WHOLE = FieldPath(FrameTransform, "")

@@ -18,10 +18,10 @@ from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.camera import CameraCondition, CameraImage, CameraInfo, CameraStatus
 from gemelo.schemas.detections import Detection, Detections
 from gemelo.schemas.topics import camera_detections, camera_image, camera_info, camera_status
-from gemelo.tools.cli import camera
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.camera import camera
+from gemelo.tools.cli.common.errors import ExitCode
+from gemelo.tools.cli.common.session import CommandSession
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.session import CommandSession
 from tests.runtime.support import free_port
 
 PICTURE = cv2.imencode(".jpg", np.full((48, 64, 3), 60, np.uint8))[1].tobytes()

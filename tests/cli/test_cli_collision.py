@@ -9,7 +9,7 @@ import pytest
 
 from gemelo.libraries.arm.model.srdf_edit import entries
 from gemelo.libraries.arm.model.urdf import read_urdf
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 
 

@@ -9,10 +9,10 @@ import pytest
 import yaml
 
 from gemelo.schemas.topics import JOINT_TARGETS, TOPICS
-from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.bus.messages import message_of
+from gemelo.tools.cli.bus.topic import topic_of
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.messages import message_of
-from gemelo.tools.cli.topic import topic_of
 from tests.table import table
 
 
@@ -143,7 +143,7 @@ def test_bash_takes_the_completion():
 
 
 def test_a_goal_may_come_from_a_file(tmp_path):
-    from gemelo.tools.cli.action import goal_text
+    from gemelo.tools.cli.bus.action import goal_text
 
     path = tmp_path / "goal.json"
     path.write_text(json.dumps({"goal_time_tolerance": 1.0}))

@@ -24,12 +24,13 @@ from gemelo.schemas.device import (
     InjectRequest,
     StopKind,
 )
-from gemelo.tools.cli import device, device_config, device_monitor, device_status, stop_ready
-from gemelo.tools.cli.device_press import PRESSES, press, request_of
-from gemelo.tools.cli.errors import CommandError, ExitCode
-from gemelo.tools.cli.forms import csv_lines, json_line
-from gemelo.tools.cli.home import home
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.forms import csv_lines, json_line
+from gemelo.tools.cli.device import device, device_config, device_monitor, device_status
+from gemelo.tools.cli.device.device_press import PRESSES, press, request_of
 from gemelo.tools.cli.main import run
+from gemelo.tools.cli.motion import stop_ready
+from gemelo.tools.cli.motion.home import home
 from tests.cli.pretend_device import PretendDevice
 from tests.runtime.support import spinning
 
@@ -176,7 +177,7 @@ def test_sensors_are_a_table_with_units(session, rm1_device, capsys):
 
 
 def test_silent_sensors_are_an_error(session, rm1_device, monkeypatch):
-    from gemelo.tools.cli.device_snapshot import DeviceView
+    from gemelo.tools.cli.device.device_snapshot import DeviceView
 
     wait = DeviceView.wait_for
     monkeypatch.setattr(DeviceView, "wait_for", lambda view, is_enough, timeout=0.2: wait(view, is_enough, timeout))

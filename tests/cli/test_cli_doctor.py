@@ -20,9 +20,9 @@ from gemelo.libraries.runtime.deployment import when_silent
 from gemelo.schemas.device import DeviceState, DeviceStatus
 from gemelo.schemas.system import NodeInfo
 from gemelo.tools.chaos.descriptors import give_descriptors, take_descriptors
-from gemelo.tools.cli import doctor
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
+from gemelo.tools.cli.watch import doctor
 from tests.disks import WAYS, refusing_disk
 from tests.real_time import may_run_in_real_time
 from tests.stepper_gateway.locked import Mosquitto, external, locked

@@ -18,7 +18,7 @@ from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import ACTIONS, FRAMES, JOINT_STATES, REQUESTS, STATIC_FRAMES, TOPICS
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.runtime.support import spinning
 

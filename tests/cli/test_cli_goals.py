@@ -11,13 +11,13 @@ from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.device import ReferenceCommand
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
 from gemelo.schemas.planning import JointGoal, NamedGoal, PoseGoal, Refusal
-from gemelo.tools.cli.device import reference_request
-from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.bus.request_text import as_typed, refusal_text
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.units import parse_joints
+from gemelo.tools.cli.device.device import reference_request
 from gemelo.tools.cli.main import parse
-from gemelo.tools.cli.move_report import MoveReport, summary, tool_error
-from gemelo.tools.cli.move_request import goal_of, request_of
-from gemelo.tools.cli.request_text import as_typed, refusal_text
-from gemelo.tools.cli.units import parse_joints
+from gemelo.tools.cli.motion.move_report import MoveReport, summary, tool_error
+from gemelo.tools.cli.motion.move_request import goal_of, request_of
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 

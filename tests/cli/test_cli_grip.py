@@ -9,10 +9,10 @@ import pytest
 
 import gemelo
 from gemelo import Gripped
-from gemelo.tools.cli import grip
-from gemelo.tools.cli.errors import CommandError
-from gemelo.tools.cli.grip import opening
+from gemelo.tools.cli.common.errors import CommandError
 from gemelo.tools.cli.main import parse
+from gemelo.tools.cli.motion import grip
+from gemelo.tools.cli.motion.grip import opening
 
 
 def said(to: str) -> CommandError:

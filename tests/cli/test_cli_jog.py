@@ -18,11 +18,11 @@ from gemelo.libraries.runtime.bus.memory_bus import MemoryBus
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.planning import JogCommand, JogLimit, JogStatus
 from gemelo.schemas.topics import JOG, JOG_STATUS
-from gemelo.tools.cli.errors import CommandError, ExitCode
-from gemelo.tools.cli.jog import command_of, jog_by_hand, jog_for
-from gemelo.tools.cli.jog_keys import FASTER, FIRST_SPEED, HELD, TOOL_SPEED, JogKeys, keyboard
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.session import load_robot, reported
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.session import load_robot, reported
+from gemelo.tools.cli.motion.jog import command_of, jog_by_hand, jog_for
+from gemelo.tools.cli.motion.jog_keys import FASTER, FIRST_SPEED, HELD, TOOL_SPEED, JogKeys, keyboard
 
 TURN = JogCommand(name=("brazo_joint",), velocity=(0.2,))
 

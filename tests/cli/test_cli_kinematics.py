@@ -16,10 +16,10 @@ from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import FkRequest, IkRequest, PoseGoal
 from gemelo.schemas.topics import FK, IK
 from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
-from gemelo.tools.cli import kinematics
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
+from gemelo.tools.cli.common.session import load_robot, reported
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.session import load_robot, reported
+from gemelo.tools.cli.robot import kinematics
 
 
 @pytest.fixture

@@ -21,13 +21,15 @@ from gemelo.schemas.device import (
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, NamedGoal, PlanRequest, PoseGoal
 from gemelo.schemas.topics import JOINT_STATES, JOINT_TARGETS
-from gemelo.tools.cli import action, device, node, state, topic, topic_rates
-from gemelo.tools.cli.errors import CommandError, ExitCode
-from gemelo.tools.cli.field_path import FieldPath
-from gemelo.tools.cli.forms import yaml_document
-from gemelo.tools.cli.messages import message_of
-from gemelo.tools.cli.move import move
-from gemelo.tools.cli.terminal import Interrupt
+from gemelo.tools.cli.bus import action, node, topic, topic_rates
+from gemelo.tools.cli.bus.field_path import FieldPath
+from gemelo.tools.cli.bus.messages import message_of
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.forms import yaml_document
+from gemelo.tools.cli.common.terminal import Interrupt
+from gemelo.tools.cli.device import device
+from gemelo.tools.cli.motion.move import move
+from gemelo.tools.cli.watch import state
 
 READY = PlanRequest(goal=NamedGoal(name="ready"))
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from gemelo.schemas.device import DeviceMode, DeviceState
 from gemelo.schemas.joints import JointState
-from gemelo.tools.cli.messages import dump
-from gemelo.tools.cli.text_table import table
-from gemelo.tools.cli.topic_rates import RateWindow
+from gemelo.tools.cli.bus.messages import dump
+from gemelo.tools.cli.bus.topic_rates import RateWindow
+from gemelo.tools.cli.common.text_table import table
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | texts

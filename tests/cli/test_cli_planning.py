@@ -21,10 +21,10 @@ from gemelo.schemas.scene import SceneReplace, SceneRequest
 from gemelo.schemas.topics import PLAN, PLAN_PROGRESS, SCENE_EDIT
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.main import run
-from gemelo.tools.cli import move as move_module
-from gemelo.tools.cli.errors import CommandError, ExitCode
-from gemelo.tools.cli.move import move
-from gemelo.tools.cli.terminal import LiveBlock
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.terminal import LiveBlock
+from gemelo.tools.cli.motion import move as move_module
+from gemelo.tools.cli.motion.move import move
 from tests.planner.walled import WALLED, past_the_wall
 from tests.runtime.support import spinning
 

@@ -16,13 +16,13 @@ from gemelo.schemas.frames import FrameTransforms
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import JOINT_STATES, STEP_ERRORS, Delivery, Topic
-from gemelo.tools.cli import living_topics
-from gemelo.tools.cli.chart import ACROSS, BLANK, DOTS, DOWN, LABEL, ChartCurve, chart
-from gemelo.tools.cli.errors import CommandError, ExitCode
-from gemelo.tools.cli.field_path import FieldPath
+from gemelo.tools.cli.bus import living_topics
+from gemelo.tools.cli.bus.field_path import FieldPath
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.terminal import COLOUR, LiveBlock, cut
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.plot import Field, Plot, plot
-from gemelo.tools.cli.terminal import COLOUR, LiveBlock, cut
+from gemelo.tools.cli.watch.chart import ACROSS, BLANK, DOTS, DOWN, LABEL, ChartCurve, chart
+from gemelo.tools.cli.watch.plot import Field, Plot, plot
 from tests.runtime.support import spinning
 
 COLUMNS, ROWS = 60, 10

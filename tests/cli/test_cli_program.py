@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gemelo.programs import Go, Program
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 
 

@@ -29,11 +29,11 @@ from gemelo.schemas.scene_meshes import mesh_digest
 from gemelo.schemas.topics import JOINT_STATES, SCENE
 from gemelo.services.planner.scene.answer_log import AnswerLog
 from gemelo.services.planner.scene.scene_keeper import SceneKeeper
-from gemelo.tools.cli import scene as scene_module
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
+from gemelo.tools.cli.common.session import load_robot, reported
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.scene import attach_choices, pair_choices
-from gemelo.tools.cli.session import load_robot, reported
+from gemelo.tools.cli.robot import scene as scene_module
+from gemelo.tools.cli.robot.scene import attach_choices, pair_choices
 from tests.runtime.support import until
 
 Said = Callable[[str], ExitCode]

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.units import ANGLE, FAR, LENGTH, SHARE, SPEED, parse_joints, parse_quantity, show
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.units import ANGLE, FAR, LENGTH, SHARE, SPEED, parse_joints, parse_quantity, show
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import pytest
 
 from gemelo.libraries.arm.model import description
 from gemelo.tools.cli.commands import COMMANDS, GROUPS
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import parse, run
 from tests.table import table
 
@@ -95,18 +95,18 @@ def test_a_robot_that_cannot_be_read_still_completes_the_commands(monkeypatch, c
 @pytest.mark.parametrize(
     ("line", "absent"),
     [
-        (["--help"], ("msgspec", "numpy", "zenoh", "gemelo.tools.cli.move", "gemelo.tools.cli.topic")),
+        (["--help"], ("msgspec", "numpy", "zenoh", "gemelo.tools.cli.motion.move", "gemelo.tools.cli.bus.topic")),
         (
             ["topic", "list"],
             (
                 "numpy",
                 "zenoh",
                 "gemelo.libraries.arm.model.description",
-                "gemelo.tools.cli.move",
+                "gemelo.tools.cli.motion.move",
                 "gemelo.libraries.runtime.actions",
             ),
         ),
-        (["move", "--help"], ("numpy", "zenoh", "rich", "gemelo.tools.cli.jog")),
+        (["move", "--help"], ("numpy", "zenoh", "rich", "gemelo.tools.cli.motion.jog")),
     ],
 )
 def test_a_command_loads_nothing_that_it_does_not_use(line, absent):

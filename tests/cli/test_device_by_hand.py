@@ -11,7 +11,7 @@ import pytest
 import gemelo
 from gemelo.schemas.device import DeviceState
 from gemelo.schemas.topics import DEVICE_SHAFT, DEVICE_STATE
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from tests.simulated import TypedAt
 
 NEAR_ITS_SWITCHES = {

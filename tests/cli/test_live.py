@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from gemelo.tools.cli.terminal import LiveBlock
+from gemelo.tools.cli.common.terminal import LiveBlock
 
 
 def screen(written: str) -> list[str]:

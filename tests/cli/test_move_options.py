@@ -18,11 +18,11 @@ from gemelo.schemas.planning import (
     PoseGoal,
     WaypointGoal,
 )
-from gemelo.tools.cli.errors import CommandError
+from gemelo.tools.cli.common.errors import CommandError
 from gemelo.tools.cli.main import parse
-from gemelo.tools.cli.move import EXAMPLES
-from gemelo.tools.cli.move_report import MoveReport, summary
-from gemelo.tools.cli.move_request import request_from
+from gemelo.tools.cli.motion.move import EXAMPLES
+from gemelo.tools.cli.motion.move_report import MoveReport, summary
+from gemelo.tools.cli.motion.move_request import request_from
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 

@@ -9,18 +9,10 @@ from typing import NamedTuple
 import pytest
 
 from gemelo.libraries.arm.model.description import load_arm
-from gemelo.tools.cli import units
 from gemelo.tools.cli.commands import COMMANDS
-from gemelo.tools.cli.device import reference_request
-from gemelo.tools.cli.device_press import request_of
-from gemelo.tools.cli.errors import CommandError, ExitCode
-from gemelo.tools.cli.jog import command_of
-from gemelo.tools.cli.kinematics import ik_request
-from gemelo.tools.cli.main import parse
-from gemelo.tools.cli.move_request import request_from
-from gemelo.tools.cli.parser import Options, Parser, complete
-from gemelo.tools.cli.scene_object import object_of
-from gemelo.tools.cli.units import (
+from gemelo.tools.cli.common import units
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.units import (
     ACCELERATION,
     ANGLE,
     ANGULAR_SPEED,
@@ -32,6 +24,14 @@ from gemelo.tools.cli.units import (
     Quantity,
     parse_joints,
 )
+from gemelo.tools.cli.device.device import reference_request
+from gemelo.tools.cli.device.device_press import request_of
+from gemelo.tools.cli.main import parse
+from gemelo.tools.cli.motion.jog import command_of
+from gemelo.tools.cli.motion.move_request import request_from
+from gemelo.tools.cli.parser import Options, Parser, complete
+from gemelo.tools.cli.robot.kinematics import ik_request
+from gemelo.tools.cli.robot.scene_object import object_of
 from tests.table import table
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")

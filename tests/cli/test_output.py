@@ -14,12 +14,12 @@ import pytest
 from gemelo.libraries.runtime.process.logs import line_logger
 from gemelo.schemas.plain_text import escaped, escaped_but_colours
 from gemelo.schemas.system import LogLevel, LogRecord
-from gemelo.tools.cli.errors import ExitCode
-from gemelo.tools.cli.log import line_of
+from gemelo.tools.cli.bus.messages import dump
+from gemelo.tools.cli.common.errors import ExitCode
+from gemelo.tools.cli.common.output import EscapedStream, control, escaped_output, print_coloured
+from gemelo.tools.cli.common.terminal import LiveBlock
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.messages import dump
-from gemelo.tools.cli.output import EscapedStream, control, escaped_output, print_coloured
-from gemelo.tools.cli.terminal import LiveBlock
+from gemelo.tools.cli.watch.log import line_of
 
 CLIPBOARD = "\x1b]52;c;cm0gLXJmIH4=\x07"  # what a terminal puts into its clipboard
 ATTACKS = (

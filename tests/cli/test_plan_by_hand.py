@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import gemelo
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from tests.simulated import TypedAt
 
 

@@ -12,10 +12,10 @@ import pytest
 
 import gemelo
 from gemelo.schemas.planning import PlanResponse
-from gemelo.tools.cli import move
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
+from gemelo.tools.cli.common.session import load_robot, reported
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.session import load_robot, reported
+from gemelo.tools.cli.motion import move
 
 
 @pytest.fixture

@@ -14,9 +14,9 @@ import pytest
 
 from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
-from gemelo.tools.cli import provision as module
-from gemelo.tools.cli.credentials import CredentialsChange, certificate, password, private_key, require_sound
-from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.device import provision as module
+from gemelo.tools.cli.hosts.credentials import CredentialsChange, certificate, password, private_key, require_sound
 from gemelo.tools.cli.main import run
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.tools.cli.ra_intake import RaIntake, RefusedMessage
+from gemelo.tools.cli.device.ra_intake import RaIntake, RefusedMessage
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.profiles import examples
 

@@ -20,11 +20,11 @@ from gemelo.schemas.cell import CellTexts
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import CELL, JOINT_STATES
-from gemelo.tools.cli import doctor
-from gemelo.tools.cli.cells import cell_of
-from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.camera.cells import cell_of
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.session import load_robot
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.session import load_robot
+from gemelo.tools.cli.watch import doctor
 from tests.runtime.support import RouterProcess, spinning
 
 ROOT = project_root()

@@ -24,11 +24,11 @@ from gemelo.libraries.runtime.firmware_update import (
 )
 from gemelo.libraries.runtime.signatures import is_signed, make_key, sign
 from gemelo.schemas.device import DeviceCommandKind
-from gemelo.tools.cli import device_update, update_transfer
-from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.device import device_update, update_transfer
+from gemelo.tools.cli.device.provision import BAUD, open_line
+from gemelo.tools.cli.device.update_transfer import SerialWire, Transfer, await_status
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.provision import BAUD, open_line
-from gemelo.tools.cli.update_transfer import SerialWire, Transfer, await_status
 
 WHOLE: Callable[[int, bytes], list[bytes]] = lambda _, frame: [frame]  # noqa: E731
 

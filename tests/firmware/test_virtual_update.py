@@ -13,7 +13,7 @@ from gemelo.firmware.platform.host.flash import Flash, NetworkCredentials
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.libraries.runtime.signatures import make_key
 from gemelo.schemas.device import DeviceCommandKind
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 
 pytestmark = pytest.mark.full

@@ -31,10 +31,10 @@ from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.libraries.runtime.serial_frames import packet
 from gemelo.libraries.runtime.signatures import make_key
 from gemelo.schemas.device import DeviceCommandKind
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
+from gemelo.tools.cli.device.provision import BAUD, open_line
+from gemelo.tools.cli.device.update_transfer import SerialWire, UpdateStatus, UpdateWire, await_status
 from gemelo.tools.cli.main import run
-from gemelo.tools.cli.provision import BAUD, open_line
-from gemelo.tools.cli.update_transfer import SerialWire, UpdateStatus, UpdateWire, await_status
 
 ROOT = Path(__file__).resolve().parents[2]
 NEWER = "1.0.9"  # as long as the version that it replaces in the library's bytes

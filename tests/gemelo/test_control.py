@@ -37,7 +37,7 @@ from gemelo.services.stepper_gateway.inputs import BeganInput, unpacked
 from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
 from gemelo.services.stepper_gateway.shell import Shell
-from gemelo.tools.cli.control import describe
+from gemelo.tools.cli.motion.control import describe
 from tests.runtime.support import ROOT, spinning, until
 
 

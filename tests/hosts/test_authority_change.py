@@ -18,7 +18,7 @@ from gemelo.libraries.mqtt.access import tls_context
 from gemelo.libraries.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.deployment import Broker, MqttSection
-from gemelo.tools.cli.credentials import LONGEST_PEM
+from gemelo.tools.cli.hosts.credentials import LONGEST_PEM
 from gemelo.tools.cli.main import run
 from gemelo.tools.hosts.keys import authority_in, make_keys
 from tests.hosts.site_router import SiteRouter

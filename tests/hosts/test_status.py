@@ -16,7 +16,7 @@ from gemelo.schemas.device import DeviceStatus
 from gemelo.schemas.roles import SERVICES
 from gemelo.schemas.system import NodeInfo
 from gemelo.schemas.topics import DEVICE_STATUS
-from gemelo.tools.cli.deploy_status import summary
+from gemelo.tools.cli.hosts.deploy_status import summary
 from gemelo.tools.cli.main import run
 from gemelo.tools.hosts.checks import load_site
 from gemelo.tools.hosts.status import SeenNode, SeenRobot, ServiceState, is_well, site_status

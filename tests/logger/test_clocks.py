@@ -20,7 +20,7 @@ from gemelo.libraries.runtime.topics import Publisher
 from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.system import NodeInfo, NodeRecord, NodeStatistics, Parameter
 from gemelo.schemas.topics import STATISTICS
-from gemelo.tools.cli.bag import information
+from gemelo.tools.cli.recording.bag import information
 from tests.runtime.support import hear, spinning
 from tests.runtime.test_clock_offset import Skewed
 

@@ -8,7 +8,7 @@ import pytest
 from mcap.writer import CompressionType, Writer
 
 from gemelo.libraries.recordings.reader import BadRecording
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from gemelo.tools.replay.main import CANNOT
 from gemelo.tools.replay.main import main as replay

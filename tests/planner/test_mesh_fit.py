@@ -22,7 +22,7 @@ from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision_geometry.coal_shapes import is_inside
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.collision_geometry.shapes import ShapeKind, TriangleMesh
-from gemelo.tools.cli.robot_folder import plan_of
+from gemelo.tools.cli.robot.robot_folder import plan_of
 from gemelo.tools.collision_fitting import cuts
 from gemelo.tools.collision_fitting.excess import SHARE, depth_in, depths
 from gemelo.tools.collision_fitting.fit_writing import HULLS, touching_states, write_fits

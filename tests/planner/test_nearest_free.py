@@ -18,7 +18,7 @@ from gemelo.services.planner.core import Planner
 from gemelo.services.planner.jog.jog import PERIOD
 from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
 from gemelo.services.stepper_gateway.motion.target_tracker import TargetTracker
-from gemelo.tools.cli.jog import command_of
+from gemelo.tools.cli.motion.jog import command_of
 from tests.planner.jogging import Array, Jogged, arm_of, kinematics_of
 
 ARMS, KINDS = ("rm1", "parol6"), ("itself", "a post", "what it carries")

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from gemelo.libraries.arm.checks.findings import Severity
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.services.planner.trial import looking_the_same, trial
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.arm.editing import edit
 from tests.arm.plates import add_rigid_plates, add_turning_disc

@@ -9,7 +9,7 @@ from random import Random
 
 import pytest
 
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.robot_import.plain_arm import APART, LIMIT, LINKS, arm, body, boxes, hinge, hinges, meshed
 from tests.robot_import.test_owners_arm import sliding

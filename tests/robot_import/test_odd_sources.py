@@ -19,7 +19,7 @@ from gemelo.libraries.robot_import.mended import Mended
 from gemelo.libraries.robot_import.mending import mend
 from gemelo.libraries.robot_import.questions import Questions
 from gemelo.libraries.robot_import.source import find_source
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.robot_import.exports import LIMIT, joint, write
 

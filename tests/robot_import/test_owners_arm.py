@@ -18,7 +18,7 @@ from gemelo.libraries.robot_import.rigid_groups import MOST_PARTS
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import PlanRequest, PoseGoal
 from gemelo.services.planner.core import Planner
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.robot_import.plain_arm import LIMIT, arm, body, boxes, hinge, hinges, meshed, part, stl
 from tests.robot_import.test_what_restricts_motion import jaws, survey

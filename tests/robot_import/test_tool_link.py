@@ -8,7 +8,7 @@ import pytest
 
 from gemelo.libraries.arm.model.urdf import UrdfModel, urdf_of
 from gemelo.libraries.robot_import.tool_link import other_tools, tool_link
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.robot_import.exports import LIMIT, joint, link, mesh, write
 

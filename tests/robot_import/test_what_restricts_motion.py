@@ -15,7 +15,7 @@ from gemelo.libraries.arm.model.srdf_edit import entries
 from gemelo.libraries.robot_import.questions import Questions
 from gemelo.libraries.robot_import.source import find_source
 from gemelo.libraries.robot_import.survey import Survey, surveyed
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.robot_import.plain_arm import BOTH, LIMIT, arm, body, boxes, hinge, hinges, part
 

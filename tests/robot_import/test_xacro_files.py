@@ -9,7 +9,7 @@ import pytest
 
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.robot_import.source import find_source
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.robot_import.exports import joint
 

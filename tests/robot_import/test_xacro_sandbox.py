@@ -20,7 +20,7 @@ from gemelo.libraries.robot_import.source import find_source
 from gemelo.libraries.robot_import.xacro_sandbox.expressions import ExpressionRefused, Interpreter
 from gemelo.libraries.robot_import.xacro_sandbox.keeper import Confined, command, expand, namespaces
 from gemelo.libraries.robot_import.xacro_sandbox.symbols import functions, symbols
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.robot_import.test_xacro_files import xacro_file
 

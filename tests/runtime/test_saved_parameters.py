@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from gemelo.libraries.runtime.errors import RequestRefused
 from gemelo.libraries.runtime.saved_parameters import SavedParameters, toml
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.runtime.support import RouterProcess, programs
 

@@ -21,7 +21,7 @@ from gemelo.programs.reading import read_program
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.text_file import NotUtf8, decode_text
 from gemelo.services.state_publisher.main import describe
-from gemelo.tools.cli.plan_file import read_plan
+from gemelo.tools.cli.motion.plan_file import read_plan
 from gemelo.tools.hosts.site_file import read_site
 
 ROOT = Path(__file__).parents[2]

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 
 

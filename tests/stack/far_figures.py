@@ -24,7 +24,7 @@ from gemelo.tools.bench.figures import quantile
 from gemelo.tools.bench.handshake import joins
 from gemelo.tools.bench.latency import follow, sharp_start
 from gemelo.tools.bench.stack import Running, has_mosquitto
-from gemelo.tools.cli.text_table import table
+from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.hosts.checks import load_site
 from gemelo.tools.stack.stack import Stack
 from tests.stack.links import SITE

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.stack.stack import Stack
 
 LONGEST = 120.0  # [s] of one command

@@ -24,7 +24,7 @@ from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.tools.chaos.slots import SlotFile, steps_in, violations
-from gemelo.tools.cli.text_table import table
+from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.hosts.checks import load_site
 from gemelo.tools.hosts.layout import processes
 from tests.stack.ethernet import Ethernet

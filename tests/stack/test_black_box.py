@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 
 from gemelo.schemas.topics import STATISTICS
 from gemelo.services.visualizer.program.rerun_program import rerun_binary
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from tests.runtime.support import until
 from tests.stack.gemelo import gemelo
 

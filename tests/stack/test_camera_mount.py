@@ -18,7 +18,7 @@ from gemelo.libraries.vision.calibration.reprojection import Carrier
 from gemelo.libraries.vision.rigid import from_transform
 from gemelo.tools.bench.vision.mount_images import FIRST
 from gemelo.tools.bench.vision.mounting import tool_error
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.stack.stack import Stack
 from tests.stack.gemelo import gemelo
 

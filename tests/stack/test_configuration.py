@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.stack.stack import Stack
 from tests.optional import need
 from tests.stack.gemelo import gemelo

@@ -9,7 +9,7 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest
 from gemelo.schemas.topics import PLAN
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from gemelo.tools.stack.stack import Stack
 from tests.robot_import.exports import solidworks

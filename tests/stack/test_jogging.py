@@ -13,7 +13,7 @@ from gemelo.schemas.joints import JointState
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest
 from gemelo.schemas.topics import PLAN, STEP_ERRORS
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from tests.stack.gemelo import COMMAND, gemelo
 from tests.stack.person import jumps
 from tests.stack.typist import Typist

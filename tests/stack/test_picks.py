@@ -14,7 +14,7 @@ import gemelo
 from gemelo.programs import Go, Pick, Program, ProgramRun, RunStatus, check_program
 from gemelo.schemas.topics import camera_truth
 from gemelo.tools.bench.vision.picks import FLOOR, picks
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from tests.stack import gemelo as command
 
 BIN = (0.1, 0.3)  # [m] the place in rm1's sample cell

@@ -14,7 +14,7 @@ from gemelo.schemas.device import DeviceStopRequest
 from gemelo.schemas.topics import DEVICE_STOP
 from gemelo.tools.chaos.descriptors import give_descriptors, take_descriptors
 from gemelo.tools.chaos.small_disk import SmallDisk
-from gemelo.tools.cli.errors import ExitCode
+from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.stack.stack import Stack
 from tests.optional import need_mounts
 from tests.stack.gemelo import gemelo

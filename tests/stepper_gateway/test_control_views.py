@@ -12,7 +12,7 @@ from gemelo.services.panel.model.availability import OF_THE_HOLDER, other_holder
 from gemelo.services.panel.model.readings import Readings
 from gemelo.services.panel.words.words import Words
 from gemelo.services.visualizer.content.panel import PanelInputs, panel
-from gemelo.tools.cli.state import control_text, snapshot, text_of
+from gemelo.tools.cli.watch.state import control_text, snapshot, text_of
 from gemelo.tools.virtual_arm.virtual_arm import rm1
 
 HELD = ControlState(held=True, name="ana `x`", node="cli-1", host="desk", members=("cli-1",))

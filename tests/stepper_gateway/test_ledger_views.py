@@ -9,7 +9,7 @@ from gemelo.services.panel.model.readings import Readings
 from gemelo.services.panel.view.tabs.state import certainty, confidences
 from gemelo.services.panel.words.words import Words
 from gemelo.services.visualizer.content.panel import PanelInputs, panel
-from gemelo.tools.cli.state import JointLine, ledger_text, snapshot, stopping_text, text_of
+from gemelo.tools.cli.watch.state import JointLine, ledger_text, snapshot, stopping_text, text_of
 from gemelo.tools.virtual_arm.sketch_arm import SketchArm
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import move

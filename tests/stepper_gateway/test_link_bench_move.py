@@ -11,9 +11,9 @@ import pytest
 from gemelo.schemas.device import DeviceMode, EchoRequest, EchoResponse
 from gemelo.schemas.joints import JointState, JointTargets
 from gemelo.schemas.topics import DEVICE_ECHO, JOINT_STATES, JOINT_TARGETS
-from gemelo.tools.cli.errors import CommandError, ExitCode
-from gemelo.tools.cli.link_bench import SWING, measure, swinging
-from gemelo.tools.cli.session import CommandSession
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.session import CommandSession
+from gemelo.tools.cli.device.link_bench import SWING, measure, swinging
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.stepper_gateway.harness import assert_within_limits
 

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 from gemelo.schemas.device import EchoResponse
-from gemelo.tools.cli.link_bench import plot, result_of, text_of, write_csv
+from gemelo.tools.cli.device.link_bench import plot, result_of, text_of, write_csv
 from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver
 from gemelo.tools.virtual_arm.sketch_arm import SketchArm
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire

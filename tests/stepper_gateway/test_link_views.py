@@ -11,8 +11,9 @@ from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.visualizer.content.panel import PanelInputs, panel
-from gemelo.tools.cli import device_status, doctor, state
-from gemelo.tools.cli.device_snapshot import device_snapshot
+from gemelo.tools.cli.device import device_status
+from gemelo.tools.cli.device.device_snapshot import device_snapshot
+from gemelo.tools.cli.watch import doctor, state
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.test_gateway_twins import Twins
 from tests.stepper_gateway.test_gateway_two_devices import TwoDevices

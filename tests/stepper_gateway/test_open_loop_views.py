@@ -10,9 +10,9 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowJointTrajectoryResult
 from gemelo.services.panel.words.words import Words
 from gemelo.services.visualizer.content.panel import PanelInputs, panel
-from gemelo.tools.cli import device_status
-from gemelo.tools.cli.move_report import MoveReport, summary
-from gemelo.tools.cli.state import snapshot, text_of
+from gemelo.tools.cli.device import device_status
+from gemelo.tools.cli.motion.move_report import MoveReport, summary
+from gemelo.tools.cli.watch.state import snapshot, text_of
 from gemelo.tools.virtual_arm.sketch_arm import SketchArm
 from tests.stepper_gateway.harness import move
 from tests.stepper_gateway.test_ra_sketch import HOME

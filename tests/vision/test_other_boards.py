@@ -8,7 +8,7 @@ import pytest
 
 from gemelo.libraries.vision.boards import picture
 from gemelo.libraries.vision.other_boards import other_board, remedy
-from gemelo.tools.cli.camera_boards import CHESS_BOARD, TAG_BOARD
+from gemelo.tools.cli.camera.camera_boards import CHESS_BOARD, TAG_BOARD
 
 PAPER = 255
 

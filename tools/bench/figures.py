@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 import psutil
 
-from gemelo.tools.cli.text_table import table
+from gemelo.tools.cli.common.text_table import table
 
 
 class Figure(msgspec.Struct, frozen=True, kw_only=True):

@@ -24,7 +24,7 @@ from gemelo.schemas.topics import STEP_LEDGER
 from gemelo.tools.bench.figures import Figure, rounded
 from gemelo.tools.bench.scenes import rm1
 from gemelo.tools.bench.stopping import random_place, smooth_move
-from gemelo.tools.cli.text_table import table
+from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.virtual_arm.gateway_driver import Kind
 from gemelo.tools.virtual_arm.virtual_arm import BOOTED, PERIOD, VirtualArm
 

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from gemelo.tools.cli.commands import COMMANDS
-from gemelo.tools.cli.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.session import load_robot
 from gemelo.tools.cli.parser import Command, Options, Parser, complete
-from gemelo.tools.cli.session import load_robot
 
 if TYPE_CHECKING:
     from gemelo import Robot

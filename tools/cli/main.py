@@ -10,8 +10,8 @@ from typing import NoReturn
 
 from gemelo.libraries.runtime.process.leaving import end_process
 from gemelo.tools.cli.commands import COMMANDS, GROUPS
-from gemelo.tools.cli.errors import CommandError, ExitCode, unknown, usage
-from gemelo.tools.cli.output import escaped_output
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown, usage
+from gemelo.tools.cli.common.output import escaped_output
 from gemelo.tools.cli.parser import Options, build
 
 ABOUT = "The twin's command line: move the arm, and see everything that is said about it."

@@ -13,7 +13,7 @@ from difflib import get_close_matches
 from importlib import import_module
 from typing import Any, NamedTuple, NoReturn
 
-from gemelo.tools.cli.errors import ExitCode, nearest
+from gemelo.tools.cli.common.errors import ExitCode, nearest
 
 Options = argparse.Namespace
 Choices = Mapping[str, Iterable[str]]  # words that may follow, by the arguments so far (joined by a blank)

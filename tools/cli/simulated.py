@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 import gemelo
-from gemelo.tools.cli.errors import usage
+from gemelo.tools.cli.common.errors import usage
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot, SimulatedArm

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import msgspec
 
-from gemelo.tools.cli.text_table import table
+from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.demo.ledger import StepTotals
 
 # Half a step is what rounding to whole steps alone makes; the path itself is known to 1/256 step.

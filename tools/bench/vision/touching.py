@@ -27,7 +27,7 @@ from gemelo.services.camera.virtual.world import CameraWorld
 from gemelo.tools.bench.figures import Figure, of_samples, quantile
 from gemelo.tools.bench.scenes import rm1
 from gemelo.tools.bench.vision.mounting import tool_error
-from gemelo.tools.cli.camera_mount import ENOUGH_TAGS, IMAGES, TOUCHES
+from gemelo.tools.cli.camera.camera_mount import ENOUGH_TAGS, IMAGES, TOUCHES
 
 # Four samples a side: with two the edges of a board that lies along the rows of the image are drawn 0.3 px off.
 CAMERA = CameraRecord(

@@ -1,0 +1,1 @@
+"""Commands of topics, requests, actions, nodes and parameters."""

@@ -1,0 +1,116 @@
+"""`gemelo camera check`: points the tool above tags that a camera has located, and says where an error comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+import gemelo
+from gemelo.api.targets import FULL
+from gemelo.libraries.vision.calibration.accuracy import Accuracy, Budget, Cause, judge
+from gemelo.tools.cli.camera.camera_images import Subject, subject
+from gemelo.tools.cli.camera.camera_tip import ask_offset, step_floor, tip_length, tip_option
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands, usage
+from gemelo.tools.cli.common.session import connect_arm, load_robot
+from gemelo.tools.cli.common.units import LENGTH, parse_quantity
+from gemelo.tools.cli.parser import Options, Parser, positive_integer
+
+if TYPE_CHECKING:
+    from gemelo import Arm, Seen
+
+ABOVE = "10mm"
+MOST_TAGS = 6
+REMEDIES = {
+    Cause.NONE: "",
+    Cause.UNKNOWN: "check more tags, far apart: what they have in common says more",
+    Cause.MOUNT: "`gemelo camera mount`, and that nobody moves the camera",
+    Cause.SCALE: "measure the print's bar and the tags' edges (`size` in cell.toml), then `gemelo camera calibrate`",
+    Cause.ZERO: "`gemelo verify`, then its reference or home position in robot.toml",
+    Cause.ARM: "`gemelo verify`; play in the gears; the length of what points (`--tip`)",
+}
+DOWN = (0.0, 0.0, -1.0)
+
+
+class TagPointing(NamedTuple):
+    """One tag that was pointed at."""
+
+    seen: Seen
+    offset: tuple[float, float]  # [m] x and y of the base, tip minus tag
+    floor: float  # [m] how far the tool may be off by half a step of every joint
+
+
+def add_options(parser: Parser) -> None:
+    """Adds the camera, how high, how many, and what points."""
+    parser.add_argument("camera", metavar="CAMERA", nargs="?", default="", help="of the cell file; its first one")
+    parser.add_argument("--above", metavar="LENGTH", default=ABOVE, help=f"between tip and tag ({ABOVE})")
+    parser.add_argument("--tags", type=positive_integer, default=MOST_TAGS, metavar="N", help="at most (6)")
+    tip_option(parser)
+
+
+def run(options: Options) -> ExitCode:
+    """Points at one tag after the other, asks, and prints what was found; raises `CommandError`."""
+    camera = subject(options.camera)
+    above = parse_quantity(options.above, LENGTH, "--above")
+    if above < 0.004:
+        raise usage(f"--above {options.above} is less than 4 mm: a tip that near may touch")
+    robot = load_robot()
+    tip = tip_length(options.tip, robot)
+    with connect_arm(robot) as arm:
+        try:
+            pointings = [*_pointings(arm, camera, above + tip, options.tags)]
+        except gemelo.Error as error:
+            raise CommandError(in_commands(str(error))) from error
+    report(camera, pointings)
+    return ExitCode.OK
+
+
+def _pointings(arm: Arm, camera: Subject, height: float, most: int) -> Iterator[TagPointing]:
+    """Looks once, while the arm is out of the way, then points."""
+    with _in_scene(arm, camera.name) as seen:
+        tags = [each for each in seen if each.kind == "tag" and not each.trouble][:most]
+        if not tags:
+            trouble = next((f": {each.name}: {each.trouble}" for each in seen if each.trouble), "")
+            raise CommandError(f'camera "{camera.name}" sees no tag of the cell file that it can locate{trouble}')
+        for each in tags:
+            x, y, z = each.pose.position
+            if len(arm.joint_names) < FULL:
+                arm.move(position=(x, y, z + height))
+            else:
+                arm.move(position=(x, y, z + height), along=DOWN)
+            question = f"how far beside the middle of {each.name} is the tip, along x and y of the base?"
+            said = ask_offset(f"{question} `1.5mm -0.4mm`; Enter: not at all")
+            yield TagPointing(each, said, step_floor(arm))
+
+
+@contextmanager
+def _in_scene(arm: Arm, camera: str) -> Iterator[tuple[Seen, ...]]:
+    """What is seen, as boxes that the arm keeps away from until the block ends."""
+    before = set(arm.scene.objects)
+    try:
+        yield arm.detect(camera=camera, scene=True)
+    finally:
+        for name in set(arm.scene.objects) - before:
+            arm.scene.remove(name)
+
+
+def report(camera: Subject, pointings: list[TagPointing]) -> Accuracy:
+    """Prints each pointing, what was to be expected, and the cause with its remedy."""
+    for each in pointings:
+        x, y = (1e3 * value for value in each.offset)
+        print(f"{each.seen.name}: {x:+.1f} {y:+.1f} mm, step floor +-{1e3 * each.floor:.2f} mm")
+    mount = camera.measured.mount
+    budget = Budget(
+        camera=max(each.seen.sigma for each in pointings),
+        mount=mount.held_out if mount is not None else 0.0,
+        arm=max(each.floor for each in pointings),
+    )
+    measured = f"+-{1e3 * budget.mount:.2f} mm" if mount is not None else "never measured"
+    print(f"expected: camera +-{1e3 * budget.camera:.2f} mm, mount {measured}, arm +-{1e3 * budget.arm:.2f} mm")
+    points = np.array([each.seen.pose.position[:2] for each in pointings])
+    found = judge(points, np.array([each.offset for each in pointings]), budget)
+    remedy = REMEDIES[found.cause]
+    print(found.sentence + (f": {remedy}" if remedy else ""))
+    return found

@@ -1,0 +1,1 @@
+"""Sessions, output, units and errors, for all commands."""

@@ -1,0 +1,141 @@
+"""`gemelo device update`: a new firmware for a board, over MQTT or its serial line; and the key that signs it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.credentials.private_files import AccessError, require_private
+from gemelo.libraries.mqtt.access import gateway_access
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.firmware_update import ImageHeader, NoImage, read_header
+from gemelo.libraries.runtime.signatures import SignatureError, make_key, sign
+from gemelo.libraries.runtime.started import load_started
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.terminal import LiveBlock
+from gemelo.tools.cli.device.provision import BAUD, open_line
+from gemelo.tools.cli.device.update_transfer import (
+    SerialWire,
+    Transfer,
+    UpdateStatus,
+    UpdateWire,
+    await_status,
+    mqtt_wire,
+)
+from gemelo.tools.cli.parser import Options, Parser, positive_integer
+
+KEY = ".gemelo/update.key"
+TO_ANSWER = 6.0  # [s] until a device that is there has said status
+TRIAL = 30.0  # [s] that the new firmware has to say status; then the one before starts again
+TO_START = 15.0  # [s] that a board takes for that
+
+
+def add_options(parser: Parser) -> None:
+    """Adds the file, the wire and the key."""
+    parser.add_argument(
+        "file", nargs="?", type=Path, metavar="FILE", help="the image, as .pio/build/esp32/firmware.bin"
+    )
+    parser.add_argument("--serial", metavar="PORT", help="over this line, as /dev/ttyUSB0 [over the deployment's MQTT]")
+    parser.add_argument("--baud", type=positive_integer, default=BAUD, metavar="BAUD", help="921600 if not said")
+    parser.add_argument("--device", metavar="NAME", help="its name at the broker [that of the deployment's robot]")
+    parser.add_argument("--key", type=Path, metavar="FILE", help=f"the private key that signs [{KEY}]")
+    parser.add_argument("--make-key", action="store_true", help="make such a key instead, and its public one beside it")
+    parser.epilog = (
+        "The device checks the signature with the public key that `gemelo device provision --update-key` gave it over "
+        "its cable, takes the image only while it is disarmed, and goes back to the firmware before unless the new one "
+        f"says status within {TRIAL:g} s. A transfer that was cut off goes on where it ended.\n\n{parser.epilog}"
+    )
+
+
+def run(options: Options) -> ExitCode:
+    """Makes a key, or updates a device."""
+    key = options.key or project_root() / KEY
+    try:
+        if options.make_key:
+            return make(key)
+        if options.file is None:
+            raise usage("which file? the image that `pio run` has built, as .pio/build/esp32/firmware.bin")
+        image, header = read_image(options.file)
+        require_private(str(key))
+        signature = sign(key, image)
+    except SignatureError as error:
+        raise CommandError(str(error)) from error
+    except AccessError as error:
+        raise CommandError(f"{error}; `gemelo device update --make-key` makes a key") from error
+    print(f"{options.file}: {header.project} {header.version} for {header.chip}, {len(image)} bytes", flush=True)
+    with wire_of(options) as wire:
+        return update(wire, image, signature)
+
+
+def make(key: Path) -> ExitCode:
+    """Makes a pair and says what to do with it."""
+    if key.suffix == ".pub":
+        raise usage(f"--key {key}: .pub is the ending of the public key: give the private one another name")
+    public = key.with_suffix(".pub")
+    make_key(key, public)
+    print(f"{key}: the private key, for you alone; who has it can replace the firmware of your devices")
+    print(f"{public}: tell each device of it once: gemelo device provision --serial PORT --update-key {public}")
+    return ExitCode.OK
+
+
+def read_image(file: Path) -> tuple[bytes, ImageHeader]:
+    """The image and what it says of itself; raises `CommandError`."""
+    try:
+        image = file.read_bytes()
+        return image, read_header(image)
+    except OSError as error:
+        raise usage(f"cannot read {file}: {error.strerror}") from error
+    except NoImage as error:
+        raise usage(f"{file}: {error}") from error
+
+
+@contextmanager
+def wire_of(options: Options) -> Iterator[UpdateWire]:
+    """Yields the wire that was asked for; raises `CommandError`."""
+    if options.serial is not None:
+        with open_line(options.serial, options.baud) as line:
+            yield SerialWire(line)
+        return
+    deployment = load_started()
+    device = options.device or load_arm(project_root() / deployment.robot).device.name
+    try:
+        access = gateway_access(deployment.mqtt)
+    except AccessError as error:
+        raise CommandError(str(error)) from error
+    with mqtt_wire(access, device) as wire:
+        yield wire
+
+
+def update(wire: UpdateWire, image: bytes, signature: bytes) -> ExitCode:
+    """Brings the image there and waits for what becomes of it; raises `CommandError` unless it runs in the end."""
+    before = await_status(wire, TO_ANSWER, lambda _: True)
+    if before is None:
+        raise CommandError(
+            f"no device has said status in {TO_ANSWER:g} s: is it switched on, and --serial or --device the right one?"
+        )
+    if before.armed:
+        raise CommandError("the device is armed: `gemelo device disarm` first, the arm must be able to do without")
+    block = LiveBlock()
+    transfer = Transfer(wire, image, signature, lambda sent: block.draw(f"{100 * sent // len(image)} % sent"))
+    had = transfer.run(before.boot_id)
+    block.say(f"{f'{had} bytes were there already; ' if had else ''}all of it is there; the device starts anew")
+    after = await_status(wire, TRIAL + TO_START, lambda status: status.boot_id != before.boot_id)
+    return outcome(before, after)
+
+
+def outcome(before: UpdateStatus, after: UpdateStatus | None) -> ExitCode:
+    """Prints what runs now; raises `CommandError` if that is not the new firmware."""
+    if after is None:
+        raise CommandError(
+            f"no word from it for {TRIAL + TO_START:g} s; it goes back to firmware {before.firmware} by itself, then "
+            "`gemelo device status` shows it; else look at it over its cable: `gemelo device doctor --serial PORT`"
+        )
+    if after.slot == before.slot:
+        raise CommandError(
+            f"the new firmware did not say status within {TRIAL:g} s: the device has gone back to firmware "
+            f"{after.firmware} in {after.slot}"
+        )
+    print(f"it runs firmware {after.firmware} from {after.slot}; before it was {before.firmware} in {before.slot}")
+    return ExitCode.OK

@@ -1,0 +1,210 @@
+"""`gemelo device provision`: gives a board its networks over its serial line, without the stack."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+import msgspec
+
+from gemelo.libraries.runtime.serial_frames import (
+    JsonFrame,
+    PacketDecoder,
+    json_frame,
+    packet,
+    parse_json_frame,
+    sync_frame,
+)
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.terminal import confirm
+from gemelo.tools.cli.hosts.credentials import (
+    MQTT_DEVICE_PASSWORD,
+    MQTT_PASSWORD,
+    WIFI_PASSWORD,
+    CredentialsChange,
+    certificate,
+    password,
+    private_key,
+    require_sound,
+    update_key,
+)
+from gemelo.tools.cli.parser import Options, Parser, positive_integer
+
+T = TypeVar("T", bound=msgspec.Struct)
+
+BAUD = 921_600
+PATIENCE = 15.0  # [s] for a board to start and answer
+AGAIN = 2.0  # [s] between two tries
+TO_RESTART = 8.0  # [s] for the first message after it
+PASSWORDS = """Passwords are no arguments, because every user of a machine sees those: they are asked for, or taken from
+$GEMELO_WIFI_PASSWORD and $GEMELO_MQTT_DEVICE_PASSWORD (else $GEMELO_MQTT_PASSWORD), or read as lines of standard
+input, in this order."""
+
+
+def add_options(parser: Parser) -> None:
+    """Adds port, names, networks and --factory-reset."""
+    parser.add_argument("--serial", required=True, metavar="PORT", help="as /dev/ttyUSB0")
+    parser.add_argument("--baud", type=positive_integer, default=BAUD, metavar="BAUD", help="921600 if not said")
+    parser.add_argument("--device", metavar="NAME", help="its name: that of [device] in robot.toml")
+    parser.add_argument("--wifi-ssid", metavar="NAME", help="the network; its password is asked for")
+    parser.add_argument("--mqtt-uri", metavar="URI", help="as mqtt://host:1883, or mqtts://host:8883")
+    parser.add_argument("--mqtt-user", metavar="NAME", help="at the broker; its password is asked for")
+    parser.add_argument("--mqtt-ca", type=Path, metavar="FILE", help="the certificate that mqtts trusts, PEM")
+    parser.add_argument("--mqtt-cert", type=Path, metavar="FILE", help="its own certificate for mqtts, PEM")
+    parser.add_argument("--mqtt-key", type=Path, metavar="FILE", help="the key of that certificate, PEM, mode 600")
+    parser.add_argument(
+        "--update-key", type=Path, metavar="FILE", help="the public key of `gemelo device update --make-key`"
+    )
+    parser.add_argument(
+        "--serial-baud",
+        type=positive_integer,
+        metavar="BAUD",
+        help="of its serial line from now on, as 115200 for a driver of <SEQ,...>; then also [serial] baud",
+    )
+    parser.add_argument("--factory-reset", action="store_true", help="forget everything, configuration included")
+    parser.add_argument("-y", "--yes", action="store_true", help="do not ask before a factory reset")
+    parser.epilog = f"{PASSWORDS}\n\n{parser.epilog}"
+
+
+def run(options: Options) -> ExitCode:
+    """Provisions the board, or resets it to its factory state after asking."""
+    given = (
+        options.device, options.wifi_ssid, options.mqtt_uri, options.mqtt_user, options.mqtt_ca, options.mqtt_cert,
+        options.mqtt_key, options.update_key, options.serial_baud,
+    )  # fmt: skip
+
+    if options.factory_reset:
+        if any(each is not None for each in given):
+            raise usage("--factory-reset forgets everything: tell the device anew afterwards, in a command of its own")
+        confirm(f"The device at {options.serial} forgets its networks, passwords and configuration.", options.yes)
+        return provision(options.serial, options.baud, CredentialsChange(factory_reset=True))
+    wifi, mqtt = options.wifi_ssid, options.mqtt_user
+    credentials = CredentialsChange(
+        device=options.device,
+        wifi_ssid=wifi,
+        mqtt_uri=options.mqtt_uri,
+        mqtt_user=mqtt,
+        mqtt_ca=certificate(options.mqtt_ca),
+        mqtt_certificate=certificate(options.mqtt_cert, "--mqtt-cert"),
+        mqtt_key=private_key(options.mqtt_key),
+        update_key=update_key(options.update_key),
+        serial_baud=None if options.serial_baud is None else str(options.serial_baud),
+        wifi_password=None if wifi is None else password("Wi-Fi password", WIFI_PASSWORD, os.environ),
+        mqtt_password=None
+        if mqtt is None
+        else password("MQTT password", MQTT_PASSWORD, os.environ, MQTT_DEVICE_PASSWORD),
+    )
+    return provision(options.serial, options.baud, require_sound(credentials))
+
+
+class BoardLine(Protocol):
+    """A serial line; `read` waits a moment at most."""
+
+    def write(self, data: bytes, /) -> int | None: ...
+    def read(self, size: int = 1, /) -> bytes: ...
+
+
+class ProvisionAnswer(msgspec.Struct, frozen=True):
+    """The JSON of `provision/ack`."""
+
+    accepted: bool
+    reason: str = ""
+
+
+class BoardStatus(msgspec.Struct, frozen=True):
+    """The fields of the JSON of `status` that are printed."""
+
+    device: str = ""
+    firmware: str = ""
+
+
+def provision(port: str, baud: int, credentials: CredentialsChange) -> ExitCode:
+    """Sends the credentials and prints the answer; raises `CommandError` if the board refuses or is silent."""
+    with open_line(port, baud) as line:
+        exchange = BoardExchange(line)
+        answer = exchange.send(credentials.text())
+        if not answer.accepted:
+            raise CommandError(f"the device refused: {answer.reason or 'without a reason'}")
+        said = "everything forgotten" if credentials.factory_reset else f"taken: {credentials.summary()}"
+        print(f"{said}; the device starts anew", flush=True)
+        who = exchange.status()
+    if who is None:
+        print(f"no word from it for {TO_RESTART:g} s: look at `gemelo device status`, or at the port's own messages")
+    else:
+        print(f"it is back: {who.device or 'without a name'}, firmware {who.firmware}")
+    return ExitCode.OK
+
+
+class BoardExchange:
+    """The exchange of frames with one board."""
+
+    def __init__(self, line: BoardLine) -> None:
+        self._line = line
+        self._packets = PacketDecoder()
+
+    def send(self, text: bytes, patience: float = PATIENCE) -> ProvisionAnswer:
+        """Sends `text` until the board answers: opening the port may have restarted it.
+
+        Raises `CommandError` without an answer in `patience` [s].
+        """
+        ack = self._exchange(packet(json_frame(JsonFrame.PROVISION, text)), JsonFrame.PROVISION_ACK, patience, AGAIN)
+        if ack is None:
+            raise CommandError(
+                f"no answer in {patience:g} s: is it the right --serial port and --baud, and does gemelo's firmware "
+                "run there? `python -m serial.tools.list_ports` lists the ports"
+            )
+        return _decoded(ack, ProvisionAnswer)
+
+    def status(self, patience: float = TO_RESTART) -> BoardStatus | None:
+        """The board's status after its restart; None if it says nothing for `patience` [s]."""
+        status = self._exchange(packet(sync_frame(0)), JsonFrame.STATUS, patience, 1.0)
+        return None if status is None else _decoded(status, BoardStatus)
+
+    def _exchange(self, question: bytes, answer: JsonFrame, patience: float, again: float) -> bytes | None:
+        deadline, next_try = time.monotonic() + patience, 0.0
+        while (now := time.monotonic()) < deadline:
+            if now >= next_try:
+                self._line.write(question)
+                next_try = now + again
+            for frame in self._packets.feed(self._line.read(4096)):
+                found = parse_json_frame(frame)
+                if found is not None and found.kind is answer:
+                    return found.text
+        return None
+
+
+def _decoded(text: bytes, kind: type[T]) -> T:
+    try:
+        return msgspec.json.decode(text, type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise CommandError(f"the device answered what is no {kind.__name__}: {error}") from error
+
+
+@contextmanager
+def open_line(port: str, baud: int) -> Iterator[BoardLine]:
+    """Yields the port at `baud` [bit/s]; raises `CommandError` if it cannot be opened or fails.
+
+    Its control lines stay low: many boards reset by them.
+    """
+    import serial  # slow to load, for a line alone
+
+    try:
+        line = serial.Serial(None, baud, timeout=0.05, write_timeout=2.0, exclusive=True)
+        line.dtr = line.rts = False
+        line.port = port
+        line.open()
+    except (serial.SerialException, ValueError, OSError) as error:
+        raise CommandError(
+            f"cannot open {port}: {error}; is it plugged in, may you use it (group dialout), and does no other program "
+            "(a gateway with wire = serial) hold it?"
+        ) from error
+    try:
+        yield line
+    except (serial.SerialException, OSError) as error:
+        raise CommandError(f"{port} failed: {error}") from error
+    finally:
+        line.close()

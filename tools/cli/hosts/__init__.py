@@ -1,0 +1,1 @@
+"""Commands of several hosts, certificates and the broker."""

@@ -1,0 +1,1 @@
+"""Commands that move the arm, and those that stop it."""

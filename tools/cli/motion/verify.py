@@ -1,0 +1,85 @@
+"""`gemelo verify`: the shortest trip that verifies joints by their switches, and what the ledger says after it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import msgspec
+
+import gemelo
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands, joint_of
+from gemelo.tools.cli.common.session import connect_arm, load_robot
+from gemelo.tools.cli.motion.home import home_text
+from gemelo.tools.cli.parser import Options, Parser, json_option
+
+if TYPE_CHECKING:
+    from gemelo import Arm
+
+
+class VerifyReport(msgspec.Struct, frozen=True, kw_only=True):
+    """What `gemelo verify --json` prints."""
+
+    passed: tuple[str, ...] = ()
+    homed: tuple[str, ...] = ()
+    without_switch: tuple[str, ...] = ()
+    steps_off: dict[str, int] = {}  # of joints whose place had been known before
+    took_s: float = 0.0
+    confidence: float = 0.0  # 0 to 1, of the arm after it
+    tool_bound: float = 0.0  # [m] at `level`
+    level: float = 0.95
+
+
+def add_options(parser: Parser) -> None:
+    """Adds the joints and --json."""
+    parser.add_argument("joints", metavar="JOINT", nargs="*", help="all, if none is named")
+    json_option(parser)
+
+
+def run(options: Options) -> ExitCode:
+    """Verifies the joints named; a wrong name is refused before the stack is asked."""
+    robot = load_robot()
+    names = [joint_of(robot.description, name).name for name in options.joints]
+    with connect_arm(robot) as arm:
+        return verify(arm, names, options.json)
+
+
+def verify(arm: Arm, names: list[str], as_json: bool) -> ExitCode:
+    """Goes on the trip and prints what it has found."""
+    try:
+        found = arm.verify(*names, on_progress=None if as_json else _tell)
+    except (gemelo.Refused, gemelo.Aborted) as error:
+        raise CommandError(in_commands(str(error))) from error
+    ledger = arm.ledger
+    report = VerifyReport(
+        passed=found.passed, homed=found.homed, without_switch=found.without_switch, steps_off=found.steps_off,
+        took_s=round(found.took, 3), confidence=ledger.confidence, tool_bound=ledger.tool_bound, level=ledger.level,
+    )  # fmt: skip
+    print(msgspec.json.encode(report).decode() if as_json else text_of(report))
+    return ExitCode.OK
+
+
+def text_of(report: VerifyReport) -> str:
+    """A line for each joint, and what is sure now."""
+    lines = [
+        f"{name}: passed its switch; its counter was {_off(report.steps_off.get(name, 0))}" for name in report.passed
+    ]
+    lines += [home_text(name, report.steps_off.get(name)) for name in report.homed]
+    lines += [
+        f"{name}: has no switch; look where it stands and say so: `gemelo reference --joints {name}=...`"
+        for name in report.without_switch
+    ]
+    count = len(report.passed) + len(report.homed)
+    lines.append(
+        f"verified {count} of {count + len(report.without_switch)} joints in {report.took_s:.1f} s: "
+        f"{int(1000.0 * report.confidence) / 10.0:g} % sure that no step is lost, "
+        f"tool within {1e3 * report.tool_bound:.2f} mm ({report.level:.0%})"
+    )
+    return "\n".join(lines)
+
+
+def _off(steps: int) -> str:
+    return "right to the step" if steps == 0 else f"{steps:+d} steps off, less than a motor can lose"
+
+
+def _tell(text: str) -> None:
+    print(in_commands(text), flush=True)

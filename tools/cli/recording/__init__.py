@@ -1,0 +1,1 @@
+"""Commands of recordings, black boxes, replay and chaos."""

@@ -1,0 +1,119 @@
+"""`gemelo blackbox`: the minutes that were saved at faults, emergency stops, aborts and crashes, and what happened."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+
+from gemelo.libraries.recordings.incidents import (
+    FOLDER,
+    BlackBoxFile,
+    Incident,
+    black_boxes,
+    is_saving,
+    read_incident,
+    time_of,
+)
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.session import load_robot
+from gemelo.tools.cli.common.text_table import table
+from gemelo.tools.cli.parser import Options, Parser, json_option
+from gemelo.tools.cli.recording.bag import one_sentence
+
+SAVING = "a black box of what has just happened is being saved: `gemelo blackbox list` has it in a few seconds"
+
+
+def list_options(parser: Parser) -> None:
+    """Adds --json."""
+    json_option(parser)
+
+
+def run_list(options: Options) -> ExitCode:
+    """Prints the saved black boxes, the newest first."""
+    folder, found, saving = _found()
+    if options.json:
+        print(msgspec.json.encode(found).decode())
+    elif not found:
+        print(saving or f"no black box in {folder}: nothing has happened yet")
+    else:
+        rows = [
+            (str(number), time_of(each.incident.stamp), str(each.incident.kind), _clause(each.incident))
+            for number, each in enumerate(found, 1)
+        ]
+        print(table(("N", "when", "what", "sentence"), rows))
+        print("\n`gemelo blackbox show N`, or `open N` to see it" + (f"\n{saving}" if saving else ""))
+    return ExitCode.OK
+
+
+def show_options(parser: Parser) -> None:
+    """Adds which one, and --json."""
+    _which_option(parser)
+    json_option(parser)
+
+
+def run_show(options: Options) -> ExitCode:
+    """Prints what happened, and what led to it."""
+    _, incident = _chosen(options.which)
+    print(msgspec.json.encode(incident).decode() if options.json else story(incident))
+    return ExitCode.OK
+
+
+def open_options(parser: Parser) -> None:
+    """Adds which one, --save and --picture."""
+    _which_option(parser)
+    parser.add_argument("--save", type=Path, metavar="FILE", help="write the view as an .rrd there, and open none")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="save a PNG of that moment, and open no view")
+
+
+def run_open(options: Options) -> ExitCode:
+    """Prints what happened, then becomes the view of that moment."""
+    path, incident = _chosen(options.which)
+    print(story(incident), flush=True)
+    wanted = {"--save": options.save, "--picture": options.picture}
+    said = [text for name, value in wanted.items() if value is not None for text in (name, str(value))]
+    command = [sys.executable, "-m", "gemelo.services.visualizer.recorded", str(path), *said]
+    os.execv(sys.executable, command)
+
+
+def story(incident: Incident) -> str:
+    """The incident as text."""
+    margins = [f"  {each}" for each in incident.margins]
+    lines = [f"{each.at:+8.2f} s  {each.text}" for each in incident.story]
+    return "\n".join([incident.sentence, *margins, *lines])
+
+
+def _which_option(parser: Parser) -> None:
+    said = "number of `gemelo blackbox list`, 1 is the newest; or a file"
+    parser.add_argument("which", metavar="N", nargs="?", default="1", help=said)
+
+
+def _chosen(which: str) -> tuple[Path, Incident]:
+    if not which.isdecimal():
+        with one_sentence():
+            return Path(which), read_incident(Path(which))
+    folder, found, saving = _found()
+    if not found:
+        raise CommandError(saving or f"no black box in {folder}: nothing has happened yet")
+    if not 1 <= int(which) <= len(found):
+        raise CommandError(f"there is no black box {which}: there are 1 to {len(found)}, `gemelo blackbox list`")
+    chosen = found[int(which) - 1]
+    return Path(chosen.path), chosen.incident
+
+
+def _found() -> tuple[Path, list[BlackBoxFile], str]:
+    """The folder, what is in it of the robot, and what to say where one is being saved; empty where none is."""
+    robot = load_robot()
+    folder = project_root() / robot.deployment.paths.out / FOLDER
+    name = robot.description.name
+    saving = SAVING if is_saving(folder, name, time.time()) else ""
+    return folder, black_boxes(folder, name), saving
+
+
+def _clause(incident: Incident) -> str:
+    """The sentence without its time."""
+    return incident.sentence.partition(" UTC: ")[2] or incident.sentence

@@ -1,0 +1,1 @@
+"""Commands of robot folders, kinematics and the scene."""
