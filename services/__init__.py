@@ -1,1 +1,1 @@
-"""The processes of the twin and the libraries that they share: one folder each."""
+"""Processes of the twin: one folder each."""

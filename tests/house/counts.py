@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TypeGuard
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("docs", "examples", "firmware", "gemelo", "schemas", "services", "tests")
+LINKED = ("firmware", "libraries", "schemas", "services", "tools")  # folders of the root that gemelo/ links to
+ROOMS = ("docs", "examples", "gemelo", "tests", *LINKED)
 TUNED = ("services/planner/", "services/stepper_gateway/")  # whose constants say where their values come from
 ORIGIN = re.compile(r"\b(?:[Cc]hosen|[Mm]easured|[Ss]tandard|[Rr]ounding|rounded)\b")
 REASON = 3  # words of a comment, besides units, that can say why
@@ -73,6 +74,8 @@ def modules(root: Path = ROOT) -> dict[str, Module]:
     for path in sorted(path for room in ROOMS for path in (root / room).rglob("*.py")):
         parts = path.relative_to(root).with_suffix("").parts
         name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        if parts[0] in LINKED:
+            name = f"gemelo.{name}"
         found[name] = Module(path.relative_to(root), name, path.read_text())
     return found
 

@@ -105,9 +105,8 @@ def test_points_are_at_most_50_ms_apart_but_few_on_a_long_way():
 def test_no_code_sends_a_trajectory_to_ruckigs_cloud():
     """`intermediate_positions` and the waypoint calculators of ruckig's community version ask a server."""
     root = Path(__file__).parents[2]
-    sources = [
-        path for folder in ("services", "schemas", "firmware", "examples") for path in (root / folder).rglob("*.py")
-    ]
+    folders = ("services", "libraries", "tools", "schemas", "gemelo", "firmware", "examples")
+    sources = [path for folder in folders for path in (root / folder).rglob("*.py")]
     assert len(sources) > 20
     forbidden = re.compile(r"intermediate_positions|per_section_|max_number_of_waypoints|cloud_client")
     assert [path.name for path in sources if forbidden.search(path.read_text(encoding="utf-8"))] == []

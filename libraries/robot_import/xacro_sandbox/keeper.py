@@ -20,7 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import services
+import gemelo
 from gemelo.libraries.arm.errors import DescriptionError
 
 LONGEST = 30.0  # [s] of one expansion, chosen: the largest published robots take 2
@@ -183,7 +183,7 @@ def _process() -> Iterator[subprocess.Popen[bytes]]:
 def command() -> list[str]:
     """The process's command line: under bwrap where that is installed and may make namespaces."""
     bwrap = shutil.which("bwrap")
-    around = [bwrap, *namespaces(Path(services.__file__).parent)] if bwrap and _makes_namespaces(bwrap) else []
+    around = [bwrap, *namespaces(*code())] if bwrap and _makes_namespaces(bwrap) else []
     return [*around, sys.executable, "-I", "-m", MODULE]
 
 
@@ -193,9 +193,15 @@ def _makes_namespaces(bwrap: str) -> bool:
     return subprocess.run([bwrap, "--unshare-all", "--ro-bind", "/", "/", "true"], capture_output=True).returncode == 0
 
 
-def namespaces(code: Path) -> list[str]:
-    """Arguments of bwrap: no network, no other process, and of the disk the interpreter and the folder `code` alone."""
-    folders = dict.fromkeys([*SYSTEM, sys.base_prefix, sys.prefix, str(code)])
+def code() -> list[Path]:
+    """The folder of the package, and those that it links to in a checkout."""
+    package = Path(gemelo.__file__).parent
+    return [package, *(each.resolve() for each in sorted(package.iterdir()) if each.is_symlink())]
+
+
+def namespaces(*code: Path) -> list[str]:
+    """Arguments of bwrap: no network, no other process, and of the disk the interpreter and `code` alone."""
+    folders = dict.fromkeys([*SYSTEM, sys.base_prefix, sys.prefix, *map(str, code)])
     binds = [part for folder in folders for part in ("--ro-bind-try", folder, folder)]
     apart = ["--unshare-all", "--die-with-parent", "--new-session", "--clearenv"]
     return [*apart, "--tmpfs", "/tmp", *binds, "--dev", "/dev", "--"]
