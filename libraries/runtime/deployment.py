@@ -48,12 +48,12 @@ class DeploymentError(ConfigurationError):
 
 
 def project_root() -> Path:
-    """The folder that holds pyproject.toml, above this file or above the working directory."""
+    """The folder of deploy/local.toml, above this file or above the working directory."""
     for start in (Path(__file__).resolve(), Path.cwd() / "here"):
         for folder in start.parents:
-            if (folder / "pyproject.toml").is_file():
+            if (folder / DEFAULT_FILE).is_file():
                 return folder
-    raise DeploymentError("no pyproject.toml above this program or the working directory: run it from the project")
+    raise DeploymentError(f"no {DEFAULT_FILE} above this program or the working directory: run it from the project")
 
 
 def load_deployment(path: Path | None = None, environ: Mapping[str, str] | None = None) -> Deployment:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime import deployment
 from gemelo.libraries.runtime.deployment import DeploymentError, load_deployment, project_root, robot_name, when_silent
 from gemelo.schemas.deployment import Broker, MqttSection
 
@@ -13,6 +14,19 @@ from gemelo.schemas.deployment import Broker, MqttSection
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     return tmp_path / "site.toml"
+
+
+def test_the_pyproject_of_a_users_own_project_is_not_taken_for_ours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "pyproject.toml").write_text('[project]\nname = "web"\n')
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(deployment, "__file__", str(tmp_path / ".venv/lib/python3.11/site-packages/gemelo/file.py"))
+    with pytest.raises(DeploymentError, match=r"no deploy/local\.toml above this program or the working directory"):
+        project_root()
+    (tmp_path / "deploy").mkdir()
+    (tmp_path / "deploy/local.toml").touch()
+    assert project_root() == tmp_path
 
 
 def test_without_anything_it_is_the_local_run() -> None:

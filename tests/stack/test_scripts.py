@@ -6,11 +6,13 @@ import asyncio
 import doctest
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 
 import gemelo
 from gemelo.tools.stack.stack import Stack
+from tests.gemelo.own_names import run_among_own_names
 from tests.gemelo.test_docstrings import ON_THE_STACK, OPTIONS, PUBLIC
 from tests.stack.scripts import ended, said, script
 
@@ -24,6 +26,16 @@ def test_it_works_where_an_event_loop_runs_as_in_a_notebook(arm: gemelo.Arm) -> 
     with ThreadPoolExecutor(1) as pool:  # in this one a browser's library may have a loop of its own
         stopped_at = pool.submit(asyncio.run, cell()).result(60.0)
     assert stopped_at == pytest.approx(arm.joints, abs=1e-9)
+
+
+def test_it_works_beside_modules_of_a_users_own_with_the_names_of_our_rooms(twin: Stack, tmp_path: Path) -> None:
+    text = """
+import gemelo
+with gemelo.connect() as arm:
+    print(arm.move(joints={"brazo_joint": 0.2}).result.executed_steps is not None, round(arm.joints["brazo_joint"], 2))
+"""
+    done = run_among_own_names(tmp_path, text, **twin.deployment)
+    assert (done.stdout, done.stderr, done.returncode) == ("True 0.2\n", "", 0)
 
 
 def test_it_works_line_by_line_and_ends_with_the_prompt(twin: Stack) -> None:
