@@ -11,7 +11,7 @@ from pathlib import Path
 
 from gemelo.firmware.schematic import GROUND, INK, POWER, SAFETY, SIGNAL, Drawing
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).resolve().parent
 ROBOT = HERE.parent / "urdf/rm1/robot.toml"
 PICTURE = HERE / "wiring.svg"
 

@@ -15,7 +15,7 @@ from gemelo.tools.cli.common.session import load_robot, reported
 from gemelo.tools.cli.motion.home import home
 from tests.table import table
 
-GEMELO = Path(__file__).parents[2] / "gemelo"
+GEMELO = Path(__file__).parents[2] / "gemelo" / "api"
 METHOD = re.compile(r"\barm\.[a-z_.]+\(")
 
 

@@ -80,7 +80,7 @@ def test_our_own_sequences_pass_and_colours_alone_within_a_drawing(capsys: pytes
 def test_what_writes_past_it_is_one_module():
     """Any other print of a command goes through the stream that escapes."""
     past = re.compile(r"__stdout__|__stderr__|\.unescaped|stdout\.buffer|os\.write\((1|2),|fdopen\((1|2)")
-    found = {path.name for path in (ROOT / "tools" / "cli").glob("*.py") if past.search(path.read_text())}
+    found = {path.name for path in (ROOT / "tools" / "cli").rglob("*.py") if past.search(path.read_text())}
     assert found == {"output.py"}
 
 

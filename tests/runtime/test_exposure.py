@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.libraries.runtime import router
 from gemelo.libraries.runtime.deployment import DeploymentError, exposure, is_loopback, load_deployment
+from gemelo.services.router import main as router
 from gemelo.tools.stack.start_check import exposed
 from tests.runtime.locks import Lock
 from tests.runtime.support import ROOT, free_port, until
