@@ -13,9 +13,9 @@ from gemelo.schemas.deployment import Deployment, Wire
 from gemelo.tools.chaos.campaign import Episode, meddled, order, unexpected_hands, words_of
 from gemelo.tools.chaos.faults import FAULTS, Fault
 from gemelo.tools.chaos.main import chosen_faults, possible_faults, unfit
-from gemelo.tools.chaos.options import add_chaos_options
 from gemelo.tools.chaos.report import ChaosReport, page_of, rows_of, summary, text_of
 from gemelo.tools.chaos.site import processes_of
+from gemelo.tools.cli.recording.chaos import add_chaos_options
 from gemelo.tools.stack.not_ready import NotReady
 from gemelo.tools.stack.stack import PROCESSES, StackError
 

@@ -31,3 +31,5 @@ def test_a_wheel_has_one_name_at_its_top(tmp_path: Path) -> None:
     assert {name.partition("/")[0] for name in names if ".dist-info/" not in name} == {"gemelo"}
     rooms = ("api/arm", "schemas/topics", "services/planner/main", "libraries/runtime/node", "tools/cli/main")
     assert {*(f"gemelo/{room}.py" for room in rooms), "gemelo/py.typed"} <= names
+    left = ("gemelo/tools/bench", "gemelo/tools/chaos", "gemelo/tools/demo", "gemelo/firmware/tests")
+    assert not [name for name in names if name.startswith(left)]

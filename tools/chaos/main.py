@@ -25,9 +25,9 @@ from gemelo.schemas.topics import JOINT_STATES
 from gemelo.tools.chaos.campaign import Campaign, Episode, order
 from gemelo.tools.chaos.faults import FAULTS, Fault
 from gemelo.tools.chaos.invariants import missing_records
-from gemelo.tools.chaos.options import add_chaos_options
 from gemelo.tools.chaos.report import ChaosReport, page_of, text_of
 from gemelo.tools.chaos.site import ChaosSite, installed_broker, processes_of
+from gemelo.tools.cli.recording.chaos import add_chaos_options
 from gemelo.tools.stack.results import new_results
 from gemelo.tools.stack.stack import StackError
 

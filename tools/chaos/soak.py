@@ -27,8 +27,8 @@ from gemelo.libraries.runtime.errors import NoAnswer
 from gemelo.libraries.runtime.process.ending import ended_by_signals
 from gemelo.schemas.deployment import DeviceKind
 from gemelo.schemas.system import SetParameter
-from gemelo.tools.chaos.options import add_soak_options
 from gemelo.tools.chaos.site import ChaosSite, installed_broker
+from gemelo.tools.cli.recording.chaos import add_soak_options
 from gemelo.tools.stack.results import new_results
 from gemelo.tools.stack.stack import StackError
 
