@@ -4,44 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
-from typing import Self, Unpack
+from typing import TYPE_CHECKING, Self, Unpack
 
-from gemelo.api.arguments import Grip, Joints, Target, ToolGoal, Vector, Waypoint
-from gemelo.api.control import Control, Hold, named_where_another_moves
-from gemelo.api.device import Device, reference_command
+from gemelo import api
+from gemelo.api.arguments import Target
 from gemelo.api.errors import BadArgument
-from gemelo.api.frames import Frames
-from gemelo.api.gripping import Gripped, Gripping, OnGripping
-from gemelo.api.homing import OnHoming, home
-from gemelo.api.homing_report import HomingReport
-from gemelo.api.jog import JogCommands, Streaming, jog_command
-from gemelo.api.ledger import Ledger, Requirement, read_ledger
-from gemelo.api.motion import Motion, MotionRegistry, OnMotion
-from gemelo.api.picking import OnPicking, Picked, named, pick
-from gemelo.api.planning import (
-    Configurations,
-    OnPlanProgress,
-    Plan,
-    find_configurations,
-    find_poses,
-    make_plan,
-    require_valid,
-)
-from gemelo.api.scene import Scene
-from gemelo.api.seeing import Eyes, Seen
-from gemelo.api.session import Session
-from gemelo.api.targets import as_target, ik_request, joint_state, request_of
+from gemelo.api.parts import Parts
 from gemelo.api.units import Pose
-from gemelo.api.verification import OnVerifying, Verification, verify
 from gemelo.libraries.arm.errors import suggestion
-from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.libraries.runtime.node import Node
-from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
-from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.joints import JointState
-from gemelo.schemas.ledger import StoppingDistance
-from gemelo.schemas.planning import IkRequest, JogCommand, JogStatus, PlanRequest
 from gemelo.schemas.topics import (
     DEVICE_STATUS,
     GRIPPER_STATE,
@@ -51,6 +23,28 @@ from gemelo.schemas.topics import (
     STEP_LEDGER,
     STOPPING_DISTANCE,
 )
+
+if TYPE_CHECKING:
+    from gemelo.api.arguments import Grip, Joints, ToolGoal, Vector, Waypoint
+    from gemelo.api.control import Control, Hold
+    from gemelo.api.device import Device
+    from gemelo.api.gripping import Gripped, OnGripping
+    from gemelo.api.homing import OnHoming
+    from gemelo.api.homing_report import HomingReport
+    from gemelo.api.ledger import Ledger
+    from gemelo.api.motion import Motion, OnMotion
+    from gemelo.api.picking import OnPicking, Picked
+    from gemelo.api.planning import Configurations, OnPlanProgress, Plan
+    from gemelo.api.scene import Scene
+    from gemelo.api.seeing import Seen
+    from gemelo.api.session import Session
+    from gemelo.api.verification import OnVerifying, Verification
+    from gemelo.libraries.arm.model.description import ArmDescription
+    from gemelo.libraries.runtime.node import Node
+    from gemelo.schemas.deployment import Deployment
+    from gemelo.schemas.gripper import GripperState
+    from gemelo.schemas.ledger import StoppingDistance
+    from gemelo.schemas.planning import IkRequest, JogCommand, JogStatus, PlanRequest
 
 
 class Arm:
@@ -63,12 +57,7 @@ class Arm:
     """
 
     def __init__(self, session: Session) -> None:
-        self._session = session
-        self._requirement, self._control = Requirement(session), Control(session)
-        self._frames, self._motions = Frames(session), MotionRegistry(session, self._require_motion)
-        self._jogging, self._streaming = JogCommands(session), Streaming(session)
-        self._scene, self._device = Scene(session), Device(session, self._control.prepare)
-        self._gripping, self._eyes = Gripping(session, self._scene), Eyes(session, self._scene)
+        self._session, self._parts = session, Parts(session)
 
     def __enter__(self) -> Self:
         return self
@@ -86,7 +75,7 @@ class Arm:
         >>> second.close()
         """
         try:
-            self._motions.cancel_attached()
+            self._parts.close()
         finally:
             self._session.close()
 
@@ -197,7 +186,7 @@ class Arm:
         >>> arm.pose().orientation
         (..., ..., ..., ...)
         """
-        return self._frames.look_up(frame or self.base_frame, link or self.tool_frame)
+        return self._parts.frames.look_up(frame or self.base_frame, link or self.tool_frame)
 
     def frame(self, target: str, source: str, stamp: int = 0) -> Pose:
         """The pose of the frame `source` in the frame `target`, now or at `stamp` [ns UNIX] of the last 10 s.
@@ -207,7 +196,7 @@ class Arm:
         >>> arm.frame("base_link", "efector_link") == arm.pose()
         True
         """
-        return self._frames.look_up(target, source, stamp)
+        return self._parts.frames.look_up(target, source, stamp)
 
     def wait_for(self, is_so: Callable[[], bool], timeout: float | None = None) -> bool:
         """Sleeps until `is_so()`, which is called after every message; False after `timeout` [s].
@@ -245,7 +234,7 @@ class Arm:
         >>> arm.ledger.open_loop, sorted(arm.ledger.joints) == sorted(arm.joint_names)
         (False, True)
         """
-        return read_ledger(self._session.newest(STEP_LEDGER))
+        return api.ledger.read_ledger(self._session.newest(STEP_LEDGER))
 
     @property
     def stopping_distance(self) -> StoppingDistance:
@@ -268,7 +257,7 @@ class Arm:
         confidence 1.0 True arm.verify()
         >>> arm.require(confidence=0.0)
         """
-        self._requirement.require(confidence)
+        self._parts.requirement.require(confidence)
 
     @property
     def sensors(self) -> dict[str, float]:
@@ -312,7 +301,7 @@ class Arm:
         >>> arm.device.mode.name
         'IDLE'
         """
-        return self._device
+        return self._parts.device
 
     @property
     def scene(self) -> Scene:
@@ -321,12 +310,7 @@ class Arm:
         >>> arm.scene.objects
         {}
         """
-        return self._scene
-
-    def _require_motion(self) -> None:
-        """Before every motion; raises `Refused`."""
-        self._control.prepare()
-        self._requirement.check()
+        return self._parts.scene
 
     # Who may move it
 
@@ -337,7 +321,7 @@ class Arm:
         >>> arm.control.held
         False
         """
-        return self._control
+        return self._parts.control
 
     def take_control(self, name: str = "", *, force: bool = False) -> Hold:
         """Takes control as `name` (of this node, if left out): until it is given back nobody else moves the arm.
@@ -353,8 +337,8 @@ class Arm:
         ...         print(refused.check, refused.reason)
         control ana holds control of rm1, since ... from node ...: ask for it, or run `gemelo control take --force`
         """
-        self._control.take(name, force=force)
-        return Hold(self._control)
+        self._parts.control.take(name, force=force)
+        return api.control.Hold(self._parts.control)
 
     # Where it goes
 
@@ -381,7 +365,7 @@ class Arm:
         'SUCCEEDED'
         """
         plan = self.plan(on_progress=on_planning, **target)
-        return self._motions.run(plan, detached, on_progress, on_cancel)
+        return self._parts.motions.run(plan, detached, on_progress, on_cancel)
 
     def line(
         self,
@@ -403,7 +387,7 @@ class Arm:
         >>> shares == sorted(shares) and shares[-1] <= 1.0
         True
         """
-        target = as_target(goal)
+        target = api.targets.as_target(goal)
         target["line"] = True
         return self.move(
             **_with_speed(target, speed),
@@ -435,7 +419,7 @@ class Arm:
         """
         if (through is None) == (center is None):
             raise BadArgument("an arc goes by one of through= and center=")
-        target = as_target(goal)
+        target = api.targets.as_target(goal)
         if isinstance(to, Pose):
             target["pose"] = to
         elif to is not None:
@@ -497,11 +481,11 @@ class Arm:
         True
         """
         if request is None:
-            request = request_of(self.description, target, self._frames.look_up)
+            request = api.targets.request_of(self.description, target, self._parts.frames.look_up)
         elif target:
             raise BadArgument(f"plan a request, or say where to: not both, as {next(iter(target))}= does")
-        with named_where_another_moves(self._control, self.name):
-            return make_plan(self._session, request, target, on_progress)
+        with api.control.named_where_another_moves(self._parts.control, self.name):
+            return api.planning.make_plan(self._session, request, target, on_progress)
 
     def execute(
         self,
@@ -516,7 +500,7 @@ class Arm:
         >>> arm.execute(arm.plan(named="lifted")).status.name
         'SUCCEEDED'
         """
-        return self._motions.run(plan, detached, on_progress, on_cancel)
+        return self._parts.motions.run(plan, detached, on_progress, on_cancel)
 
     def start(
         self,
@@ -552,8 +536,8 @@ class Arm:
         if target and after is not None and "from_joints" not in target:
             target["from_joints"] = after.plan.end
         if target and after is None:
-            self._motions.bring_to_rest()
-        return self._motions.start(plan if plan is not None else self.plan(**target), detached, after=after)
+            self._parts.motions.bring_to_rest()
+        return self._parts.motions.start(plan if plan is not None else self.plan(**target), detached, after=after)
 
     def home(
         self, *joints: str, on_progress: OnHoming | None = None, on_cancel: Callable[[], object] | None = None
@@ -567,7 +551,7 @@ class Arm:
         >>> arm.home("efector_joint").homed
         ('efector_joint',)
         """
-        return home(self._session, joints, self.device.command, on_progress, on_cancel)
+        return api.homing.home(self._session, joints, self.device.command, on_progress, on_cancel)
 
     def verify(self, *joints: str, on_progress: OnVerifying | None = None) -> Verification:
         """Verifies the joints by their switches, all that have one if none is named, on the shortest trip.
@@ -579,8 +563,10 @@ class Arm:
         >>> arm.verify("efector_joint").homed
         ('efector_joint',)
         """
-        with self._requirement.suspended():
-            return verify(self, joints, lambda plan: self._motions.run(plan, False, None, None), on_progress)
+        with self._parts.requirement.suspended():
+            return api.verification.verify(
+                self, joints, lambda plan: self._parts.motions.run(plan, False, None, None), on_progress
+            )
 
     def reference(self, joints: Joints | None = None) -> None:
         """Declares where the joints stand, [rad] or [m] by name; the others are at robot.toml's reference position.
@@ -588,9 +574,9 @@ class Arm:
         >>> where = arm.joints
         >>> arm.reference(where)
         """
-        given = joint_state(self.description, joints, "joints") if joints is not None else JointState()
+        given = api.targets.joint_state(self.description, joints, "joints") if joints is not None else JointState()
         values = dict(zip(given.name, given.position, strict=True))
-        self.device.command(reference_command(self.description, values))
+        self.device.command(api.device.reference_command(self.description, values))
 
     def jog(
         self,
@@ -615,13 +601,13 @@ class Arm:
         False
         """
         if command is None:
-            command = jog_command(self.description, joints, twist, frame)
+            command = api.jog.jog_command(self.description, joints, twist, frame)
         elif joints is not None or twist is not None or frame:
             raise BadArgument("jog by a command, or by joints= or twist=: not both")
-        self._require_motion()
+        self._parts.require_motion()
         if duration is None:
-            return self._jogging.say(command)
-        return self._jogging.hold(command, duration, on_progress)
+            return self._parts.jogging.say(command)
+        return self._parts.jogging.hold(command, duration, on_progress)
 
     def end_jog(self) -> JogStatus | None:
         """Says no more `jog`, and returns when the arm rests: the planner's last word, None where nothing was said.
@@ -630,7 +616,7 @@ class Arm:
         >>> arm.end_jog().active
         False
         """
-        return self._jogging.end()
+        return self._parts.jogging.end()
 
     def stream(self, joints: Joints) -> None:
         """A target [rad] or [m] that the arm follows within its limits, now; the newest wins. No path is planned.
@@ -641,8 +627,8 @@ class Arm:
         >>> for step in range(20):
         ...     arm.stream({"brazo_joint": arm.joints["brazo_joint"] + 0.002})
         """
-        self._require_motion()
-        self._streaming.say(joints)
+        self._parts.require_motion()
+        self._parts.streaming.say(joints)
 
     def grip(
         self,
@@ -666,8 +652,8 @@ class Arm:
         >>> print(arm.grip("close"))
         0... mm, there
         """
-        self._control.prepare()
-        return self._gripping.go(to, max_effort, on_progress, is_cancelled)
+        self._parts.control.prepare()
+        return self._parts.gripping.go(to, max_effort, on_progress, is_cancelled)
 
     @property
     def gripper(self) -> GripperState:
@@ -746,7 +732,7 @@ class Arm:
         ...     print(refused.check)
         cell
         """
-        return self._eyes.detect(name, camera, scene)
+        return self._parts.eyes.detect(name, camera, scene)
 
     def pick(
         self,
@@ -771,7 +757,7 @@ class Arm:
         cell
         """
         with_words = on_progress if on_progress is not None else _silent
-        return pick(self, self._eyes, name, to, camera, with_words, is_cancelled or _never)
+        return api.picking.pick(self, self._parts.eyes, name, to, camera, with_words, is_cancelled or _never)
 
     def require_pickable(self, name: str, to: str) -> None:
         """Raises `Refused` without a gripper or a cell, `BadArgument` for a thing or place that the cell has not.
@@ -782,7 +768,7 @@ class Arm:
         ...     print(refused.check)
         cell
         """
-        named(self, self._eyes, name, to)
+        api.picking.named(self, self._parts.eyes, name, to)
 
     # What could be
 
@@ -804,10 +790,12 @@ class Arm:
         [{'brazo_joint': ..., 'antebrazo_joint': ..., 'efector_joint': ...}]
         """
         if request is None:
-            request = ik_request(self.description, goal, self._frames.look_up, near, solutions, touching)
+            request = api.targets.ik_request(
+                self.description, goal, self._parts.frames.look_up, near, solutions, touching
+            )
         elif goal or near is not None or solutions != 1 or touching:
             raise BadArgument("ask with a request, or say where to: not both")
-        return find_configurations(self._session, request, goal)
+        return api.planning.find_configurations(self._session, request, goal)
 
     def fk(self, joints: Joints | None = None) -> Pose:
         """Where the tool is for joint values [rad] or [m]; joints that are not named stand as they do now.
@@ -815,7 +803,7 @@ class Arm:
         >>> arm.fk({"brazo_joint": 0.0, "antebrazo_joint": 0.0, "efector_joint": 0.0}).position
         (..., ..., ...)
         """
-        return find_poses(self._session, joints, ())[self.tool_frame]
+        return api.planning.find_poses(self._session, joints, ())[self.tool_frame]
 
     def check(self, joints: Joints) -> None:
         """Raises `Refused` where the arm may not stand, with the nearest joint values at which it may; nothing moves.
@@ -829,7 +817,7 @@ class Arm:
         ...     print(refused.check, refused.nearest)
         joint limit {'joints': {'brazo_joint': ...}}
         """
-        require_valid(self._session, joints)
+        api.planning.require_valid(self._session, joints)
 
     def link_poses(self, joints: Joints | None = None, links: Sequence[str] = ()) -> dict[str, Pose]:
         """As `fk`, for `links`, or for all.
@@ -837,7 +825,7 @@ class Arm:
         >>> sorted(arm.link_poses(links=["base_link"]))
         ['base_link']
         """
-        return find_poses(self._session, joints, tuple(links) or self.description.model.link_names)
+        return api.planning.find_poses(self._session, joints, tuple(links) or self.description.model.link_names)
 
 
 def _silent(text: str) -> None:

@@ -8,7 +8,7 @@ from gemelo.api.errors import Refused
 from gemelo.api.seeing import Seen, body_of
 from gemelo.api.units import Point, Pose
 from gemelo.libraries.arm.frames.transforms import IDENTITY, Quaternion, Rigid, compose, from_axis_angle, rotate
-from gemelo.libraries.arm.model.gripper import jaw_edges
+from gemelo.libraries.arm.model.jaws import jaw_edges
 from gemelo.schemas.cell import Thing
 from gemelo.schemas.robot import Gripper
 

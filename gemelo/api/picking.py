@@ -6,10 +6,15 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from gemelo.api.arguments import Grip
 from gemelo.api.errors import Aborted, BadArgument, Canceled, Lost, Refused
 from gemelo.api.grasping import grasp_point, lift_above, looking_down, turn_between, yaw_of
+from gemelo.api.gripping import Gripped
+from gemelo.api.motion import Motion
+from gemelo.api.moving_arm import MovingArm
+from gemelo.api.planning import Plan
 from gemelo.api.seeing import Eyes, Seen, add_to_scene, body_of
 from gemelo.api.targets import FULL
 from gemelo.api.units import Point, Pose
@@ -18,13 +23,6 @@ from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, fro
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.cell import Place, PosePlace, Thing
 from gemelo.schemas.robot import Gripper
-
-if TYPE_CHECKING:
-    from gemelo.api.arguments import Grip
-    from gemelo.api.arm import Arm
-    from gemelo.api.gripping import Gripped
-    from gemelo.api.motion import Motion
-    from gemelo.api.planning import Plan
 
 APPROACH = 0.04  # [m] the straight way down to a thing, and up with it
 SLOW = 0.05  # [m/s] down and up
@@ -79,7 +77,7 @@ class Approach:
 class Hand:
     """What moves while a thing is picked, each motion slowed down and ended once it is cancelled."""
 
-    arm: Arm
+    arm: MovingArm
     tell: OnPicking
     is_cancelled: Callable[[], bool]
 
@@ -110,7 +108,9 @@ class Hand:
             raise Canceled("the pick was cancelled: the arm stands", GoalStatusCode.CANCELED)
 
 
-def pick(arm: Arm, eyes: Eyes, name: str, to: str, camera: str, tell: OnPicking, is_cancelled: IsCancelled) -> Picked:
+def pick(
+    arm: MovingArm, eyes: Eyes, name: str, to: str, camera: str, tell: OnPicking, is_cancelled: IsCancelled
+) -> Picked:
     """Takes the thing `name` to the place `to`; raises what `Arm.pick` raises."""
     hand = Hand(arm, tell, is_cancelled)
     began = arm.node.monotonic()
@@ -168,7 +168,7 @@ def look_twice(eyes: Eyes, name: str, camera: str) -> Seen:
         return eyes.one(name, camera)
 
 
-def named(arm: Arm, eyes: Eyes, name: str, to: str) -> tuple[Thing, Place, Gripper]:
+def named(arm: MovingArm, eyes: Eyes, name: str, to: str) -> tuple[Thing, Place, Gripper]:
     """What the cell and the arm have for it; raises `Refused` without a cell or gripper, `BadArgument` for a name."""
     cell = eyes.cell()
     gripper = arm.description.gripper
@@ -180,7 +180,7 @@ def named(arm: Arm, eyes: Eyes, name: str, to: str) -> tuple[Thing, Place, Gripp
         raise BadArgument(str(error)) from error
 
 
-def _way_to(arm: Arm, thing: Thing, seen: Seen, tool: Point, gripper: Gripper) -> Approach:
+def _way_to(arm: MovingArm, thing: Thing, seen: Seen, tool: Point, gripper: Gripper) -> Approach:
     """The configuration above the thing at which the jaws turn it least; raises `Refused`."""
     size, center = body_of(thing)
     body = compose((seen.pose.position, seen.pose.orientation), center)
@@ -204,7 +204,7 @@ def _way_to(arm: Arm, thing: Thing, seen: Seen, tool: Point, gripper: Gripper) -
 
 
 def _configurations_above(
-    arm: Arm, above: Point, body: Rigid, size: Point, gripper: Gripper
+    arm: MovingArm, above: Point, body: Rigid, size: Point, gripper: Gripper
 ) -> list[Mapping[str, float]]:
     """With the jaws along the thing's sides where the arm can turn its tool, else as they come; raises `Refused`."""
     if len(arm.joint_names) < FULL:
@@ -226,7 +226,7 @@ def _configurations_above(
     return found
 
 
-def _configuration_above(arm: Arm, tool: Point, yaw: float | None) -> Mapping[str, float]:
+def _configuration_above(arm: MovingArm, tool: Point, yaw: float | None) -> Mapping[str, float]:
     above = (tool[0], tool[1], tool[2] + APPROACH)
     if len(arm.joint_names) < FULL:
         return arm.ik(position=above)[0]
@@ -235,7 +235,7 @@ def _configuration_above(arm: Arm, tool: Point, yaw: float | None) -> Mapping[st
     return arm.ik(position=above, along=DOWN)[0]
 
 
-def _yaw_at(arm: Arm, place: Place, seen: Seen, way: Approach) -> float | None:
+def _yaw_at(arm: MovingArm, place: Place, seen: Seen, way: Approach) -> float | None:
     """[rad] of the jaws at a place where the thing's turn matters; None where it does not."""
     if not isinstance(place, PosePlace) or place.yaw is None:
         return None
@@ -271,7 +271,7 @@ def _take(hand: Hand, thing: Thing, seen: Seen, way: Approach) -> bool:
     return True
 
 
-def _turn_with_the_jaws(arm: Arm, thing: Thing, seen: Seen, way: Approach) -> None:
+def _turn_with_the_jaws(arm: MovingArm, thing: Thing, seen: Seen, way: Approach) -> None:
     """What closing jaws do to a thing that stands askew between them."""
     _, center = body_of(thing)
     pose = (seen.pose.position, from_axis_angle((0.0, 0.0, 1.0), yaw_of(seen.pose.orientation) + way.turned))
@@ -300,7 +300,7 @@ def _put(hand: Hand, name: str, release: Mapping[str, float]) -> None:
 
 
 @contextmanager
-def _touching(arm: Arm, name: str) -> Iterator[None]:
+def _touching(arm: MovingArm, name: str) -> Iterator[None]:
     """The thing may touch what it stands on, and the jaws, until the block ends."""
     arm.scene.allow(name, "*")
     try:

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from gemelo.api.errors import BadArgument, Refused
 from gemelo.api.ledger import Ledger
+from gemelo.api.moving_arm import MovingArm
 from gemelo.api.planning import Plan
 from gemelo.libraries.arm.errors import suggestion
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device_config import InputRole
 from gemelo.schemas.ledger import VerifiedBy
 from gemelo.schemas.robot import HomingDirection
-
-if TYPE_CHECKING:
-    from gemelo.api.arm import Arm
 
 OVERSHOOT = {"rad": 0.02, "m": 0.002}  # chosen: beyond the switch, where the limits leave as much
 LEAST_STEPS = 3.0  # beyond the switch: closer to it the limit may come first
@@ -49,7 +46,9 @@ class Trip:
     without_switch: list[str] = field(default_factory=list)
 
 
-def verify(arm: Arm, names: Iterable[str], run: Callable[[Plan], object], tell: OnVerifying | None) -> Verification:
+def verify(
+    arm: MovingArm, names: Iterable[str], run: Callable[[Plan], object], tell: OnVerifying | None
+) -> Verification:
     """Verifies the joints named, or all; `run` goes along a plan. Raises what `Arm.move` and `Arm.home` raise."""
     say = tell if tell is not None else _silent
     began = arm.node.monotonic()
@@ -125,7 +124,7 @@ def _beyond(joint: Joint) -> float:
     return min(OVERSHOOT[joint.unit], 0.5 * room)
 
 
-def _pass(arm: Arm, trip: Trip, run: Callable[[Plan], object], say: OnVerifying) -> list[str]:
+def _pass(arm: MovingArm, trip: Trip, run: Callable[[Plan], object], say: OnVerifying) -> list[str]:
     """The joints whose switches were passed: all in one motion if that is free, else one by one."""
     if not trip.passable:
         return []
@@ -143,7 +142,9 @@ def _pass(arm: Arm, trip: Trip, run: Callable[[Plan], object], say: OnVerifying)
     return found
 
 
-def _pass_together(arm: Arm, joints: Sequence[Joint], run: Callable[[Plan], object], say: OnVerifying) -> list[str]:
+def _pass_together(
+    arm: MovingArm, joints: Sequence[Joint], run: Callable[[Plan], object], say: OnVerifying
+) -> list[str]:
     """Both ways are planned before anything moves."""
     at, before = arm.joints, arm.ledger
     ends = {joint.name: far_side(joint, at[joint.name]) for joint in joints}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ssl
+from binascii import a2b_base64
 from pathlib import Path
 
 from gemelo.libraries.credentials.expiry import CERTIFICATE, VERSION, elements
@@ -15,7 +15,7 @@ def common_name(file: Path) -> str:
     """Of the first certificate in a PEM file, empty if it has none; raises `AccessError`."""
     try:
         found = CERTIFICATE.search(file.read_text(encoding="ascii"))
-        return _common_name(ssl.PEM_cert_to_DER_cert(found[0])) if found else ""
+        return _common_name(a2b_base64(found[1])) if found else ""
     except OSError as error:
         raise AccessError(f"cannot read {file}: {error.strerror}") from None
     except (ValueError, IndexError, StopIteration):

@@ -6,8 +6,8 @@ A process that moves an arm starts no other one to learn this, and a host needs 
 from __future__ import annotations
 
 import re
-import ssl
 import time
+from binascii import a2b_base64
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,7 +16,7 @@ from gemelo.libraries.credentials.private_files import AccessError
 
 DAY = 86_400.0  # [s]
 WARN_WITHIN = 30.0  # [days] before its end a certificate is spoken of, and `gemelo deploy keys` renews it
-CERTIFICATE = re.compile(r"-----BEGIN CERTIFICATE-----.+?-----END CERTIFICATE-----", re.DOTALL)
+CERTIFICATE = re.compile(r"-----BEGIN CERTIFICATE-----(.+?)-----END CERTIFICATE-----", re.DOTALL)  # 1: its base64
 VERSION = 0xA0  # tag of the one field of a certificate that may be missing
 UTC_TIME = 0x17  # tag of a time with two digits of the year, to 2049
 
@@ -67,7 +67,7 @@ def ending(ends: float, now: float | None = None, within: float = WARN_WITHIN) -
 
 
 def _expiry_of_pem(text: str) -> float:
-    return not_after(ssl.PEM_cert_to_DER_cert(text))
+    return not_after(a2b_base64(text))
 
 
 def elements(data: bytes) -> Iterator[tuple[int, bytes]]:

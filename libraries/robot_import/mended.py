@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from gemelo.libraries.arm.checks.findings import Finding, Severity, error, note, once, warning
 from gemelo.libraries.arm.checks.meshes import MeshFacts, check_meshes, facts_of
@@ -17,8 +16,30 @@ from gemelo.libraries.arm.model.xml_reader import XmlReader
 from gemelo.libraries.robot_import.questions import Questions, one_of
 from gemelo.libraries.robot_import.source import RobotSource
 
-if TYPE_CHECKING:
-    from gemelo.libraries.robot_import.semantics import Semantics
+
+@dataclass
+class Semantics:
+    """What an SRDF says of a robot, by the names of its URDF."""
+
+    file: str = ""
+    groups: dict[str, tuple[str, ...]] = field(default_factory=dict)  # joints
+    tips: dict[str, str] = field(default_factory=dict)  # the last link of a group's chain
+    states: list[tuple[str, str, dict[str, float]]] = field(default_factory=list)  # name, group, [rad] or [m]
+    pairs: dict[tuple[str, str], str] = field(default_factory=dict)  # reasons by two links, sorted
+
+    @property
+    def tip(self) -> str:
+        """The last link of the largest group where that is a chain; "" where it is none."""
+        largest = max(self.groups, key=lambda name: (len(self.groups[name]), name in self.tips), default="")
+        return self.tips.get(largest, "")
+
+    def state(self, name: str, joints: Sequence[str]) -> dict[str, float]:
+        """The values that a state of that name gives to these joints, of all groups; empty where there is none."""
+        found: dict[str, float] = {}
+        for state, _, values in self.states:
+            if state == name:
+                found |= {joint: value for joint, value in values.items() if joint in joints}
+        return found
 
 
 @dataclass

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from gemelo.libraries.arm.model.description import ROUNDING
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfModel
 from gemelo.libraries.robot_import.joint_mending import stand_at
-from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.mended import Mended, Semantics
 from gemelo.libraries.robot_import.poses import zero_state
 from gemelo.schemas.text_file import NotUtf8, read_text
 
@@ -20,31 +19,6 @@ OWN_GROUP = "arm"  # of the robot's folder
 UNUSED = ("virtual_joint", "link_sphere_approximation", "disable_default_collisions", "enable_collisions")
 MOST_NAMED = 3  # SRDFs of other robots
 OF_SRDF = "of the SRDF: "  # before the reasons that it gives for its pairs
-
-
-@dataclass
-class Semantics:
-    """What an SRDF says of a robot, by the names of its URDF."""
-
-    file: str = ""
-    groups: dict[str, tuple[str, ...]] = field(default_factory=dict)  # joints
-    tips: dict[str, str] = field(default_factory=dict)  # the last link of a group's chain
-    states: list[tuple[str, str, dict[str, float]]] = field(default_factory=list)  # name, group, [rad] or [m]
-    pairs: dict[tuple[str, str], str] = field(default_factory=dict)  # reasons by two links, sorted
-
-    @property
-    def tip(self) -> str:
-        """The last link of the largest group where that is a chain; "" where it is none."""
-        largest = max(self.groups, key=lambda name: (len(self.groups[name]), name in self.tips), default="")
-        return self.tips.get(largest, "")
-
-    def state(self, name: str, joints: Sequence[str]) -> dict[str, float]:
-        """The values that a state of that name gives to these joints, of all groups; empty where there is none."""
-        found: dict[str, float] = {}
-        for state, _, values in self.states:
-            if state == name:
-                found |= {joint: value for joint, value in values.items() if joint in joints}
-        return found
 
 
 def semantics(mended: Mended) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.libraries.arm.model.gripper import jaw_objects, jaws_apart
+from gemelo.libraries.arm.model.jaws import jaw_objects, jaws_apart
 from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.topics import (
     CONTACTS,

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import gemelo
+from gemelo import api
 
 SLOW = {"zenoh", "numpy", "pinocchio", "coal", "ruckig", "rich", "asyncio", "argparse"}
 SCRIPT = """
@@ -107,6 +108,22 @@ def test_a_name_loads_its_own_part_alone(root: Path) -> None:
     loaded = loaded_by("assert gemelo.mm(250) == 0.25", root)
     assert "gemelo.api.units" in loaded
     assert not {"gemelo.api.arm", "gemelo.libraries.runtime.node"} & loaded
+
+
+def test_connecting_loads_no_part_of_the_arm_before_it_is_used(root: Path) -> None:
+    """A script that only reads the arm's state waits for no motion, scene, device, seeing, picking or program."""
+    loaded = loaded_by("gemelo.connect, gemelo.Arm", root)
+    assert "gemelo.api.parts" in loaded
+    used_later = {"device", "gripping", "homing", "motion", "picking", "planning", "scene", "seeing", "verification"}
+    assert not ({f"gemelo.api.{name}" for name in used_later} | {"gemelo.programs", "zenoh", "ssl"}) & loaded
+
+
+def test_a_part_is_loaded_when_it_is_used(root: Path) -> None:
+    loaded = loaded_by("from gemelo import api; api.motion.Motion", root)
+    assert {"gemelo.api.motion", "gemelo.api.planning"} < loaded
+    assert "gemelo.api.seeing" not in loaded
+    with pytest.raises(AttributeError, match=r"module 'gemelo\.api' has no attribute 'moton'"):
+        api.moton  # type: ignore[attr-defined]  # noqa: B018
 
 
 def test_a_name_that_there_is_not_is_an_attribute_error() -> None:

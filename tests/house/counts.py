@@ -54,12 +54,14 @@ class Module:
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 yield (node.end_lineno or node.lineno) - node.lineno + 1
 
-    def imported(self) -> Iterator[tuple[str, str]]:
-        """Each module, and what of it, that is imported when it runs, at its top or later; not what types need."""
+    def imported(self, with_types: bool = False) -> Iterator[tuple[str, str]]:
+        """Each module, and what of it, that is imported when it runs, at its top or later; `with_types` what only types
+        need as well."""
         waiting: list[ast.AST] = [self.tree]
         while waiting:
             node = waiting.pop()
-            if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            if not with_types and isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+                waiting += node.orelse
                 continue
             if isinstance(node, ast.Import):
                 yield from ((alias.name, "") for alias in node.names)
@@ -80,11 +82,11 @@ def modules(root: Path = ROOT) -> dict[str, Module]:
     return found
 
 
-def imports(house: dict[str, Module]) -> dict[str, set[str]]:
-    """The modules of the house that each imports; of a package's module that module alone."""
+def imports(house: dict[str, Module], with_types: bool = False) -> dict[str, set[str]]:
+    """The modules of the house that each imports, as `Module.imported`; of a package's module that module alone."""
     found = {}
     for name, module in house.items():
-        others = {part if part in house else whole for whole, part in module.imported()}
+        others = {part if part in house else whole for whole, part in module.imported(with_types)}
         found[name] = {other for other in others if other in house and other != name}
     return found
 
@@ -278,7 +280,7 @@ def main() -> int:
         print(f"  lines of a file: {spread([count for count in lines if count > 1])}")
         print(f"  lines of a function: {spread([count for module in part for count in module.functions()])}")
     numeric = [name for module in house.values() if module.is_product for name in without_unit(module)]
-    print(f"circles of imports: {len(circles(imports(house)))}")
+    print(f"circles of imports, those of types among them: {len(circles(imports(house, with_types=True)))}")
     print(f"fragments: {fragments(house) or 0}")
     print(f"public functions of numbers without a unit: {len(numeric)}")
     if "--names" in sys.argv:

@@ -38,8 +38,8 @@ def house() -> dict[str, Module]:
     return modules()
 
 
-def test_no_module_imports_itself_over_others(house):
-    assert circles(imports(house)) == []
+def test_no_module_imports_itself_over_others_not_for_its_types_either(house):
+    assert circles(imports(house, with_types=True)) == []
 
 
 def test_a_short_file_with_one_importer_is_a_part_of_that(house):
@@ -141,11 +141,12 @@ def test_a_look_at_what_is_private_is_seen(line, name):
     assert [found.rpartition(" ")[2] for found in pokes(module("a", line)[1])] == ([name] if name else [])
 
 
-def test_a_circle_is_seen_and_one_of_types_alone_is_none():
+def test_a_circle_is_seen_and_one_of_types_alone_too():
     three = dict([module("a", "import b"), module("b", "def f():", "    from c import x"), module("c", "import a")])
     assert circles(imports(three)) == [{"a", "b", "c"}]
     types = dict([module("a", "import b"), module("b", "if TYPE_CHECKING:", "    import a")])
     assert circles(imports(types)) == []
+    assert circles(imports(types, with_types=True)) == [{"a", "b"}]
 
 
 def test_a_fragment_is_seen_unless_two_import_it_or_a_table_names_it():

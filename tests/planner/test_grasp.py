@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from gemelo.libraries.arm.frames.transforms import Rigid, compose, from_message, from_rpy, to_message
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
-from gemelo.libraries.arm.model.gripper import JAWS, jaw_objects, jaws_apart
+from gemelo.libraries.arm.model.jaws import JAWS, jaw_objects, jaws_apart
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.gripper import GripperState

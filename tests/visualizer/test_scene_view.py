@@ -11,7 +11,7 @@ import pytest
 import rerun as rr
 
 from gemelo.libraries.arm.model.description import load_arm
-from gemelo.libraries.arm.model.gripper import JAWS, jaw_objects
+from gemelo.libraries.arm.model.jaws import JAWS, jaw_objects
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.scene import (

@@ -91,6 +91,7 @@ FIGURES = {
     "estop_reaction_ticks": FigureRow("pulses:estop_reaction_ticks", "ticks"),
     "render_ms": FigureRow("vision.eyes:render_ms", "ms"),
     "cli_start_ms": FigureRow("stack:cli_start_ms", "ms"),
+    "import_gemelo_ms": FigureRow("stack:import_gemelo_ms", "ms"),
     "handshake_ms": FigureRow("handshake:handshake_ms", "ms"),
     "broker_echo_ms": FigureRow("brokers:broker_echo_ms", "ms"),
     "arms_on_one_router": FigureRow("many_arms:arms_on_one_router", "arms"),

@@ -25,6 +25,7 @@ READY_GOAL = FigureGoal(median=8.0)  # [s]
 READY_ROUNDS = 3
 CLI_GOAL = FigureGoal(p99=500.0)  # [ms]
 CLI_ROUNDS = 15
+IMPORT_GOAL = FigureGoal(median=120.0)  # [ms]
 CPUCLOCK_SCHED = 2  # the kernel's include/linux/posix-timers.h: with ~pid above it, the CPU clock of a whole process
 GEMELO = (sys.executable, "-m", "gemelo.tools.cli.main")
 
@@ -176,6 +177,23 @@ def cli_start_ms() -> Figure:
         bare.append(first_output(sys.executable, "-c", "print()"))
     reference = {"python -c 'print()'": statistics.median(bare), "gemelo --help": statistics.median(helps)}
     return of_samples(samples, CLI_GOAL, reference, f"gemelo topic list, {CLI_ROUNDS} starts")
+
+
+def import_gemelo_ms() -> Figure:
+    """Time [ms] from the start of Python to its first output after `from gemelo import connect`, as a script begins."""
+    programs = {
+        "import gemelo": "import gemelo",
+        "import msgspec, zenoh": "import msgspec, zenoh",
+        "python -c 'print()'": "",
+        "": "from gemelo import connect",
+    }
+    samples: dict[str, list[float]] = {name: [] for name in programs}
+    for _ in range(CLI_ROUNDS):
+        for name, program in programs.items():
+            samples[name].append(first_output(sys.executable, "-c", f"{program}\nprint()"))
+    own = samples.pop("")
+    reference = {name: statistics.median(times) for name, times in samples.items()}
+    return of_samples(own, IMPORT_GOAL, reference, f"from gemelo import connect, {CLI_ROUNDS} starts")
 
 
 def first_output(*command: str) -> float:

@@ -15,7 +15,7 @@ from gemelo.firmware.bindings.device import CoreDevice
 from gemelo.firmware.platform.host.board import DeviceClock
 from gemelo.libraries.arm.device.device_config import device_config, reference_steps
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
-from gemelo.libraries.arm.model.gripper import gripper_unit
+from gemelo.libraries.arm.model.jaws import gripper_unit
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.device_config import DeviceConfig
 from gemelo.schemas.message import Message, Vector

@@ -16,7 +16,7 @@ from gemelo.firmware.platform.host.flash import Flash, NetworkCredentials
 from gemelo.firmware.platform.host.memory import BootState, PositionStore, StoredPosition
 from gemelo.libraries.arm.device.device_config import device_config, reference_steps
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.libraries.arm.model.gripper import gripper_unit
+from gemelo.libraries.arm.model.jaws import gripper_unit
 from gemelo.libraries.runtime.clock import SYSTEM, Clock
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles, remedy_of
 from gemelo.schemas.device_config import config_text

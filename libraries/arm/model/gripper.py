@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from gemelo.libraries.arm.errors import DescriptionError, suggestion
 from gemelo.libraries.arm.model.robot_file import line_of
 from gemelo.schemas.device_config import SensorKind
-from gemelo.schemas.frames import Transform
-from gemelo.schemas.gripper import GripperState
-from gemelo.schemas.robot import Gripper, OutputGripper, RobotFile, Sensor, ServoGripper
-from gemelo.schemas.scene import BoxShape, SceneObject
-
-if TYPE_CHECKING:
-    from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.robot import OutputGripper, RobotFile, Sensor, ServoGripper
 
 METRES = {"mm": 0.001, "m": 1.0}  # [m] of a sensor's unit
-JAW = (0.01, 0.005, 0.02)  # [m] the edges of a jaw that robot.toml does not give
-JAWS = ("gripper_jaw_1", "gripper_jaw_2")  # the names that collisions with them have
-APART = 0.0005  # [m] by which openings are told apart
 LEAST_PULSES = 100  # [us] between open and closed: a servo cannot tell less apart from noise
 LEAST_PULSE_SPEED, MOST_PULSE_SPEED = 10, 1_000_000  # [us/s] the firmware's bounds
 
@@ -87,48 +77,3 @@ def opening_of(gripper: ServoGripper, pulse_us: float) -> float:
     """[m] between the jaws under a pulse of `pulse_us` [us]."""
     share = (pulse_us - gripper.closed_us) / (gripper.open_us - gripper.closed_us)
     return gripper.closed + share * (gripper.open - gripper.closed)
-
-
-def jaw_edges(gripper: Gripper) -> tuple[float, float, float]:
-    """(3,) [m] of one jaw: along x, y and z of the tool frame, which it begins at."""
-    return gripper.jaw or JAW
-
-
-def jaw_objects(arm: ArmDescription, opening: float) -> tuple[SceneObject, ...]:
-    """The two jaws as boxes that the tool carries, [m] apart as far as `opening`; none where robot.toml gives no jaw.
-
-    They touch what is fixed to the tool.
-    """
-    if arm.gripper is None or arm.gripper.jaw is None:
-        return ()
-    size = arm.gripper.jaw
-    holders = tuple(joint.parent for joint in arm.model.joints if joint.child == arm.tool_frame)
-    away = (opening + size[1]) / 2.0
-    return tuple(
-        SceneObject(
-            name=name,
-            shape=BoxShape(size=size),
-            pose=Transform(translation=(0.0, y, size[2] / 2.0), rotation=(0.0, 0.0, 0.0, 1.0)),
-            frame=arm.tool_frame,
-            attached=True,
-            touch_links=holders,
-        )
-        for name, y in zip(JAWS, (away, -away), strict=True)
-    )
-
-
-def jaws_apart(arm: ArmDescription, state: GripperState | None) -> float:
-    """[m] that the jaws take up: as far as they are apart and will be; open where that is not known."""
-    if arm.gripper is None:
-        return 0.0
-    if state is None or not state.known:
-        return arm.gripper.open
-    widest = max(state.position, state.target) if state.moving else state.position
-    within = min(max(widest, arm.gripper.closed), arm.gripper.open)  # a foreign word of 1e308 m cannot be rounded
-    return min(max(round(within / APART) * APART, arm.gripper.closed), arm.gripper.open)
-
-
-def gripper_unit(arm: ArmDescription) -> str:
-    """The unit of the sensor that reads the jaws; "mm" where none does."""
-    name = arm.gripper.sensor if isinstance(arm.gripper, ServoGripper) else ""
-    return next((sensor.unit for sensor in arm.sensors if sensor.name == name), "mm")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import socket
-import ssl
 import time
 
 from gemelo.libraries.credentials.private_files import require_private
@@ -83,6 +82,8 @@ def refusal(router: RouterSection) -> str:
     """Why TLS with the router fails, with the remedy; empty where TLS is not the reason."""
     if not router.tls:
         return ""
+    import ssl  # slow to load, and only needed to say why the handshake fails
+
     try:
         context = ssl.create_default_context(cafile=router.ca)
         context.load_cert_chain(router.certificate, router.key)

@@ -28,7 +28,7 @@ from gemelo.libraries.arm.frames.transforms import (
 )
 from gemelo.libraries.arm.kinematics.chain import link_transforms
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.libraries.arm.model.gripper import JAWS, jaw_edges, jaw_objects
+from gemelo.libraries.arm.model.jaws import JAWS, jaw_edges, jaw_objects
 from gemelo.schemas.cell import ColourThing, TagPlace, TagRecord, TagThing, Thing
 from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.joints import JointState

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import gemelo
 from gemelo.api.device import fault_of
-from gemelo.libraries.arm.model.gripper import jaw_objects, jaws_apart
+from gemelo.libraries.arm.model.jaws import jaw_objects, jaws_apart
 from gemelo.libraries.runtime.scene_meshes import SceneMeshes
 from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.control import ControlState

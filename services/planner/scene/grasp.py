@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gemelo.libraries.arm.frames.transforms import Rigid, compose, from_message, inverse, rotate
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.libraries.arm.model.gripper import jaw_edges
+from gemelo.libraries.arm.model.jaws import jaw_edges
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import PlaneShape, PlanningScene, SceneObject
 from gemelo.services.planner.collision.scene_shapes import Folders, SceneError, pose_of, shape_of

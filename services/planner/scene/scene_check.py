@@ -8,7 +8,7 @@ import msgspec
 
 from gemelo.libraries.arm.errors import suggestion
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.libraries.arm.model.gripper import JAWS
+from gemelo.libraries.arm.model.jaws import JAWS
 from gemelo.schemas.scene import AllowedPair, PlaneShape, PlanningScene, SceneObject
 from gemelo.schemas.scene_meshes import meshes_in
 from gemelo.services.planner.collision.scene_shapes import ANY, Folders, SceneError, shape_of

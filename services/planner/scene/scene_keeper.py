@@ -11,7 +11,7 @@ import msgspec
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.libraries.arm.model.gripper import jaw_objects, jaws_apart
+from gemelo.libraries.arm.model.jaws import jaw_objects, jaws_apart
 from gemelo.libraries.runtime.bus.wire import Encoded, encoded
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.node import Node

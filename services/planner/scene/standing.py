@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.libraries.arm.model.gripper import JAWS
+from gemelo.libraries.arm.model.jaws import JAWS
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import Vector

@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 
 from msgspec.structs import replace
 
-from gemelo.libraries.arm.model.gripper import JAWS
+from gemelo.libraries.arm.model.jaws import JAWS
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import (
     PlanCancelResult,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gemelo.libraries.arm.model.gripper import METRES, gripper_unit
+from gemelo.libraries.arm.model.gripper import METRES
+from gemelo.libraries.arm.model.jaws import gripper_unit
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandResponse, DeviceMode
 from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
