@@ -14,11 +14,11 @@ from gemelo.api.targets import Joints, named_joints
 from gemelo.api.whole_files import write_whole
 from gemelo.libraries.arm.errors import suggestion
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.toml_lines import nearest_line, toml_lines
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import checked_folder, point_name, read_text
 from gemelo.programs.program import VERSION
 from gemelo.programs.reading import load_toml
-from gemelo.programs.toml_lines import toml_lines
 from gemelo.programs.toml_text import key_text, value_text
 
 LARGEST_PICTURE = 10_000_000  # [bytes]
@@ -169,7 +169,7 @@ def _read(file: Path, robot: ArmDescription) -> dict[str, Point]:
     mistakes: list[Mistake] = []
 
     def say(what: str, *place: str) -> None:
-        line = next((lines[place[:end]] for end in range(len(place), 0, -1) if place[:end] in lines), 0)
+        line = nearest_line(lines, place)
         mistakes.append(Mistake(str(file), line, (), what))
 
     if data.get("version") != VERSION:

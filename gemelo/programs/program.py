@@ -8,10 +8,10 @@ from pathlib import Path
 
 from gemelo.api.errors import BadArgument
 from gemelo.api.whole_files import write_whole
+from gemelo.libraries.toml_lines import Where
 from gemelo.programs.mistakes import Mistake
 from gemelo.programs.names import program_name
 from gemelo.programs.steps import AnyStep, Repeat, StepPath
-from gemelo.programs.toml_lines import Where
 from gemelo.programs.toml_text import program_text
 
 VERSION = 1  # of the files of programs and points

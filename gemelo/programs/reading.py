@@ -14,11 +14,11 @@ import msgspec
 
 from gemelo.api.gripping import CLOSE, OPEN
 from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.toml_lines import Where, nearest_line, toml_lines
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import read_text
 from gemelo.programs.program import VERSION, Program, step_place
 from gemelo.programs.steps import KINDS, AnyStep, Repeat, Step, StepPath, Wait
-from gemelo.programs.toml_lines import Where, toml_lines
 from gemelo.programs.values import DEEPEST, MOST_STEPS, wrong_values
 
 UNITS = {"m": ("m", 1.0), "cm": ("m", 0.01), "mm": ("m", 0.001), "rad": ("rad", 1.0), "deg": ("rad", math.pi / 180.0),
@@ -162,7 +162,7 @@ class _Reader:
 
     def _say(self, place: Where, path: StepPath, what: str) -> bool:
         """Keeps a mistake, at the line of the place or of what is around it; False."""
-        line = next((self.lines[place[:end]] for end in range(len(place), 0, -1) if place[:end] in self.lines), 0)
+        line = nearest_line(self.lines, place)
         self.mistakes.append(Mistake(self.file, line, path, what))
         return False
 

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gemelo.libraries.runtime.errors import RequestRefused
+from gemelo.libraries.toml_lines import Where, nearest_line, toml_lines
 from gemelo.schemas.system import ParameterValue
 from gemelo.schemas.text_file import NotUtf8, read_text
 
@@ -23,6 +24,7 @@ class SavedParameters:
 
     def __init__(self, run_dir: Path, node: str) -> None:
         self.path = run_dir / FOLDER / f"{node}.toml"
+        self._lines: dict[Where, int] = {}
 
     def read(self) -> dict[str, ParameterValue]:
         """The values by name, none where there is no file; raises `RequestRefused` with the line that is wrong."""
@@ -38,6 +40,7 @@ class SavedParameters:
             found = _LINE.search(str(error))
             where = f", line {found[1]}" if found else ""
             raise RequestRefused(f"{self.path}{where}: {error}") from error
+        self._lines = toml_lines(text)
         for name, value in values.items():
             if not isinstance(value, bool | int | float | str):
                 raise RequestRefused(
@@ -46,13 +49,9 @@ class SavedParameters:
         return values
 
     def line(self, name: str) -> str:
-        """`, line 3`: where the file has the parameter; empty where it cannot be said."""
-        begin = re.compile(rf"\s*[\"']?{re.escape(name)}[\"']?\s*[=.\]]")
-        try:
-            lines = read_text(self.path).splitlines()
-        except (OSError, NotUtf8):
-            return ""
-        return next((f", line {number}" for number, each in enumerate(lines, 1) if begin.match(each)), "")
+        """`, line 3`: where the file had the parameter when it was read; empty where it did not."""
+        line = nearest_line(self._lines, (name,))
+        return f", line {line}" if line else ""
 
     def keep(self, values: Mapping[str, ParameterValue]) -> None:
         """Writes the file anew; raises `RequestRefused` where it cannot."""

@@ -72,6 +72,28 @@ def test_a_wrong_type_names_the_key(copy: Path):
         load_arm(copy)
 
 
+PULL_OUT = """[joint.motor.pull_out]
+speed = [0, 1000, 2000, 4000, 6000, 8000, 10000]
+torque = [1.2, 1.15, 1.0, 0.7, 0.45, 0.28, 0.15]
+inertia = 7.5e-5
+friction = 0.05
+"""
+
+
+@pytest.mark.parametrize(
+    ("new", "sentence"),
+    [
+        ("pull_out = {speed = [0], torque = [1], inertia = 1, frition = 0.05}", r"line 124: .*motor.pull_out.frition`"),
+        ("pull_out = {speed = [0,\n 1000], torque = [1, 1], inertia = inf}", r"line 125: .*pull_out.inertia` is inf"),
+        ("pull_out.speed = [\n 0,\n 1000, # slow\n -2000,\n]", r"line 127: .*>= 0.0 - at `.*pull_out.speed\[2\]`"),
+    ],
+)
+def test_a_line_is_found_within_inline_tables_and_arrays_of_several_lines(copy: Path, new: str, sentence: str):
+    edit(copy / "robot.toml", PULL_OUT, new + "\n")
+    with pytest.raises(DescriptionError, match=sentence):
+        load_arm(copy)
+
+
 @pytest.mark.parametrize(
     ("file", "old", "new", "sentence"),
     [

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from gemelo import BadArgument, Error
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.toml_lines import toml_lines
 from gemelo.programs import (
     AnyStep,
     Arc,
@@ -42,7 +43,6 @@ from gemelo.programs import (
 )
 from gemelo.programs.reading import parse_program
 from gemelo.programs.steps import KINDS
-from gemelo.programs.toml_lines import toml_lines
 from tests.table import table
 
 ROBOT = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")

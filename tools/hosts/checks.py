@@ -12,7 +12,7 @@ from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.credentials.authority import DAYS
 from gemelo.libraries.runtime.deployment import is_loopback
-from gemelo.programs.toml_lines import Where
+from gemelo.libraries.toml_lines import Where
 from gemelo.schemas.deployment import DeviceKind, Wire
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.roles import ROLES

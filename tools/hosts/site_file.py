@@ -12,7 +12,7 @@ from typing import Any, TypeVar, get_args
 
 import msgspec
 
-from gemelo.programs.toml_lines import Where, toml_lines
+from gemelo.libraries.toml_lines import Where, nearest_line, toml_lines
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.site import Site, SiteBroker, SiteHost, SiteRecord, SiteRobot, SiteRouter
 from gemelo.schemas.text_file import NotUtf8, read_text
@@ -43,7 +43,7 @@ class Problems:
 
     def add(self, place: Where, text: str) -> None:
         """At the line of `place`, or of the nearest thing around it that stands in the file."""
-        at = next((self._lines[place[:end]] for end in range(len(place), 0, -1) if place[:end] in self._lines), 1)
+        at = nearest_line(self._lines, place) or 1
         self._found.append((at, text))
 
     def raise_any(self) -> None:

@@ -12,7 +12,8 @@ import msgspec
 from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE, measured_of
 from gemelo.libraries.arm.errors import DescriptionError, suggestion
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
-from gemelo.libraries.arm.model.robot_file import Keys, line_of, read_robot_data, read_text, where_of
+from gemelo.libraries.arm.model.robot_file import line_of, read_robot_data, read_text, where_of
+from gemelo.libraries.toml_lines import Where
 from gemelo.schemas.cell import (
     CameraRecord,
     CellFile,
@@ -123,13 +124,13 @@ def cell_of(texts: CellTexts, arm: ArmDescription, *, is_here: bool = True) -> C
         raise DescriptionError(f"{path}{where_of(error, text)}: {error}{_choices(str(error))}") from error
     cell = Cell(path, file.camera, file.tag, file.thing, file.place, file.table)
     for keys, fault in _faults(cell, arm, is_here):
-        raise DescriptionError(f"{path}, line {_nearest_line(keys, text)}: {fault}")
+        raise DescriptionError(f"{path}, line {line_of(keys, text) or 1}: {fault}")
     names = [each.name for each in cell.cameras]
     measured = measured_of(path.with_name(CAMERA_FILE), texts.cameras, names) if texts.cameras else {}
     return Cell(path, file.camera, file.tag, file.thing, file.place, file.table, measured)
 
 
-def _faults(cell: Cell, arm: ArmDescription, is_here: bool) -> Iterator[tuple[Keys, str]]:
+def _faults(cell: Cell, arm: ArmDescription, is_here: bool) -> Iterator[tuple[Where, str]]:
     """Where each fault stands, and its sentence."""
     for what, named in (("camera", cell.cameras), ("thing", cell.things), ("place", cell.places)):
         yield from _repeated(what, [each.name for each in named])
@@ -144,13 +145,13 @@ def _faults(cell: Cell, arm: ArmDescription, is_here: bool) -> Iterator[tuple[Ke
     yield from _tag_faults(cell)
 
 
-def _repeated(what: str, names: list[str]) -> Iterator[tuple[Keys, str]]:
+def _repeated(what: str, names: list[str]) -> Iterator[tuple[Where, str]]:
     for number, name in enumerate(names):
         if name in names[:number]:
             yield (what, number, "name"), f'there are two [[{what}]] "{name}": give each a name of its own'
 
 
-def _camera_faults(keys: Keys, camera: CameraRecord, cell: Cell, arm: ArmDescription) -> Iterator[tuple[Keys, str]]:
+def _camera_faults(keys: Where, camera: CameraRecord, cell: Cell, arm: ArmDescription) -> Iterator[tuple[Where, str]]:
     yield from _parent_faults(keys, f'camera "{camera.name}"', camera.parent, arm)
     length = sum((a - b) ** 2 for a, b in zip(camera.position, camera.look_at, strict=True)) ** 0.5
     if length < NEAREST_LOOK:
@@ -158,7 +159,7 @@ def _camera_faults(keys: Keys, camera: CameraRecord, cell: Cell, arm: ArmDescrip
     yield from _source_faults((*keys, "source"), camera.name, camera.source, cell)
 
 
-def _source_faults(keys: Keys, name: str, source: Source, cell: Cell) -> Iterator[tuple[Keys, str]]:
+def _source_faults(keys: Where, name: str, source: Source, cell: Cell) -> Iterator[tuple[Where, str]]:
     if isinstance(source, FolderSource | FileSource) and not source.path:
         yield (*keys, "path"), f'camera "{name}": write the path of what it plays'
     distortion = getattr(source, "distortion", ())
@@ -167,13 +168,13 @@ def _source_faults(keys: Keys, name: str, source: Source, cell: Cell) -> Iterato
         yield (*keys, "distortion"), f'camera "{name}": {said}'
 
 
-def _parent_faults(keys: Keys, what: str, parent: str, arm: ArmDescription) -> Iterator[tuple[Keys, str]]:
+def _parent_faults(keys: Where, what: str, parent: str, arm: ArmDescription) -> Iterator[tuple[Where, str]]:
     if parent and parent not in arm.model.link_names:
         known = suggestion(parent, arm.model.link_names)
         yield (*keys, "parent"), f'{what}: {arm.name} has no link "{parent}"{known}'
 
 
-def _thing_faults(keys: Keys, thing: Thing, arm: ArmDescription) -> Iterator[tuple[Keys, str]]:
+def _thing_faults(keys: Where, thing: Thing, arm: ArmDescription) -> Iterator[tuple[Where, str]]:
     if arm.gripper is not None:
         width, most = grasp_width(thing), arm.gripper.open
         if width >= most:
@@ -185,14 +186,14 @@ def _thing_faults(keys: Keys, thing: Thing, arm: ArmDescription) -> Iterator[tup
             )
 
 
-def _model_faults(keys: Keys, thing: Thing, cell: Cell) -> Iterator[tuple[Keys, str]]:
+def _model_faults(keys: Where, thing: Thing, cell: Cell) -> Iterator[tuple[Where, str]]:
     if isinstance(thing, OnnxThing) and not cell.path_of(thing.model).is_file():
         yield (*keys, "model"), f'thing "{thing.name}": there is no file {cell.path_of(thing.model)}'
 
 
-def _tag_faults(cell: Cell) -> Iterator[tuple[Keys, str]]:
+def _tag_faults(cell: Cell) -> Iterator[tuple[Where, str]]:
     known: dict[tuple[TagFamily, int], str] = {}
-    records: list[tuple[Keys, str, object]] = [
+    records: list[tuple[Where, str, object]] = [
         *((("tag", number), f"[[tag]] {number + 1}", tag) for number, tag in enumerate(cell.tags)),
         *((("thing", number), f'thing "{each.name}"', each) for number, each in enumerate(cell.things)),
         *((("place", number), f'place "{each.name}"', each) for number, each in enumerate(cell.places)),
@@ -223,15 +224,6 @@ def height_of_frame(thing: Thing) -> float:
     if isinstance(thing, TagThing):
         return thing.box[2] if thing.box is not None else 0.0
     return thing.box[2] / 2.0
-
-
-def _nearest_line(keys: Keys, text: str) -> int:
-    """The line of a key; of the table that it belongs to where it is not written."""
-    while keys:
-        if line := line_of(keys, text):
-            return line
-        keys = keys[:-1]
-    return 1
 
 
 def _choices(error: str) -> str:

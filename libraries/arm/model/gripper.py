@@ -29,8 +29,7 @@ def require_gripper(robot: RobotFile, path: Path, text: str) -> None:
     else:
         key, reason = _servo_fault(gripper, robot)
     if reason:
-        line = line_of(("gripper", key), text) or line_of(("gripper",), text)
-        raise DescriptionError(f"{path}, line {line}: [gripper] {key} {reason}")
+        raise DescriptionError(f"{path}, line {line_of(('gripper', key), text)}: [gripper] {key} {reason}")
 
 
 def _servo_fault(gripper: ServoGripper, robot: RobotFile) -> tuple[str, str]:

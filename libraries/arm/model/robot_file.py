@@ -14,10 +14,10 @@ import msgspec
 
 from gemelo.libraries.arm.errors import DescriptionError, suggestion
 from gemelo.libraries.arm.motors.tick import chosen_tick
+from gemelo.libraries.toml_lines import Where, nearest_line, toml_lines
 from gemelo.schemas import text_file
 from gemelo.schemas.robot import RobotFile
 
-Keys = tuple[str | int, ...]
 TAG_FIELD = "kind"  # of tables of which there are several kinds
 
 
@@ -25,7 +25,7 @@ TAG_FIELD = "kind"  # of tables of which there are several kinds
 class UnknownKey:
     """A key that no type of schemas/robot.py has: `path` is where it stands, e.g. ("joint", 0, "motr")."""
 
-    path: Keys
+    path: Where
     line: int  # 0 where it was not found
     hint: str
 
@@ -77,7 +77,7 @@ def unknown_keys(data: dict[str, object], text: str, kind: type[msgspec.Struct] 
     return [UnknownKey(path, line_of(path, text), hint) for path, hint in _walk(data, kind, ())]
 
 
-def not_finite(data: object, path: Keys = ()) -> list[tuple[Keys, float]]:
+def not_finite(data: object, path: Where = ()) -> list[tuple[Where, float]]:
     """Every NaN and infinity in the TOML data with its key path; the values are dimensionless."""
     match data:
         case dict():
@@ -98,7 +98,7 @@ def where_of(error: msgspec.ValidationError, text: str) -> str:
     return f", line {line}" if line else ""
 
 
-def dotted(path: Keys) -> str:
+def dotted(path: Where) -> str:
     """("joint", 0, "motor") as joint[0].motor."""
     text = ""
     for key in path:
@@ -106,41 +106,21 @@ def dotted(path: Keys) -> str:
     return text
 
 
-def line_of(path: Keys, text: str) -> int:
-    """The line, from 1, of a key in TOML written with table headers; 0 where it is not found."""
-    header: list[str | int] = []
-    counts: dict[str, int] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        if table := re.match(r"\s*\[(\[?)\s*([\w.\-]+)\s*\]", line):
-            header = _header(table[2], bool(table[1]), counts)
-            if tuple(header[: len(path)]) == path:  # the table itself, or the first below it where it has no header
-                return number
-        elif (key := re.match(r"\s*\"?([\w\-]+)\"?\s*=", line)) and (*header, key[1]) == path:
-            return number
-    return 0
-
-
-def _header(name: str, is_array: bool, counts: dict[str, int]) -> list[str | int]:
-    """The key path of a table header, counting the tables of every array so far."""
-    if is_array:
-        counts[name] = counts.get(name, -1) + 1
-    path: list[str | int] = []
-    parts = name.split(".")
-    for depth, part in enumerate(parts, start=1):
-        path.append(part)
-        if (index := counts.get(".".join(parts[:depth]))) is not None:
-            path.append(index)
-    return path
+def line_of(place: Where, text: str) -> int:
+    """The line, from 1, of a key of a TOML text, or of the nearest table around it that is written; 0 where there is
+    none."""
+    return nearest_line(toml_lines(text), place)
 
 
 def _chosen(kind: object, data: object) -> object:
-    """Of several tables that may stand there, the one that its own `kind` names; else `kind` itself."""
+    """Of several tables that may stand there, the only one, or the one that its own `kind` names; else `kind`
+    itself."""
     if not (isinstance(kind, UnionType) and isinstance(data, dict)):
         return kind
-    for option in get_args(kind):
-        if _tag_of(option) and _tag_of(option).get(TAG_FIELD) == data.get(TAG_FIELD):
-            return option
-    return kind
+    options = [option for option in get_args(kind) if hasattr(option, "__struct_fields__")]
+    if len(options) == 1:
+        return options[0]
+    return next((each for each in options if _tag_of(each).get(TAG_FIELD, "") == data.get(TAG_FIELD)), kind)
 
 
 def _tag_of(kind: object) -> dict[str, object]:
@@ -149,7 +129,7 @@ def _tag_of(kind: object) -> dict[str, object]:
     return {config.tag_field: config.tag} if config is not None and config.tag is not None else {}
 
 
-def _walk(data: object, kind: object, path: Keys) -> list[tuple[Keys, str]]:
+def _walk(data: object, kind: object, path: Where) -> list[tuple[Where, str]]:
     if get_origin(kind) is tuple and isinstance(data, list):
         item = get_args(kind)[0]
         return [found for index, entry in enumerate(data) for found in _walk(entry, item, (*path, index))]
@@ -157,7 +137,7 @@ def _walk(data: object, kind: object, path: Keys) -> list[tuple[Keys, str]]:
     if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct) and isinstance(data, dict)):
         return []
     types = get_type_hints(kind) | _tag_of(kind)
-    found: list[tuple[Keys, str]] = []
+    found: list[tuple[Where, str]] = []
     for key, value in data.items():
         if key in types:
             found += _walk(value, types[key], (*path, key))

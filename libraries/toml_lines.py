@@ -1,9 +1,10 @@
-"""The line of every key and element of a TOML text, which the parser of the standard library does not tell."""
+"""The line of every key and element of a TOML text, which the parser of the standard library does not give."""
 
 from __future__ import annotations
 
 import tomllib
 from collections import Counter
+from collections.abc import Mapping
 
 Where = tuple[str | int, ...]  # keys, and indices of arrays
 
@@ -14,6 +15,11 @@ SPACE = " \t\r\n"
 def toml_lines(text: str) -> dict[Where, int]:
     """Line (from 1) by place, of a text that `tomllib` has read; headers, keys and elements of arrays."""
     return _Scanner(text.replace("\r\n", "\n")).scan()
+
+
+def nearest_line(lines: Mapping[Where, int], place: Where) -> int:
+    """The line of `place`, or of the nearest thing around it that is written; 0 where there is none."""
+    return next((lines[place[:end]] for end in range(len(place), 0, -1) if place[:end] in lines), 0)
 
 
 class _Scanner:
