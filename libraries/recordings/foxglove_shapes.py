@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from xml.etree import ElementTree
 
+from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.frames.transforms import from_rpy
+from gemelo.libraries.arm.model.urdf import SIZES, Geometry, UrdfLink, urdf_of
 from gemelo.libraries.arm.stl import BadStl, read_stl
 from gemelo.libraries.recordings import foxglove_schemas as fox
 from gemelo.schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, Shape, SphereShape
@@ -32,16 +33,16 @@ class Drawn:
 def drawn_links(urdf: str) -> tuple[str, list[Drawn]]:
     """The root link of a URDF's text, and its links: visual shapes where they are primitives, else those of collision.
 
-    Meshes are not drawn: their files are not in the recording, and Foxglove turns some kinds of them upright.
+    Meshes are not drawn: their files are not in the recording, and Foxglove turns some kinds of them upright. What
+    cannot be read of the URDF is left out.
     """
     try:
-        robot = ElementTree.fromstring(urdf)
-    except (ElementTree.ParseError, ValueError):
+        robot, _ = urdf_of(urdf)
+    except DescriptionError:
         return "", []
-    children = {child.get("link") for child in robot.findall("joint/child")}
-    links = robot.findall("link")
-    roots = [link.get("name", "") for link in links if link.get("name") not in children]
-    found = [_link(link) for link in links]
+    children = {joint.child for joint in robot.joints}
+    roots = [name for name in robot.link_names if name not in children]
+    found = [_link(link) for link in robot.links]
     return (roots[0] if roots else ""), [each for each in found if each.cubes or each.spheres or each.cylinders]
 
 
@@ -76,28 +77,22 @@ def _drawn_shape(frame: str, shape: Shape, pose: fox.Pose, color: fox.Color) -> 
     return None
 
 
-def _link(link: ElementTree.Element) -> Drawn:
+def _link(link: UrdfLink) -> Drawn:
     cubes, spheres, cylinders = [], [], []
-    for item in _primitives(link, "visual") or _primitives(link, "collision"):
-        pose, shape = _origin(item), item.find("geometry/*")
-        if shape is None:
-            continue
-        radius, length = _number(shape, "radius"), _number(shape, "length")
-        if shape.tag == "box":
-            cubes.append(fox.CubePrimitive(pose=pose, size=_triple(shape, "size"), color=LINK))
-        elif shape.tag == "sphere":
-            spheres.append(_sphere(pose, radius, LINK))
+    for each in _primitives(link.visuals) or _primitives(link.collisions):
+        pose = pose_of(each.origin.xyz, from_rpy(*each.origin.rpy))
+        if each.shape == "box":
+            cubes.append(fox.CubePrimitive(pose=pose, size=_vector(each.size), color=LINK))
+        elif each.shape == "sphere":
+            spheres.append(_sphere(pose, each.size[0], LINK))
         else:
-            cylinders.append(_cylinder(pose, radius, length, LINK))
-    return Drawn(link.get("name", ""), tuple(cubes), tuple(spheres), tuple(cylinders))
+            cylinders.append(_cylinder(pose, each.size[0], each.size[1], LINK))
+    return Drawn(link.name, tuple(cubes), tuple(spheres), tuple(cylinders))
 
 
-def _primitives(link: ElementTree.Element, kind: str) -> list[ElementTree.Element]:
-    """The <visual> or <collision> elements of a link that are no mesh."""
-    items = link.findall(kind)
-    return [
-        each for each in items if any(each.find(f"geometry/{tag}") is not None for tag in ("box", "sphere", "cylinder"))
-    ]
+def _primitives(shapes: Iterable[Geometry]) -> list[Geometry]:
+    """Those that are no mesh, with all their sizes."""
+    return [each for each in shapes if each.size and len(each.size) == sum(SIZES[each.shape].values())]
 
 
 def _sphere(pose: fox.Pose, radius: float, color: fox.Color) -> fox.SpherePrimitive:
@@ -120,26 +115,3 @@ def _triangles(pose: fox.Pose, data: bytes, scale: Sequence[float], color: fox.C
 def _vector(values: Sequence[float]) -> fox.Vector3:
     x, y, z = values
     return fox.Vector3(x=x, y=y, z=z)
-
-
-def _origin(element: ElementTree.Element) -> fox.Pose:
-    origin = element.find("origin")
-    if origin is None:
-        return pose_of((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-    position, angles = _triple(origin, "xyz"), _triple(origin, "rpy")
-    return pose_of((position.x, position.y, position.z), from_rpy(angles.x, angles.y, angles.z))
-
-
-def _triple(element: ElementTree.Element, name: str) -> fox.Vector3:
-    """Zeros where it is missing or no three numbers."""
-    try:
-        return _vector([float(word) for word in element.get(name, "0 0 0").split()])
-    except ValueError:
-        return _vector((0.0, 0.0, 0.0))
-
-
-def _number(element: ElementTree.Element, name: str) -> float:
-    try:
-        return float(element.get(name, "0"))
-    except ValueError:
-        return 0.0

@@ -117,9 +117,12 @@ LINKS = "<link name='a'/><link name='b'/><link name='c'/>"
         (f"<robot>{LINKS}" + joint("a", "b", "<mimic joint='x'/>") + joint("b", "c") + "</robot>", "mimics x"),
         (
             f"<robot>{LINKS}" + joint("a", "b", "<axis xyz='0 0'/>") + joint("b", "c") + "</robot>",
-            "must have 3 numbers",
+            '"0 0" must be three numbers',
         ),
-        (f"<robot>{LINKS}" + joint("a", "b", "<axis xyz='0 0 z'/>") + joint("b", "c") + "</robot>", "'z'"),
+        (
+            f"<robot>{LINKS}" + joint("a", "b", "<axis xyz='0 0 z'/>") + joint("b", "c") + "</robot>",
+            '"z" is not a number',
+        ),
     ],
 )
 def test_a_urdf_that_cannot_be_drawn_is_refused_with_the_reason(urdf, complaint):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 
@@ -12,6 +12,9 @@ from gemelo.libraries.arm.errors import DescriptionError, nearest_name
 from gemelo.libraries.arm.model.robot_file import read_text
 from gemelo.libraries.arm.model.xml_reader import Triple as Triple
 from gemelo.libraries.arm.model.xml_reader import XmlFault, XmlReader, joined, parse_xml
+
+Color = tuple[int, int, int]  # red, green and blue, 0 to 255
+Colors = dict[str, Color | None]  # by the name of their <material>
 
 ZERO: Triple = (0.0, 0.0, 0.0)
 DEFAULT_AXIS: Triple = (1.0, 0.0, 0.0)
@@ -98,6 +101,7 @@ class Geometry:
     origin: Origin = Origin()
     scale: Triple = (1.0, 1.0, 1.0)
     size: tuple[float, ...] = ()  # [m] x, y, z; radius; or radius and length
+    color: Color | None = field(default=None, compare=False)  # None: the reader's own
     line: int = field(default=0, compare=False)  # of the file
 
 
@@ -166,7 +170,8 @@ def model_of(xml: XmlReader) -> tuple[UrdfModel, list[XmlFault]]:
     """As `urdf_of`, of elements that are parsed."""
     if xml.root.tag != "robot":
         raise DescriptionError(f"the root element is <{xml.root.tag}>, it must be <robot>: export it as URDF")
-    links = tuple(_link(xml, element) for element in xml.root.findall("link"))
+    colors = {material.get("name", ""): _color(material) for material in xml.root.findall("material")}
+    links = tuple(_link(xml, element, colors) for element in xml.root.findall("link"))
     joints = tuple(_joint(xml, element) for element in xml.root.findall("joint"))
     _require_single(xml)
     return UrdfModel(xml.root.get("name", ""), links, joints), xml.faults
@@ -189,13 +194,15 @@ def _require_single(xml: XmlReader) -> None:
                 )
 
 
-def _link(xml: XmlReader, element: ET.Element) -> UrdfLink:
+def _link(xml: XmlReader, element: ET.Element, colors: Colors) -> UrdfLink:
     name = xml.text(element, "name", "a <link>")
     where, inertial = f'link "{name}"', element.find("inertial")
     return UrdfLink(
         name=name,
         inertial=None if inertial is None else _inertial(xml, inertial, where),
-        visuals=tuple(_geometry(xml, item, where) for item in element.findall("visual")),
+        visuals=tuple(
+            replace(_geometry(xml, item, where), color=_color_of(item, colors)) for item in element.findall("visual")
+        ),
         collisions=tuple(_geometry(xml, item, where) for item in element.findall("collision")),
         line=xml.lines.get(element, 0),
     )
@@ -304,3 +311,19 @@ def _are_sizes(words: list[str], count: int) -> bool:
 def _origin(xml: XmlReader, element: ET.Element, where: str) -> Origin:
     origin = element.find("origin")
     return Origin(xml.triple(origin, "xyz", ZERO, where), xml.triple(origin, "rpy", ZERO, where))
+
+
+def _color_of(visual: ET.Element, colors: Colors) -> Color | None:
+    """Of the <material> within it, or of the robot's own that it names."""
+    material = visual.find("material")
+    return None if material is None else _color(material) or colors.get(material.get("name", ""))
+
+
+def _color(material: ET.Element) -> Color | None:
+    """None without a <color> of four numbers: a colour is no reason to refuse an arm."""
+    element = material.find("color")
+    try:
+        red, green, blue, _ = map(float, ("" if element is None else element.get("rgba", "")).split())
+        return round(255 * red), round(255 * green), round(255 * blue)
+    except (ValueError, OverflowError):
+        return None
