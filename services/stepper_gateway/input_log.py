@@ -13,7 +13,7 @@ import msgspec
 
 from gemelo.schemas.device import GatewayInputs
 from gemelo.services.stepper_gateway.core import GatewayCore
-from gemelo.services.stepper_gateway.inputs import BeganInput, Given, Input, Reply, digest_of, give, packed
+from gemelo.services.stepper_gateway.inputs import BeganInput, Given, Input, Reply, digest_of, packed
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.outputs import Output
 
@@ -23,7 +23,7 @@ LARGE = 256 * 1024  # [B] after which a message does not wait for its time; chos
 
 
 class InputLog:
-    """Gives inputs to the core, and keeps them until they are published."""
+    """Has the core handle inputs, and keeps them until they are published."""
 
     def __init__(
         self, core: GatewayCore, began: BeganInput, moment: Moment, publish: Callable[[GatewayInputs], object]
@@ -38,10 +38,10 @@ class InputLog:
         self.is_on = True
         self._add(began, moment, 0)
 
-    def give(self, given: Input, moment: Moment) -> tuple[Reply, list[Output]]:
-        """Gives the core one input; an error of the core comes after its input has been published."""
+    def handle(self, given: Input, moment: Moment) -> tuple[Reply, list[Output]]:
+        """As the core's own; an error of the core comes after its input has been published."""
         try:
-            reply, outputs = give(self._core, given, moment)
+            reply, outputs = self._core.handle(given, moment)
         except Exception:
             self._add(given, moment, 0)
             self.finish()

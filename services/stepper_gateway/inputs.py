@@ -1,4 +1,4 @@
-"""Everything that the core can be given, as values: the shell gives them to the core, and a replay gives them again.
+"""Inputs of the core, as values: the shell makes them of what arrives, and a replay reads them from a recording.
 
 The core has no clock, no wire and no chance of its own, so the same inputs at the same moments give the same outputs.
 """
@@ -16,12 +16,9 @@ from gemelo.schemas.device import DeviceCommandRequest, DeviceStopRequest, Injec
 from gemelo.schemas.gripper import GripperCommandGoal
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
-from gemelo.schemas.scene import PlanningScene
-from gemelo.services.stepper_gateway.control.clients import MotionCaller
-from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
 from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
-from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.outputs import Output, Publish
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
@@ -172,52 +169,6 @@ class Given(msgspec.Struct, frozen=True, array_like=True):
     @property
     def moment(self) -> Moment:
         return Moment(self.unix, self.monotonic)
-
-
-def give(core: GatewayCore, given: Input, moment: Moment) -> tuple[Reply, list[Output]]:
-    """Gives the core one input; what it says at once, and its outputs."""
-    match given:
-        case StepInput(absences):
-            return None, core.step(moment, absences)
-        case LinkInput(connected, reason):
-            return None, core.on_link(connected, reason, moment)
-        case FrameInput(kind, payload, retained, arrival):
-            return None, core.on_received(Received(kind, payload, retained, arrival), moment)
-        case TargetsInput(targets, node):
-            return None, core.on_targets(targets, moment, MotionCaller(node=node))
-        case GoalInput(goal_id, goal, session):
-            return core.on_goal(goal_id, goal, moment, MotionCaller(session))
-        case CancelInput(goal_id):
-            return core.on_cancel(goal_id, moment)
-        case GripInput(goal_id, goal, session):
-            return core.on_grip(goal_id, goal, moment, MotionCaller(session))
-        case GripCancelInput(goal_id):
-            return core.on_grip_cancel(goal_id, moment)
-        case SceneInput(version, epoch, instance):
-            core.on_scene(PlanningScene(version=version, epoch=epoch), instance)
-        case PlannerInput(instance, is_there):
-            return None, core.on_planner(instance, is_there, moment)
-        case CommandInput(ticket, request, session):
-            return None, core.on_command(request, ticket, moment, MotionCaller(session))
-        case StopInput(ticket, request):
-            return None, core.on_stop(request, ticket, moment)
-        case ConfigureInput(ticket, session):
-            return None, core.on_configure(ticket, moment, MotionCaller(session))
-        case InjectInput(ticket, request):
-            return None, core.on_inject(request, ticket, moment)
-        case EchoInput(ticket):
-            return None, core.on_echo(ticket, moment)
-        case TakeControlInput(ticket, request, session):
-            return None, core.on_take_control(request, session, ticket, moment)
-        case JoinControlInput(ticket, request, session):
-            return None, core.on_join_control(request, session, ticket, moment)
-        case GiveControlInput(ticket, request):
-            return None, core.on_give_control(request, ticket, moment)
-        case ParametersInput(parameters):
-            core.set_parameters(parameters)
-        case BeganInput():
-            raise ValueError("a core begins once: make another one")
-    return None, []
 
 
 def digest_of(reply: Reply, outputs: list[Output]) -> int:

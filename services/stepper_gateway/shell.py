@@ -133,7 +133,7 @@ class Shell:
         self._absences = node.absences()
         node.subscribe_signed(JOINT_TARGETS, self._on_targets)
         node.watch_service(PLANNER, self._on_planner)
-        node.subscribe_signed(SCENE, lambda scene, by: self._give(SceneInput(scene.version, scene.epoch, by)))
+        node.subscribe_signed(SCENE, lambda scene, by: self._handle(SceneInput(scene.version, scene.epoch, by)))
         self._commands = node.serve_later(DEVICE_COMMAND, self._on_command)
         node.serve_later(DEVICE_STOP, self._on_stop)
         node.serve_later(DEVICE_CONFIGURE, self._on_configure)
@@ -159,9 +159,9 @@ class Shell:
             return self._node.set_ready(False, WAS_STOPPED)
         if self._parameters.value is not self._told:
             self._told = self._parameters.value
-            self._give(ParametersInput(self._told))
+            self._handle(ParametersInput(self._told))
         moment = self._moment()
-        self._give(StepInput(self._absences.seconds(self._core.watched_clients, moment.monotonic)))
+        self._handle(StepInput(self._absences.seconds(self._core.watched_clients, moment.monotonic)))
         moment = self._moment()
         reason = self._core.not_ready(moment)
         self._node.set_ready(not reason, reason)
@@ -182,10 +182,10 @@ class Shell:
             return
         if self._link_told != (present := (link.connected, link.reason)):
             self._link_told = present
-            self._give(LinkInput(*present))
+            self._handle(LinkInput(*present))
         received = link.take(AT_ONCE)
         for payload in received:
-            self._give(FrameInput(*payload))
+            self._handle(FrameInput(*payload))
         if len(received) == AT_ONCE:
             self.wake()
 
@@ -209,71 +209,71 @@ class Shell:
         if self._is_silent():
             return refuse(FollowErrorCode.DEVICE_FAILED, WAS_STOPPED)
         try:
-            return _decision(self._give(GoalInput(goal_id, goal, self._server.session_of(goal_id))))
+            return _decision(self._handle(GoalInput(goal_id, goal, self._server.session_of(goal_id))))
         except Exception:
-            self._give(CancelInput(goal_id))  # it is refused, so the arm must not follow it
+            self._handle(CancelInput(goal_id))  # it is refused, so the arm must not follow it
             raise
 
     def _on_cancel(self, goal_id: str) -> str:
-        return str(self._give(CancelInput(goal_id)))
+        return str(self._handle(CancelInput(goal_id)))
 
     def _on_grip(self, goal_id: str, goal: GripperCommandGoal) -> GoalDecision:
         if self._is_silent():
             return refuse(FollowErrorCode.DEVICE_FAILED, WAS_STOPPED)
         try:
-            return _decision(self._give(GripInput(goal_id, goal, self._gripper.session_of(goal_id))))
+            return _decision(self._handle(GripInput(goal_id, goal, self._gripper.session_of(goal_id))))
         except Exception:
-            self._give(GripCancelInput(goal_id))
+            self._handle(GripCancelInput(goal_id))
             raise
 
     def _on_grip_cancel(self, goal_id: str) -> str:
-        return str(self._give(GripCancelInput(goal_id)))
+        return str(self._handle(GripCancelInput(goal_id)))
 
     def _on_targets(self, targets: JointTargets, writer: str) -> None:
         """The planner's are those of whom it jogs for; of anybody else it does not count what they say of that."""
         if self._is_silent():
             return
-        self._give(TargetsInput(targets, targets.client or writer if writer == PLANNER else writer))
+        self._handle(TargetsInput(targets, targets.client or writer if writer == PLANNER else writer))
 
     def _on_planner(self, instance: str, is_there: bool) -> None:
-        self._give(PlannerInput(instance, is_there))
+        self._handle(PlannerInput(instance, is_there))
 
     def _on_command(self, request: DeviceCommandRequest, pending: Pending[DeviceCommandResponse]) -> None:
-        self._give(CommandInput(self._ticket(pending), request, pending.client))
+        self._handle(CommandInput(self._ticket(pending), request, pending.client))
 
     def _on_stop(self, request: DeviceStopRequest, pending: Pending[DeviceCommandResponse]) -> None:
         """What was asked for before a stop must not move the arm after it."""
         reason = f"{request.kind} was asked for after it: ask again"
         for server in (self._server, self._gripper, self._commands):
             server.refuse_waiting(reason, pending.asked)
-        self._give(StopInput(self._ticket(pending), request))
+        self._handle(StopInput(self._ticket(pending), request))
 
     def _on_configure(self, _request: ConfigureRequest, pending: Pending[ConfigureResponse]) -> None:
-        self._give(ConfigureInput(self._ticket(pending), pending.client))
+        self._handle(ConfigureInput(self._ticket(pending), pending.client))
 
     def _on_inject(self, request: InjectRequest, pending: Pending[InjectResponse]) -> None:
-        self._give(InjectInput(self._ticket(pending), request))
+        self._handle(InjectInput(self._ticket(pending), request))
 
     def _on_echo(self, _request: EchoRequest, pending: Pending[EchoResponse]) -> None:
-        self._give(EchoInput(self._ticket(pending)))
+        self._handle(EchoInput(self._ticket(pending)))
 
-    def _give(self, given: Input) -> Reply:
-        """Gives the core one input now, carries out what comes of it, and returns what it says at once."""
+    def _handle(self, given: Input) -> Reply:
+        """Has the core handle one input now, carries out what comes of it, and returns what it says at once."""
         self._is_silent()
-        reply, outputs = self._inputs.give(given, self._moment())
+        reply, outputs = self._inputs.handle(given, self._moment())
         self._carry_out(outputs)
         return reply
 
     def _on_take_control(self, request: ControlTake, pending: Pending[ControlAnswer]) -> None:
         sealed = replace(request, secret=seal(request.secret))
-        self._give(TakeControlInput(self._ticket(pending), sealed, pending.client))
+        self._handle(TakeControlInput(self._ticket(pending), sealed, pending.client))
 
     def _on_join_control(self, request: ControlJoin, pending: Pending[ControlAnswer]) -> None:
         sealed = replace(request, secret=seal(request.secret))
-        self._give(JoinControlInput(self._ticket(pending), sealed, pending.client))
+        self._handle(JoinControlInput(self._ticket(pending), sealed, pending.client))
 
     def _on_give_control(self, request: ControlGive, pending: Pending[ControlAnswer]) -> None:
-        self._give(GiveControlInput(self._ticket(pending), replace(request, secret=seal(request.secret))))
+        self._handle(GiveControlInput(self._ticket(pending), replace(request, secret=seal(request.secret))))
 
     def _ticket(self, pending: Pending[Any]) -> int:
         ticket = next(self._tickets)

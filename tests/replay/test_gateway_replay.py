@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import inspect
 import zlib
+from typing import get_args
 
 import msgspec
 import pytest
@@ -12,7 +13,7 @@ import pytest
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import GRIPPER_STATE
 from gemelo.services.stepper_gateway.core import GatewayCore
-from gemelo.services.stepper_gateway.inputs import FrameInput, Given, give, packed, unpacked
+from gemelo.services.stepper_gateway.inputs import FrameInput, Given, GoalInput, Input, packed, unpacked
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.outputs import GoalFinished, LogLine, Publish
 from gemelo.services.stepper_gateway.shell import Shell
@@ -104,42 +105,29 @@ def test_a_core_with_another_lead_is_found_in_what_it_sends(monkeypatch):
     assert found.topic in ("commands", "frames, results, answers and log lines")
 
 
-def test_a_core_that_logs_another_word_is_found_by_its_digest(monkeypatch):
-    sent = GatewayCore.on_goal
+def test_a_core_that_logs_another_word_is_found_by_its_digest(changed_core):
+    def another_word(given, outputs):
+        return [*outputs, LogLine(LogLevel.INFO, "another word")] if isinstance(given, GoalInput) else outputs
 
-    def other(core, goal_id, goal, moment, *more):
-        verdict, outputs = sent(core, goal_id, goal, moment, *more)
-        return verdict, [*outputs, LogLine(LogLevel.INFO, "another word")]
-
-    monkeypatch.setattr(GatewayCore, "on_goal", other)
+    changed_core(another_word)
     found = replay(RECORDINGS / "stepper_gateway.mcap", GATEWAY).difference
     assert (found.topic, found.path) == ("frames, results, answers and log lines", "outputs of Goal")
     assert "another word" in found.replayed
 
 
-def test_another_result_of_a_goal_is_named_by_its_field(monkeypatch):
-    step = GatewayCore.step
-
-    def other(core, moment, *more):
-        return [renamed(each) if isinstance(each, GoalFinished) else each for each in step(core, moment, *more)]
-
+def test_another_result_of_a_goal_is_named_by_its_field(changed_core):
     def renamed(ended):
         return GoalFinished(ended.goal_id, ended.status, msgspec.structs.replace(ended.result, error_string="another"))
 
-    monkeypatch.setattr(GatewayCore, "step", other)
+    changed_core(lambda _, outputs: [renamed(each) if isinstance(each, GoalFinished) else each for each in outputs])
     found = replay(RECORDINGS / "stepper_gateway.mcap", GATEWAY).difference
     assert (found.topic, found.path) == ("follow_joint_trajectory/ended", "result.error_string")
     assert found.replayed == "another"
 
 
-def test_a_core_that_says_nothing_any_more_is_found(monkeypatch):
+def test_a_core_that_says_nothing_any_more_is_found(changed_core):
     """Of a LATEST topic the recorder may lack what was said, but the core must not lack what was recorded."""
-    step = GatewayCore.step
-    monkeypatch.setattr(
-        GatewayCore,
-        "step",
-        lambda core, moment, *more: [each for each in step(core, moment, *more) if not is_gripper(each)],
-    )
+    changed_core(lambda _, outputs: [each for each in outputs if not is_gripper(each)])
     found = replay(RECORDINGS / "stepper_gateway.mcap", GATEWAY).difference
     assert (found.topic, found.replayed) == ("gripper_state", "(nothing)")
 
@@ -148,13 +136,31 @@ def is_gripper(output):
     return isinstance(output, Publish) and output.topic is GRIPPER_STATE
 
 
-def test_a_core_that_ends_by_an_error_is_shown_with_it(monkeypatch):
-    def broken(*_):
-        raise ZeroDivisionError("by zero")
+def test_a_core_that_ends_by_an_error_is_shown_with_it(changed_core):
+    def broken(given, outputs):
+        if isinstance(given, GoalInput):
+            raise ZeroDivisionError("by zero")
+        return outputs
 
-    monkeypatch.setattr(GatewayCore, "on_goal", broken)
+    changed_core(broken)
     found = replay(RECORDINGS / "stepper_gateway.mcap", GATEWAY).difference
     assert found.replayed == "the core ends by ZeroDivisionError: by zero"
+
+
+@pytest.fixture
+def changed_core(monkeypatch):
+    """Has every core return what `change(given, outputs)` makes of its outputs."""
+
+    def with_change(change):
+        handle = GatewayCore.handle
+
+        def other(core, given, moment):
+            reply, outputs = handle(core, given, moment)
+            return reply, change(given, outputs)
+
+        monkeypatch.setattr(GatewayCore, "handle", other)
+
+    return with_change
 
 
 def test_inputs_that_are_missing_are_refused(changed):
@@ -179,9 +185,11 @@ def test_inputs_of_another_version_are_refused(changed):
         replay(changed(GATEWAY, Messages(INPUTS, alter)), GATEWAY)
 
 
-def test_every_way_into_the_core_is_an_input():
-    """One that is missing in `give` would be left out of every recording."""
-    ways = {name for name in vars(GatewayCore) if name.startswith("on_")} | {"step", "set_parameters"}
-    assert ways == {way for way in vars(GatewayCore) if f"core.{way}(" in inspect.getsource(give)}
-    shell = inspect.getsource(Shell)
-    assert [name for name in ways if f"_core.{name}(" in shell] == []
+def test_every_way_into_the_core_is_an_input_that_a_recording_keeps():
+    """The other public names change nothing."""
+    public = {name for name in vars(GatewayCore) if not name.startswith("_")}
+    assert public == {"handle", "not_ready", "prepare_goal", "scenes_dropped", "watched_clients", "ledger_record"}
+    handled, shell = inspect.getsource(GatewayCore.handle), inspect.getsource(Shell)
+    assert [kind.__name__ for kind in get_args(Input) if f"case {kind.__name__}(" not in handled] == []
+    assert "_inputs.handle(" in shell
+    assert "_core.handle(" not in shell

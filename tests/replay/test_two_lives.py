@@ -47,7 +47,7 @@ class Life:
             self._log.step(self.moment, True)
 
     def give(self, given) -> None:
-        for output in self._log.give(given, self.moment)[1]:
+        for output in self._log.handle(given, self.moment)[1]:
             if isinstance(output, Publish):
                 self._keep(output.topic, output.message)
 

@@ -13,6 +13,7 @@ from gemelo.schemas.device_config import config_crc, config_text
 from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATUS
 from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.tools.virtual_arm.gateway_driver import ConfigureInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import move
 
@@ -151,7 +152,7 @@ def test_a_flood_of_people_who_want_the_configuration_given_costs_one_frame_a_se
     rig.lost.add("config/ack")
     before = len([kind for _, kind, _ in rig.sent if kind == Kind.CONFIG])
     for ticket in range(1, 501):
-        rig.ask_configuration(ticket)
+        rig.handle(ConfigureInput(ticket))
     assert len([kind for _, kind, _ in rig.sent if kind == Kind.CONFIG]) == before + 1
     rig.lost.clear()
     assert rig.run(2.0, lambda: len(rig.configured) == 500)

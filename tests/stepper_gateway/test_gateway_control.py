@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import NamedTuple
 
 import pytest
 from hypothesis import given
@@ -26,7 +27,7 @@ from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import CONTROL
 from gemelo.services.stepper_gateway.control.control import MOST_MEMBERS
-from gemelo.tools.virtual_arm.gateway_driver import MotionCaller
+from gemelo.tools.virtual_arm.gateway_driver import CancelInput, ConfigureInput, TargetsInput
 from gemelo.tools.virtual_arm.virtual_arm import GatewayParameters, VirtualArm
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
@@ -34,7 +35,16 @@ from tests.stepper_gateway.harness import assert_within_limits, move
 ZERO = (0.0, 0.0, 0.0)
 FAR = (1.2, -1.2, 0.08)
 GRACE = GatewayParameters().control_grace
-ANA, BEN = MotionCaller("5e55a", "cli-1"), MotionCaller("5e55b", "cli-2")
+
+
+class Client(NamedTuple):
+    """A node that asks for control."""
+
+    session: str
+    node: str
+
+
+ANA, BEN = Client("5e55a", "cli-1"), Client("5e55b", "cli-2")
 SECRETS = {ANA: "a" * 64, BEN: "b" * 64}
 NAMES = {ANA: "ana", BEN: "ben"}
 COMMANDS = [
@@ -43,11 +53,11 @@ COMMANDS = [
 ]  # fmt: skip
 
 
-def key_of(who: MotionCaller) -> str:
+def key_of(who: Client) -> str:
     return f"@id/{who.node}/{1:020d}.{who.node[-1]}.desk-{who.node[-1]}"
 
 
-def take(who: MotionCaller, force: bool = False) -> ControlTake:
+def take(who: Client, force: bool = False) -> ControlTake:
     return ControlTake(name=NAMES[who], client=key_of(who), secret=SECRETS[who], force=force)
 
 
@@ -56,10 +66,6 @@ def held_by_ana(rig: VirtualArm | None = None) -> VirtualArm:
     rig.control(take(ANA), ANA.session)
     assert rig.controlled.pop(1).accepted
     return rig
-
-
-def session_of(who: MotionCaller) -> MotionCaller:
-    return MotionCaller(who.session)
 
 
 def state(rig: VirtualArm) -> ControlState:
@@ -78,16 +84,16 @@ def is_still(rig: VirtualArm) -> bool:
 def test_without_a_holder_everybody_may_move() -> None:
     rig = VirtualArm().ready()
     assert not state(rig).held
-    assert rig.goal(move(ZERO, FAR), "a", session_of(ANA)).accepted
+    assert rig.goal(move(ZERO, FAR), "a", ANA.session).accepted
     rig.run(0.5)
     assert rig.finish("a")[0] is GoalStatusCode.SUCCEEDED
-    assert rig.goal(move(FAR, ZERO), "b", session_of(BEN)).accepted
+    assert rig.goal(move(FAR, ZERO), "b", BEN.session).accepted
 
 
 def test_the_holder_moves_and_others_are_refused_by_name_since_when_and_from_where() -> None:
     rig = held_by_ana()
     rig.run(12.0)
-    verdict = rig.goal(move(ZERO, FAR), "b", session_of(BEN))
+    verdict = rig.goal(move(ZERO, FAR), "b", BEN.session)
     assert not verdict.accepted
     assert verdict.code is FollowErrorCode.NOT_IN_CONTROL
     assert re.fullmatch(
@@ -95,18 +101,15 @@ def test_the_holder_moves_and_others_are_refused_by_name_since_when_and_from_whe
         r"ask for it, or run `gemelo control take --force`",
         verdict.reason,
     ), verdict.reason
-    assert rig.goal(move(ZERO, FAR), "a", session_of(ANA)).accepted
+    assert rig.goal(move(ZERO, FAR), "a", ANA.session).accepted
     assert rig.finish("a")[0] is GoalStatusCode.SUCCEEDED
     assert state(rig).members == ("cli-1",)
 
 
-@pytest.mark.parametrize(
-    "caller",
-    [MotionCaller(), MotionCaller("5e55"), MotionCaller("5e55a "), MotionCaller("cli-1"), MotionCaller(node="5e55a")],
-)
-def test_who_does_not_say_who_it_is_or_says_something_else_is_not_the_holder(caller: MotionCaller) -> None:
+@pytest.mark.parametrize("session", ["", "5e55", "5e55a ", "cli-1"])
+def test_who_does_not_say_who_it_is_or_says_something_else_is_not_the_holder(session: str) -> None:
     rig = held_by_ana()
-    assert rig.goal(move(ZERO, FAR), "b", caller).code is FollowErrorCode.NOT_IN_CONTROL
+    assert rig.goal(move(ZERO, FAR), "b", session).code is FollowErrorCode.NOT_IN_CONTROL
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda each: type(each).__name__)
@@ -128,7 +131,7 @@ def test_the_holders_command_reaches_the_device() -> None:
 
 def test_a_configuration_of_others_is_refused_by_name() -> None:
     rig = held_by_ana()
-    rig.carry_out(rig.core.on_configure(7, rig.moment, session_of(BEN)))
+    rig.handle(ConfigureInput(7, BEN.session))
     assert not rig.configured[7].accepted
     assert "ana holds control" in rig.configured[7].reason
 
@@ -137,23 +140,23 @@ def test_a_configuration_of_others_is_refused_by_name() -> None:
 def test_stop_hold_and_disarm_are_everybodys(kind: StopKind) -> None:
     rig = held_by_ana()
     if kind is not StopKind.DISARM:
-        assert rig.goal(move(ZERO, FAR), "a", session_of(ANA)).accepted
+        assert rig.goal(move(ZERO, FAR), "a", ANA.session).accepted
         rig.run(1.0)
     assert rig.answer(kind).accepted
 
 
 def test_everybody_may_cancel_the_holders_goal() -> None:
     rig = held_by_ana()
-    assert rig.goal(move(ZERO, FAR), "a", session_of(ANA)).accepted
+    assert rig.goal(move(ZERO, FAR), "a", ANA.session).accepted
     rig.run(1.0)
-    assert rig.cancel("a") == ""
+    assert rig.handle(CancelInput("a")) == ""
     assert rig.finish("a")[0] is GoalStatusCode.CANCELED
 
 
 def test_streamed_targets_of_others_do_not_move_the_arm_and_are_told_so_once_a_second() -> None:
     rig = held_by_ana()
     for _ in range(75):
-        rig.stream(JointTargets(name=rig.arm.joint_names, position=FAR), BEN.node)
+        rig.handle(TargetsInput(JointTargets(name=rig.arm.joint_names, position=FAR), BEN.node))
         rig.run(0.02)
     assert rig.position == pytest.approx(ZERO, abs=1e-3)
     refusals = [event for event in rig.published["device/events"] if event.event == "target_refused"]
@@ -164,14 +167,14 @@ def test_streamed_targets_of_others_do_not_move_the_arm_and_are_told_so_once_a_s
 def test_targets_of_others_neither_steer_nor_keep_alive_the_holders_stream() -> None:
     rig = held_by_ana()
     for _ in range(50):
-        rig.stream(JointTargets(name=rig.arm.joint_names, position=(0.4, 0.0, 0.0)), ANA.node)
-        rig.stream(JointTargets(name=rig.arm.joint_names, position=(-0.4, 0.0, 0.0)), BEN.node)
+        rig.handle(TargetsInput(JointTargets(name=rig.arm.joint_names, position=(0.4, 0.0, 0.0)), ANA.node))
+        rig.handle(TargetsInput(JointTargets(name=rig.arm.joint_names, position=(-0.4, 0.0, 0.0)), BEN.node))
         rig.run(0.02)
     assert max(row[0] for row in rig.path) > 0.0
     assert rig.position[0] > 0.0
     silence = GatewayParameters().stream_silence
     for _ in range(round((silence + 1.0) / 0.02)):
-        rig.stream(JointTargets(name=rig.arm.joint_names, position=(-0.4, 0.0, 0.0)), BEN.node)
+        rig.handle(TargetsInput(JointTargets(name=rig.arm.joint_names, position=(-0.4, 0.0, 0.0)), BEN.node))
         rig.run(0.02)
     assert is_still(rig)
     assert rig.position[0] > 0.0
@@ -179,15 +182,15 @@ def test_targets_of_others_neither_steer_nor_keep_alive_the_holders_stream() -> 
 
 def test_a_gripper_goal_of_others_is_refused_by_name() -> None:
     rig = held_by_ana()
-    assert rig.grip(0.0, caller=session_of(BEN)).code is FollowErrorCode.NOT_IN_CONTROL
-    assert rig.grip(0.0, caller=session_of(ANA)).code is not FollowErrorCode.NOT_IN_CONTROL
+    assert rig.grip(0.0, session=BEN.session).code is FollowErrorCode.NOT_IN_CONTROL
+    assert rig.grip(0.0, session=ANA.session).code is not FollowErrorCode.NOT_IN_CONTROL
 
 
 def test_a_forced_take_leaves_the_jaws_where_they_are_and_ends_their_goal_with_the_reason() -> None:
     rig = held_by_ana()
-    assert rig.grip(0.05, caller=session_of(ANA)).accepted
+    assert rig.grip(0.05, session=ANA.session).accepted
     assert rig.finish_grip()[0] is GoalStatusCode.SUCCEEDED
-    assert rig.grip(0.0, caller=session_of(ANA)).accepted
+    assert rig.grip(0.0, session=ANA.session).accepted
     rig.run(0.05)
     rig.control(take(BEN, force=True), BEN.session, 2)
     status, result = rig.finish_grip(seconds=0.1)
@@ -215,13 +218,13 @@ def test_the_same_take_again_is_answered_as_the_first() -> None:
 
 def test_a_forced_take_slows_the_former_holder_to_rest_first_and_says_so_in_the_log() -> None:
     rig = held_by_ana()
-    assert rig.goal(move(ZERO, FAR), "a", session_of(ANA)).accepted
+    assert rig.goal(move(ZERO, FAR), "a", ANA.session).accepted
     rig.run(1.0)
     since = len(rig.path)
     rig.control(take(BEN, force=True), BEN.session, 2)
     assert 2 not in rig.controlled
-    assert "nothing moves until the arm rests" in rig.goal(move(ZERO, FAR), "b", session_of(BEN)).reason
-    assert rig.goal(move(ZERO, FAR), "c", session_of(ANA)).code is FollowErrorCode.NOT_IN_CONTROL
+    assert "nothing moves until the arm rests" in rig.goal(move(ZERO, FAR), "b", BEN.session).reason
+    assert rig.goal(move(ZERO, FAR), "c", ANA.session).code is FollowErrorCode.NOT_IN_CONTROL
     assert rig.run(3.0, lambda: 2 in rig.controlled)
     assert rig.controlled[2].accepted
     assert stands(rig)
@@ -231,15 +234,15 @@ def test_a_forced_take_slows_the_former_holder_to_rest_first_and_says_so_in_the_
     assert "ben (node cli-2 on desk-2) takes control" in result.error_string
     assert state(rig).name == "ben"
     assert any("taken it, by force, from ana (node cli-1 on desk-1)" in line for line in rig.log)
-    assert "ben holds control" in rig.goal(move(rig.position, ZERO), "d", session_of(ANA)).reason
-    assert rig.goal(move(rig.position, ZERO), "e", session_of(BEN)).accepted
+    assert "ben holds control" in rig.goal(move(rig.position, ZERO), "d", ANA.session).reason
+    assert rig.goal(move(rig.position, ZERO), "e", BEN.session).accepted
     assert rig.finish("e")[0] is GoalStatusCode.SUCCEEDED
     assert_within_limits(rig, since)
 
 
 def test_a_take_slows_the_motion_of_another_to_rest_also_where_nobody_held_control() -> None:
     rig = VirtualArm().ready()
-    assert rig.goal(move(ZERO, FAR), "b", session_of(BEN)).accepted
+    assert rig.goal(move(ZERO, FAR), "b", BEN.session).accepted
     rig.run(1.0)
     rig.control(take(ANA), ANA.session)
     assert 1 not in rig.controlled
@@ -250,7 +253,7 @@ def test_a_take_slows_the_motion_of_another_to_rest_also_where_nobody_held_contr
 
 def test_a_take_leaves_the_takers_own_motion_alone() -> None:
     rig = VirtualArm().ready()
-    assert rig.goal(move(ZERO, FAR), "a", session_of(ANA)).accepted
+    assert rig.goal(move(ZERO, FAR), "a", ANA.session).accepted
     rig.run(1.0)
     held_by_ana(rig)
     assert rig.finish("a")[0] is GoalStatusCode.SUCCEEDED
@@ -258,7 +261,7 @@ def test_a_take_leaves_the_takers_own_motion_alone() -> None:
 
 def test_a_take_brings_a_homing_and_a_held_motion_of_others_to_an_end() -> None:
     rig = VirtualArm().ready()
-    assert rig.goal(move(ZERO, FAR), "b", session_of(BEN)).accepted
+    assert rig.goal(move(ZERO, FAR), "b", BEN.session).accepted
     rig.run(1.0)
     assert rig.answer(StopKind.HOLD).accepted
     rig.control(take(ANA), ANA.session)
@@ -269,7 +272,7 @@ def test_a_take_brings_a_homing_and_a_held_motion_of_others_to_an_end() -> None:
 
 def test_a_holder_that_vanishes_loses_control_after_the_stated_time_with_the_arm_at_rest() -> None:
     rig = held_by_ana()
-    assert rig.goal(move(ZERO, FAR), "a", session_of(ANA)).accepted
+    assert rig.goal(move(ZERO, FAR), "a", ANA.session).accepted
     rig.run(1.0)
     began, rested = rig.now, 0.0
     while state(rig).held:
@@ -280,20 +283,20 @@ def test_a_holder_that_vanishes_loses_control_after_the_stated_time_with_the_arm
         if not stands(rig):
             assert state(rig).held, "control was lost before the arm was at rest"
         if state(rig).held:
-            assert rig.goal(move(rig.position, ZERO), "b", session_of(BEN)).code is FollowErrorCode.NOT_IN_CONTROL
+            assert rig.goal(move(rig.position, ZERO), "b", BEN.session).code is FollowErrorCode.NOT_IN_CONTROL
         assert rig.now - began < GRACE + 0.5
     assert 0.0 < rested - began < GRACE
     assert rig.now - began == pytest.approx(GRACE, abs=0.05)
     assert rig.finish("a")[0] is GoalStatusCode.ABORTED
     assert any("has lost it, gone for" in line for line in rig.log)
     rig.absences.clear()
-    assert rig.goal(move(rig.position, ZERO), "c", session_of(BEN)).accepted
+    assert rig.goal(move(rig.position, ZERO), "c", BEN.session).accepted
     assert rig.finish("c")[0] is GoalStatusCode.SUCCEEDED
 
 
 def test_control_is_kept_beyond_its_time_while_the_arm_is_not_at_rest() -> None:
     rig = held_by_ana(VirtualArm(parameters=GatewayParameters(control_grace=0.5)).ready())
-    assert rig.goal(move(ZERO, FAR), "a", session_of(ANA)).accepted
+    assert rig.goal(move(ZERO, FAR), "a", ANA.session).accepted
     rig.run(1.0)
     rig.lost = {"cmd"}  # no STOP arrives
     began = rig.now
@@ -309,17 +312,17 @@ def test_control_is_kept_beyond_its_time_while_the_arm_is_not_at_rest() -> None:
 
 def test_a_frozen_holder_that_wakes_in_time_keeps_control_but_not_its_motion() -> None:
     rig = held_by_ana()
-    assert rig.goal(move(ZERO, FAR), "a", session_of(ANA)).accepted
+    assert rig.goal(move(ZERO, FAR), "a", ANA.session).accepted
     rig.run(1.0)
     rig.absences[key_of(ANA)] = 1.0
     rig.run(1.0)
-    assert "is gone for" in rig.goal(move(rig.position, ZERO), "b", session_of(ANA)).reason
+    assert "is gone for" in rig.goal(move(rig.position, ZERO), "b", ANA.session).reason
     rig.absences.clear()
     rig.run(0.1)
     assert rig.finish("a")[0] is GoalStatusCode.ABORTED
     assert state(rig).name == "ana"
     assert any("ana (node cli-1 on desk-1) is back" in line for line in rig.log)
-    assert rig.goal(move(rig.position, ZERO), "c", session_of(ANA)).accepted
+    assert rig.goal(move(rig.position, ZERO), "c", ANA.session).accepted
 
 
 def test_a_frozen_holder_that_wakes_too_late_finds_another_holder_and_cannot_give_that_ones_control_back() -> None:
@@ -330,7 +333,7 @@ def test_a_frozen_holder_that_wakes_too_late_finds_another_holder_and_cannot_giv
     assert rig.controlled[2].accepted
     rig.absences.clear()
     rig.run(0.1)
-    assert "ben holds control" in rig.goal(move(ZERO, FAR), "a", session_of(ANA)).reason
+    assert "ben holds control" in rig.goal(move(ZERO, FAR), "a", ANA.session).reason
     rig.control(ControlGive(secret=SECRETS[ANA]), ANA.session, 3)
     assert "ben (node cli-2 on desk-2) holds control, not you" in rig.controlled[3].reason
     rig.control(ControlJoin(client=key_of(ANA), secret=SECRETS[ANA]), ANA.session, 4)
@@ -352,10 +355,10 @@ def test_a_stream_is_the_holders_by_the_address_in_its_key(principal: str, addre
     targets = JointTargets(name=rig.arm.joint_names, position=(0.1, 0.0, 0.0))
     for stranger in {node, "operator.lab/cli-1", "operator.lab/panel", "local/cli-1"} - {address}:
         for _ in range(10):
-            rig.stream(targets, stranger)
+            rig.handle(TargetsInput(targets, stranger))
             rig.run(0.02)
         assert rig.position == ZERO, stranger
-    rig.stream(targets, address)
+    rig.handle(TargetsInput(targets, address))
     rig.run(0.3)
     assert rig.position != ZERO
 
@@ -365,20 +368,20 @@ def test_given_back_everybody_may_move() -> None:
     rig.control(ControlGive(secret=SECRETS[ANA]), "any", 2)
     assert rig.controlled[2].accepted
     assert not state(rig).held
-    assert rig.goal(move(ZERO, FAR), "b", session_of(BEN)).accepted
+    assert rig.goal(move(ZERO, FAR), "b", BEN.session).accepted
 
 
 def test_a_node_that_knows_the_secret_moves_the_arm_until_it_ends() -> None:
     rig = held_by_ana()
-    script = MotionCaller("5e55c", "pick-3")
+    script = Client("5e55c", "pick-3")
     rig.control(ControlJoin(client=key_of(script), secret=SECRETS[ANA]), script.session, 2)
     assert rig.controlled[2].accepted
-    assert rig.goal(move(ZERO, FAR), "c", session_of(script)).accepted
+    assert rig.goal(move(ZERO, FAR), "c", script.session).accepted
     assert state(rig).members == ("cli-1", "pick-3") or rig.run(0.1)
     rig.absences[key_of(script)] = GRACE + 0.1
     rig.run(0.1)
     assert state(rig).members == ("cli-1",)
-    assert rig.goal(move(ZERO, FAR), "d", session_of(script)).code is FollowErrorCode.NOT_IN_CONTROL
+    assert rig.goal(move(ZERO, FAR), "d", script.session).code is FollowErrorCode.NOT_IN_CONTROL
 
 
 def test_a_wrong_secret_neither_joins_nor_gives() -> None:
@@ -414,12 +417,12 @@ def test_a_restarted_gateway_knows_no_holder_and_an_earlier_epochs_secret_opens_
     assert "nobody holds control" in rig.controlled[2].reason
     rig.control(ControlGive(secret=SECRETS[ANA]), ANA.session, 3)
     assert not rig.controlled[3].accepted
-    assert rig.goal(move(ZERO, FAR), "b", session_of(BEN)).accepted
+    assert rig.goal(move(ZERO, FAR), "b", BEN.session).accepted
 
 
 def test_a_claimant_that_ends_before_the_arm_rests_does_not_get_control() -> None:
     rig = VirtualArm().ready()
-    assert rig.goal(move(ZERO, FAR), "b", session_of(BEN)).accepted
+    assert rig.goal(move(ZERO, FAR), "b", BEN.session).accepted
     rig.run(1.0)
     rig.control(take(ANA), ANA.session)
     rig.absences[key_of(ANA)] = 0.5
@@ -427,12 +430,12 @@ def test_a_claimant_that_ends_before_the_arm_rests_does_not_get_control() -> Non
     assert not rig.controlled[1].accepted
     assert not state(rig).held
     rig.run(3.0)
-    assert rig.goal(move(rig.position, ZERO), "c", session_of(BEN)).accepted
+    assert rig.goal(move(rig.position, ZERO), "c", BEN.session).accepted
 
 
 def test_of_two_that_force_at_once_the_later_gets_it_and_the_earlier_hears_so() -> None:
     rig = VirtualArm().ready()
-    assert rig.goal(move(ZERO, FAR), "c", MotionCaller("5e55c")).accepted
+    assert rig.goal(move(ZERO, FAR), "c", "5e55c").accepted
     rig.run(1.0)
     rig.control(take(ANA), ANA.session, 1)
     rig.control(take(BEN), BEN.session, 2)
@@ -467,7 +470,7 @@ def test_a_client_that_is_no_nodes_token_gets_nothing_and_is_never_watched(key: 
     assert "is not the key of a liveliness token" in rig.controlled[1].reason
     assert len(rig.controlled[1].reason) < 300
     assert rig.core.watched_clients == ()
-    assert rig.goal(move(ZERO, FAR), "a", session_of(ANA)).accepted
+    assert rig.goal(move(ZERO, FAR), "a", ANA.session).accepted
 
 
 @pytest.mark.parametrize("name", ["", " ", "a" * 41, "a" * 100_000, "ana\nERROR", "\x1b[2J", "\0", "a\u202eb"])
@@ -528,7 +531,7 @@ def test_whatever_is_asked_in_whatever_order_only_the_holder_moves_and_the_arm_i
                 rig.control(ControlJoin(client=key_of(who), secret=SECRETS[ANA]), who.session, number)
             case "goal":
                 end = ZERO if max(map(abs, rig.position)) > 0.1 else FAR
-                verdict = rig.goal(move(rig.position, end), f"g{number}", session_of(who))
+                verdict = rig.goal(move(rig.position, end), f"g{number}", who.session)
                 if verdict.accepted and state(rig).held:
                     assert who.node in state(rig).members
             case "gone":
@@ -545,6 +548,6 @@ def test_whatever_is_asked_in_whatever_order_only_the_holder_moves_and_the_arm_i
     assert rig.run(5.0, lambda: 1000 in rig.controlled)
     assert rig.controlled[1000].accepted
     assert state(rig).name == "ben"
-    assert rig.goal(move(rig.position, ZERO), "last", session_of(BEN)).accepted
+    assert rig.goal(move(rig.position, ZERO), "last", BEN.session).accepted
     assert rig.finish("last")[0] is GoalStatusCode.SUCCEEDED
     assert_within_limits(rig)

@@ -15,7 +15,7 @@ from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.topics import DEVICE_STATUS
 from gemelo.services.stepper_gateway.links.frames import Code, CommandReply, decode
 from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind
-from gemelo.tools.virtual_arm.gateway_driver import asked
+from gemelo.tools.virtual_arm.gateway_driver import CancelInput, ConfigureInput, InjectInput, asked
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 from tests.profiles import examples
 from tests.stepper_gateway.harness import move
@@ -109,7 +109,7 @@ def test_every_cancelled_goal_ends_in_time_and_the_arm_does_not_go_on_by_itself(
     rig = lost.rig
     assert rig.goal(move(HOME, READY)).accepted
     lost.ends(when, lambda: "g" in rig.finished)
-    rig.cancel()
+    rig.handle(CancelInput("g"))
     assert lost.ends(BEHIND, lambda: "g" in rig.finished), "the cancelled goal does not end"
     lost.ends(4.0, lambda: not rig.device.moving and rig.device.mode is not DeviceMode.RUN)
     stood = rig.device.steps
@@ -156,8 +156,8 @@ def test_a_configuration_and_an_injection_are_answered_in_time(cut: Cut, when: f
     lost = Lost(cut)
     rig = lost.rig
     lost.ends(when, lambda: False)
-    rig.ask_configuration(1)
-    rig.press(InjectRequest(kind=InjectKind.DRIFT, value=0.0), 2)
+    rig.handle(ConfigureInput(1))
+    rig.handle(InjectInput(2, InjectRequest(kind=InjectKind.DRIFT, value=0.0)))
     assert lost.ends(CONFIGURATION, lambda: 1 in rig.configured and 2 in rig.pressed), "no answer"
 
 

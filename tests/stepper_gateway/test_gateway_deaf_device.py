@@ -7,6 +7,7 @@ import pytest
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceMode
 from gemelo.services.stepper_gateway.links.link import TO_DEVICE
+from gemelo.tools.virtual_arm.gateway_driver import CancelInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import move
 
@@ -55,7 +56,7 @@ def test_an_arm_that_has_not_come_to_rest_yet_is_waited_for() -> None:
     assert rig.goal(move(HOME, READY)).accepted
     rig.run(0.8)
     rig.lost = {"cmd"}
-    assert rig.cancel() == ""
+    assert rig.handle(CancelInput("g")) == ""
     assert rig.finish("g", 6.0)[0] == GoalStatusCode.CANCELED
     assert not any(rig.state.velocity)
     stood = rig.device.steps

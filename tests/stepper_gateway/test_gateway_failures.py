@@ -12,6 +12,7 @@ from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.topics import DEVICE_STATUS, JOINT_STATES
 from gemelo.services.stepper_gateway.links.frames import Ack, CommandReply, StateFrame, SyncReply, encode
 from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.tools.virtual_arm.gateway_driver import CancelInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
@@ -236,7 +237,7 @@ def test_cancel_works_over_a_wire_that_loses_and_reorders(seed: int) -> None:
     rig = VirtualArm(VirtualWire(delay=0.004, jitter=0.01, loss=0.15, duplicates=0.2), seed=seed).ready()
     rig.goal(move(HOME, READY))
     rig.run(0.05 + 0.4 * seed)
-    assert rig.cancel() == ""
+    assert rig.handle(CancelInput("g")) == ""
     status, result = rig.finish(seconds=10.0)
     assert status == GoalStatusCode.CANCELED
     assert result.executed_steps == rig.device.steps

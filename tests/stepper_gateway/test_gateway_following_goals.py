@@ -11,8 +11,8 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import StopKind
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.topics import COMMANDS, JOINT_STATES
+from gemelo.tools.virtual_arm.gateway_driver import CancelInput, SceneInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import assert_within_limits, move
 from tests.stepper_gateway.test_gateway_moves import HOME, READY, expected_steps
@@ -117,7 +117,7 @@ def test_only_one_goal_follows() -> None:
 
 def test_a_goal_that_ended_otherwise_is_not_followed() -> None:
     rig = started()
-    rig.cancel("first")
+    rig.handle(CancelInput("first"))
     assert "is not under way" in rig.goal(follows(READY, FARTHER, "first"), "second").reason or not rig.finished
     rig.finish("first")
     verdict = rig.goal(follows(READY, FARTHER, "first"), "third")
@@ -130,7 +130,7 @@ def test_when_the_first_is_cancelled_the_second_does_not_begin(seconds: float) -
     rig = started()
     rig.goal(follows(READY, FARTHER, "first"), "second")
     rig.run(seconds)
-    rig.cancel("first")
+    rig.handle(CancelInput("first"))
     assert rig.finish("first")[0] == GoalStatusCode.CANCELED
     status, result = rig.finished["second"]
     assert status == GoalStatusCode.ABORTED
@@ -143,7 +143,7 @@ def test_when_the_first_is_cancelled_the_second_does_not_begin(seconds: float) -
 def test_a_following_goal_is_taken_back_before_its_knots_are_sent() -> None:
     rig = started()
     rig.goal(follows(READY, FARTHER, "first"), "second")
-    assert rig.cancel("second") == ""
+    assert rig.handle(CancelInput("second")) == ""
     assert rig.finished["second"][0] == GoalStatusCode.CANCELED
     assert rig.finish("first")[0] == GoalStatusCode.SUCCEEDED
     assert rig.device.steps == expected_steps(READY)
@@ -155,7 +155,7 @@ def test_a_following_goal_whose_knots_are_on_their_way_is_cancelled_as_it_begins
     transmission = rig.core.controller.transmission
     assert rig.run(20.0, lambda: not transmission.has_following)
     assert "first" not in rig.finished
-    assert rig.cancel("second") == ""
+    assert rig.handle(CancelInput("second")) == ""
     assert rig.finish("second")[0] == GoalStatusCode.CANCELED
     assert rig.finished["first"][0] == GoalStatusCode.SUCCEEDED
     rig.run(1.0)
@@ -185,9 +185,9 @@ def test_a_stop_of_a_person_ends_both() -> None:
 
 def test_a_scene_that_changes_before_it_begins_ends_it_and_not_the_first() -> None:
     rig = started()
-    rig.core.on_scene(PlanningScene(version=4, epoch=1))
+    rig.handle(SceneInput(4, 1))
     assert rig.goal(follows(READY, FARTHER, "first", scene=4), "second").accepted
-    rig.core.on_scene(PlanningScene(version=5, epoch=1))
+    rig.handle(SceneInput(5, 1))
     status, result = rig.finish("second", 0.1)
     assert (status, result.error_code) == (GoalStatusCode.ABORTED, FollowErrorCode.SCENE_CHANGED)
     assert rig.finish("first")[0] == GoalStatusCode.SUCCEEDED

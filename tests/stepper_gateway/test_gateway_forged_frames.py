@@ -19,6 +19,7 @@ from gemelo.schemas.message import encode as encode_message
 from gemelo.schemas.topics import JOINT_STATES
 from gemelo.services.stepper_gateway.links.frames import SyncReply, decode, encode
 from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, Kind
+from gemelo.tools.virtual_arm.gateway_driver import CancelInput
 from gemelo.tools.virtual_arm.virtual_arm import BOOTED, GATEWAY_ZERO, VirtualArm
 from tests.stepper_gateway.harness import move
 
@@ -211,7 +212,7 @@ def test_a_forged_answer_to_every_question_for_the_clock_moves_it_nowhere(offset
 def test_a_stop_whose_answer_is_forged_from_ahead_still_ends_the_goal(by: int) -> None:
     rig = moving_rig()
     rig.forges[Kind.CMD_ACK].append(later(by, "t_us"))
-    assert rig.cancel() == ""
+    assert rig.handle(CancelInput("g")) == ""
     assert rig.finish(seconds=3.0)[0] == GoalStatusCode.CANCELED
     rig.assert_next_goal_succeeds()
 

@@ -11,6 +11,7 @@ from gemelo.schemas.device import DeviceMode, InjectKind, InjectRequest
 from gemelo.services.stepper_gateway.device.injection_handler import target_of
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected
 from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.tools.virtual_arm.gateway_driver import InjectInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.processes import Processes
 from tests.stepper_gateway.wired import WiredGateway
@@ -40,7 +41,7 @@ def test_a_real_device_is_not_pressed_by_a_request() -> None:
     status = {"online": True, "boot_id": 77, "joints": 3, "config_crc32": rig.core.device.configuration.crc32}
     for _ in range(2):  # it is asked again before a change is believed
         rig.receive(Kind.STATUS, json.dumps(status).encode())
-    rig.press(ESTOP)
+    rig.handle(InjectInput(1, ESTOP))
     assert not rig.pressed[1].accepted
     assert "by hand" in rig.pressed[1].reason
     assert not presses(rig)
@@ -48,8 +49,8 @@ def test_a_real_device_is_not_pressed_by_a_request() -> None:
 
 def test_presses_go_out_one_at_a_time_and_each_gets_its_own_answer() -> None:
     rig = virtual(VirtualArm())
-    rig.press(ESTOP, 1)
-    rig.press(InjectRequest(kind=InjectKind.SWITCH, target="limit_q1"), 2)
+    rig.handle(InjectInput(1, ESTOP))
+    rig.handle(InjectInput(2, InjectRequest(kind=InjectKind.SWITCH, target="limit_q1")))
     assert presses(rig) == ["estop"]
     say(rig, "injected")
     assert rig.pressed[1].accepted
@@ -60,8 +61,8 @@ def test_presses_go_out_one_at_a_time_and_each_gets_its_own_answer() -> None:
 
 def test_a_press_that_is_not_answered_is_given_up_and_the_next_one_goes_out() -> None:
     rig = virtual(VirtualArm())
-    rig.press(ESTOP, 1)
-    rig.press(ESTOP, 2)
+    rig.handle(InjectInput(1, ESTOP))
+    rig.handle(InjectInput(2, ESTOP))
     rig.run(2.5)
     assert "not answered" in rig.pressed[1].reason
     assert presses(rig) == ["estop", "estop"]
@@ -69,8 +70,8 @@ def test_a_press_that_is_not_answered_is_given_up_and_the_next_one_goes_out() ->
 
 def test_a_device_that_starts_anew_before_its_answer_has_left_was_pressed() -> None:
     rig = virtual(VirtualArm())
-    rig.press(InjectRequest(kind=InjectKind.REBOOT), 1)
-    rig.press(ESTOP, 2)
+    rig.handle(InjectInput(1, InjectRequest(kind=InjectKind.REBOOT)))
+    rig.handle(InjectInput(2, ESTOP))
     rig.reboot(boot_id=78)
     assert rig.run(1.0, lambda: 1 in rig.pressed)
     assert rig.pressed[1].accepted
@@ -80,7 +81,7 @@ def test_a_device_that_starts_anew_before_its_answer_has_left_was_pressed() -> N
 
 def test_a_press_of_something_else_is_not_done_by_a_reboot() -> None:
     rig = virtual(VirtualArm())
-    rig.press(ESTOP, 1)
+    rig.handle(InjectInput(1, ESTOP))
     rig.reboot(boot_id=78)
     rig.run(1.0)
     assert "rebooted" in rig.events()
@@ -95,7 +96,7 @@ def last_will(rig: VirtualArm, boot_id: int = 77) -> None:
 
 def test_a_device_that_vanishes_before_its_answer_has_left_is_offline_as_was_asked() -> None:
     rig = virtual(VirtualArm())
-    rig.press(InjectRequest(kind=InjectKind.OFFLINE, value=1.0), 1)
+    rig.handle(InjectInput(1, InjectRequest(kind=InjectKind.OFFLINE, value=1.0)))
     last_will(rig)
     assert rig.pressed[1].accepted
 
@@ -103,7 +104,7 @@ def test_a_device_that_vanishes_before_its_answer_has_left_is_offline_as_was_ask
 @pytest.mark.parametrize(("kind", "boot_id"), [(InjectKind.ESTOP, 77), (InjectKind.OFFLINE, 76)])
 def test_no_last_will_is_the_answer_to_another_press_or_of_another_boot(kind: InjectKind, boot_id: int) -> None:
     rig = virtual(VirtualArm())
-    rig.press(InjectRequest(kind=kind), 1)
+    rig.handle(InjectInput(1, InjectRequest(kind=kind)))
     last_will(rig, boot_id)
     assert 1 not in rig.pressed
     rig.run(2.5)
@@ -114,7 +115,7 @@ def test_an_absent_device_is_not_pressed() -> None:
     rig = virtual(VirtualArm())
     rig.wire.is_cut = True
     rig.run(1.0)
-    rig.press(ESTOP)
+    rig.handle(InjectInput(1, ESTOP))
     assert "silent" in rig.pressed[1].reason
 
 

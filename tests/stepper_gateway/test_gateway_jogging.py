@@ -13,6 +13,7 @@ from gemelo.schemas.topics import DEVICE_EVENTS, JOINT_STATES
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.jog.jog import PERIOD, Jog
+from gemelo.tools.virtual_arm.gateway_driver import TargetsInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
 
@@ -40,7 +41,7 @@ class JoggedRig:
             state = self.rig.messages(JOINT_STATES)[-1]
             output = self.jog.step(self.rig.now, 0, state, 0.02, self.goal_is_active)
             if output.targets is not None:
-                self.rig.stream(output.targets)
+                self.rig.handle(TargetsInput(output.targets))
             if self.jog.commanded is not None:
                 self.led = tuple(self.jog.commanded[0].tolist())
             if output.status is not None:

@@ -54,7 +54,7 @@ def test_large_goals_one_after_the_other_are_recorded_in_messages_that_fit_and_c
     log = InputLog(arm.core, began, arm.moment, messages.append)
     goals = [GoalInput(f"g{index}", wave(MOST_POINTS // 4, arm, True)) for index in range(3)]
     for goal in goals:
-        log.give(goal, arm.moment)
+        log.handle(goal, arm.moment)
     log.finish()
     assert [given.input for message in messages for given in unpacked(message.inputs)] == [began, *goals]
     assert all(encoded(message) for message in messages)

@@ -19,6 +19,7 @@ from gemelo.services.stepper_gateway.goals.goal_validator import GoalValidator
 from gemelo.services.stepper_gateway.links.frames import StateFrame
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.tools.virtual_arm.gateway_driver import CancelInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
 
@@ -74,7 +75,7 @@ def test_the_log_says_what_moved_where_how_long_and_with_what_error() -> None:
     assert any(line.startswith("motion finished: at brazo_joint +0.6") for line in rig.log)
     rig.goal(move(READY, HOME), "h")
     rig.run(0.3)
-    rig.cancel("h")
+    rig.handle(CancelInput("h"))
     rig.finish("h")
     assert any(": the arm decelerated on its path; brazo_joint from +0.6" in line for line in rig.log)
 
@@ -191,7 +192,7 @@ def test_cancel_decelerates_on_the_path_within_the_limits() -> None:
     rig = VirtualArm().ready()
     rig.goal(move(HOME, READY))
     rig.run(1.5)
-    assert rig.cancel() == ""
+    assert rig.handle(CancelInput("g")) == ""
     status, result = rig.finish()
     assert status == GoalStatusCode.CANCELED
     assert result.error_code == FollowErrorCode.CANCELED
@@ -207,16 +208,16 @@ def test_cancel_decelerates_on_the_path_within_the_limits() -> None:
 def test_a_cancel_at_once_and_one_at_the_end_both_end_the_goal() -> None:
     rig = VirtualArm().ready()
     rig.goal(move(HOME, READY), "early")
-    assert rig.cancel("early") == ""
+    assert rig.handle(CancelInput("early")) == ""
     assert rig.finish("early", 5.0)[0] == GoalStatusCode.CANCELED
     rig.goal(move(rig.position, READY), "late")
     stream = rig.core.controller.stream
     assert stream is not None
     rig.run(20.0, lambda: stream.is_complete)
     rig.run(0.2)
-    assert rig.cancel("late") == ""
+    assert rig.handle(CancelInput("late")) == ""
     assert rig.finish("late", 5.0)[0] == GoalStatusCode.CANCELED
-    assert "not being carried out" in rig.cancel("late")
+    assert "not being carried out" in rig.handle(CancelInput("late"))
     assert_within_limits(rig)
 
 

@@ -16,6 +16,7 @@ from gemelo.schemas.motion import (
 from gemelo.schemas.topics import DEVICE_STATE, JOINT_STATES
 from gemelo.services.stepper_gateway.device.clock import ENOUGH, ClockSync
 from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.tools.virtual_arm.gateway_driver import CancelInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
 
@@ -129,7 +130,7 @@ def test_a_lost_link_while_a_goal_waits_leaves_no_motion_behind() -> None:
 
 def test_canceling_a_goal_that_waits_behind_a_motion_stops_the_motion() -> None:
     rig = rig_with_a_goal_that_waits()
-    assert rig.cancel("second") == ""
+    assert rig.handle(CancelInput("second")) == ""
     assert rig.finish("second", 3.0)[0] == GoalStatusCode.CANCELED
     assert not rig.device.moving
     assert_next_goal_succeeds(rig)
@@ -138,7 +139,7 @@ def test_canceling_a_goal_that_waits_behind_a_motion_stops_the_motion() -> None:
 def test_a_canceled_goal_stays_canceled_when_a_stamped_one_comes_due_meanwhile() -> None:
     rig = moving_rig()
     assert rig.goal(later(rig, move(here(rig), HOME), 0.2), "stamped").accepted
-    assert rig.cancel() == ""
+    assert rig.handle(CancelInput("g")) == ""
     assert rig.finish()[0] == GoalStatusCode.CANCELED
     assert rig.finish("stamped")[0] in (GoalStatusCode.ABORTED, GoalStatusCode.SUCCEEDED)
     assert_next_goal_succeeds(rig)
@@ -151,7 +152,7 @@ def test_a_stamped_goal_that_is_canceled_leaves_streaming_as_it_was() -> None:
         rig.run(0.1)
     assert rig.goal(later(rig, move(here(rig), HOME), 30.0), "stamped").accepted
     rig.run(0.1)
-    assert rig.cancel("stamped") == ""
+    assert rig.handle(CancelInput("stamped")) == ""
     rig.run(3.0)
     assert rig.device.mode == DeviceMode.IDLE
     for _ in range(40):
@@ -178,7 +179,7 @@ def test_a_late_chunk_of_a_stopped_stream_ends_the_goal_that_it_disturbs() -> No
     rig = VirtualArm().ready()
     rig.goal(move(HOME, READY), "old")
     late = rig.drop("traj")
-    assert rig.cancel("old") == ""
+    assert rig.handle(CancelInput("old")) == ""
     assert rig.finish("old", 2.0)[0] == GoalStatusCode.CANCELED
     rig.device.receive(late[0])
     goal = FollowJointTrajectoryGoal(trajectory=move(HOME, READY), goal_time_tolerance=-1.0)

@@ -7,8 +7,8 @@ from msgspec.structs import replace
 
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from gemelo.schemas.scene import PlanningScene
 from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
+from gemelo.tools.virtual_arm.gateway_driver import PlannerInput, SceneInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import move
 
@@ -27,13 +27,13 @@ def goal(
 
 def heard(*versions: int) -> VirtualArm:
     """A gateway that has been told these versions of a scene, in this order."""
-    return told(*(PlanningScene(version=version) for version in versions))
+    return told(*(SceneInput(version, 0) for version in versions))
 
 
-def told(*scenes: PlanningScene) -> VirtualArm:
+def told(*scenes: SceneInput) -> VirtualArm:
     rig = VirtualArm().ready()
     for scene in scenes:
-        rig.core.on_scene(scene)
+        rig.handle(scene)
     return rig
 
 
@@ -70,14 +70,14 @@ def test_a_client_may_know_of_a_new_scene_sooner_than_the_gateway():
 
 def test_a_scene_that_went_back_makes_plans_of_the_later_one_bad():
     """A planner whose file was damaged begins again with nothing around the arm."""
-    rig = told(PlanningScene(version=4, epoch=7), PlanningScene(version=5, epoch=7), PlanningScene(version=0))
+    rig = told(SceneInput(4, 7), SceneInput(5, 7), SceneInput(0, 0))
     assert rig.goal(goal(5, epoch=7)).code is FollowErrorCode.SCENE_CHANGED
     assert rig.goal(goal(0, epoch=0)).accepted
 
 
 def test_a_scene_that_has_grown_to_the_same_version_again_is_another():
     """After a lost file, and as many edits as before it."""
-    rig = told(PlanningScene(version=5, epoch=7), PlanningScene(version=0), PlanningScene(version=5, epoch=8))
+    rig = told(SceneInput(5, 7), SceneInput(0, 0), SceneInput(5, 8))
     verdict = rig.goal(goal(5, epoch=7))
     assert verdict.code is FollowErrorCode.SCENE_CHANGED
     assert "holds no more" in verdict.reason
@@ -89,7 +89,7 @@ def test_a_scene_that_has_grown_to_the_same_version_again_is_another():
 def test_a_version_that_no_planner_gives_is_dropped_counted_and_said_once(version: int):
     rig = heard(4)
     for _ in range(3):
-        rig.core.on_scene(PlanningScene(version=version))
+        rig.handle(SceneInput(version, 0))
     assert rig.core.scenes_dropped == 3
     assert rig.goal(goal(3)).code is FollowErrorCode.SCENE_CHANGED
     assert rig.goal(goal(4)).accepted
@@ -101,7 +101,7 @@ def test_a_goal_that_waits_for_its_time_is_aborted_where_the_scene_changes_meanw
     rig = heard(4)
     assert rig.goal(goal(4, delay=1.0, rig=rig)).accepted
     rig.run(0.5)
-    rig.core.on_scene(PlanningScene(version=5))
+    rig.handle(SceneInput(5, 0))
     status, result = rig.finish()
     assert (status, result.error_code) == (GoalStatusCode.ABORTED, FollowErrorCode.SCENE_CHANGED)
     assert rig.position == HOME
@@ -111,7 +111,7 @@ def test_an_edit_does_not_stop_what_is_under_way():
     rig = heard(4)
     assert rig.goal(goal(4)).accepted
     rig.run(0.2)
-    rig.core.on_scene(PlanningScene(version=5))
+    rig.handle(SceneInput(5, 0))
     assert rig.finish()[0] is GoalStatusCode.SUCCEEDED
 
 
@@ -122,8 +122,8 @@ def alive(*instances: str) -> VirtualArm:
     """A gateway for which these planners live, and have published scene 4 of epochs 1, 2 ... in this order."""
     rig = VirtualArm().ready()
     for epoch, instance in enumerate(instances, 1):
-        rig.core.on_planner(instance, True, rig.moment)
-        rig.core.on_scene(PlanningScene(version=4, epoch=epoch), instance)
+        rig.handle(PlannerInput(instance, True))
+        rig.handle(SceneInput(4, epoch, instance))
     return rig
 
 
@@ -131,7 +131,7 @@ def alive(*instances: str) -> VirtualArm:
 def test_a_scene_of_a_planner_that_does_not_live_changes_nothing_and_is_logged_once(stranger: str):
     rig = alive(NEWER)
     for version in (7, 8):
-        rig.core.on_scene(PlanningScene(version=version, epoch=9), stranger)
+        rig.handle(SceneInput(version, 9, stranger))
     assert rig.goal(goal(8, epoch=9)).code is FollowErrorCode.SCENE_CHANGED
     assert rig.goal(goal(4, epoch=1)).accepted
     assert rig.finish()[0] is GoalStatusCode.SUCCEEDED
@@ -145,14 +145,14 @@ def test_of_two_planners_that_live_no_plan_is_followed_until_one_has_ended():
         verdict = rig.goal(goal(4, epoch=epoch))
         assert verdict.code is FollowErrorCode.SCENE_CHANGED
         assert "two planners live, process 12 on workshop and process 34 on office" in verdict.reason
-    rig.core.on_planner(OLDER, False, rig.moment)
+    rig.handle(PlannerInput(OLDER, False))
     assert rig.goal(goal(4, epoch=1)).code is FollowErrorCode.SCENE_CHANGED
     assert rig.goal(goal(4, epoch=2)).accepted
 
 
 def test_a_planner_beside_which_a_second_one_came_and_went_is_followed_again():
     rig = alive(OLDER, NEWER)
-    rig.core.on_planner(NEWER, False, rig.moment)
+    rig.handle(PlannerInput(NEWER, False))
     assert rig.goal(goal(4, epoch=2)).code is FollowErrorCode.SCENE_CHANGED
     assert rig.goal(goal(4, epoch=1)).accepted
 
@@ -160,22 +160,22 @@ def test_a_planner_beside_which_a_second_one_came_and_went_is_followed_again():
 def test_a_planner_that_starts_and_gives_way_at_once_hinders_nothing():
     """A second node of a name declares its token for a moment, and publishes nothing."""
     rig = alive(OLDER)
-    rig.core.on_planner(NEWER, True, rig.moment)
+    rig.handle(PlannerInput(NEWER, True))
     assert rig.goal(goal(4, epoch=1)).accepted
 
 
 def test_a_scene_that_comes_before_its_planners_token_counts_once_that_is_there():
     rig = alive(OLDER)
-    rig.core.on_planner(OLDER, False, rig.moment)
-    rig.core.on_scene(PlanningScene(version=1, epoch=2), NEWER)
+    rig.handle(PlannerInput(OLDER, False))
+    rig.handle(SceneInput(1, 2, NEWER))
     assert rig.goal(goal(1, epoch=2)).code is FollowErrorCode.SCENE_CHANGED
-    rig.core.on_planner(NEWER, True, rig.moment)
+    rig.handle(PlannerInput(NEWER, True))
     assert rig.goal(goal(1, epoch=2)).accepted
 
 
 def test_a_router_that_takes_all_tokens_with_it_leaves_the_scene_as_it_is():
     rig = alive(OLDER)
-    rig.core.on_planner(OLDER, False, rig.moment)
+    rig.handle(PlannerInput(OLDER, False))
     assert rig.goal(goal(3, epoch=1)).code is FollowErrorCode.SCENE_CHANGED
     assert rig.goal(goal(4, epoch=1)).accepted
 
@@ -183,5 +183,5 @@ def test_a_router_that_takes_all_tokens_with_it_leaves_the_scene_as_it_is():
 def test_scenes_of_many_strangers_do_not_push_out_that_of_the_living_planner():
     rig = alive(OLDER)
     for number in range(100):
-        rig.core.on_scene(PlanningScene(version=9, epoch=9), f"{number:020d}.1.nowhere")
+        rig.handle(SceneInput(9, 9, f"{number:020d}.1.nowhere"))
     assert rig.goal(goal(4, epoch=1)).accepted

@@ -14,7 +14,7 @@ from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.schemas.topics import JOINT_STATES
-from gemelo.tools.virtual_arm.gateway_driver import asked
+from gemelo.tools.virtual_arm.gateway_driver import CancelInput, TargetsInput, asked
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
@@ -184,7 +184,7 @@ def stream(share: Vector, reach: float, count: int, period: float) -> Action:
     def act(play: Play) -> None:
         for _ in range(count):
             target = JointTargets(name=rm1().joint_names, position=near(play, share, reach))
-            play.rig.stream(target)
+            play.rig.handle(TargetsInput(target))
             play.wait(period)
 
     return act
@@ -237,7 +237,10 @@ EXPLORED = st.one_of(
         shares, reaches, st.sampled_from([0.0, 0.001, 0.5, 4.0, 8.0]), st.booleans(),
     ),
     st.builds(lambda rests: lambda play: play.goal(point(play.here(), 0.0, rests)), st.booleans()),
-    st.builds(lambda back: lambda play: play.rig.cancel(f"g{max(0, len(play.accepted) - back)}"), st.integers(1, 2)),
+    st.builds(
+        lambda back: lambda play: play.rig.handle(CancelInput(f"g{max(0, len(play.accepted) - back)}")),
+        st.integers(1, 2),
+    ),
     st.builds(stream, shares, reaches, st.integers(1, 12), st.sampled_from([0.02, 0.1, 0.4])),
     st.builds(lambda kind: lambda play: play.command(kind), st.sampled_from(PLAIN)),
     st.builds(

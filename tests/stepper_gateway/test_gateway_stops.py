@@ -11,6 +11,7 @@ from gemelo.services.stepper_gateway.device.pending_commands import MOST_TICKETS
 from gemelo.services.stepper_gateway.links.frames import CommandFrame, decode
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.tools.virtual_arm.gateway_driver import ConfigureInput, InjectInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import assert_within_limits, move
 
@@ -99,9 +100,9 @@ def test_a_stop_reaches_a_boot_that_the_gateway_has_not_met_yet() -> None:
 def test_a_stop_leaves_at_once_with_a_configuration_and_twenty_presses_unanswered() -> None:
     rig = moving()
     rig.lost = {Kind.CONFIG, Kind.INJECT}
-    rig.ask_configuration(500)
+    rig.handle(ConfigureInput(500))
     for number in range(20):
-        rig.press(InjectRequest(kind=InjectKind.ESTOP), 1000 + number)
+        rig.handle(InjectInput(1000 + number, InjectRequest(kind=InjectKind.ESTOP)))
     before = rig.now
     rig.ask(StopKind.STOP, 7)
     assert [at for at, kind, _ in rig.sent if kind == Kind.CMD] == [before]

@@ -16,6 +16,7 @@ from gemelo.schemas.joints import JointState
 from gemelo.schemas.topics import DEVICE_EVENTS, JOINT_STATES
 from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
 from gemelo.services.stepper_gateway.motion.target_tracker import TargetTracker
+from gemelo.tools.virtual_arm.gateway_driver import TargetsInput
 from gemelo.tools.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
@@ -141,7 +142,7 @@ def test_a_malformed_target_is_refused_and_nothing_moves(
     from gemelo.schemas.joints import JointTargets
 
     rig = VirtualArm().ready()
-    rig.stream(JointTargets(name=names, position=positions))
+    rig.handle(TargetsInput(JointTargets(name=names, position=positions)))
     rig.run(1.0)
     assert said in rig.messages(DEVICE_EVENTS)[-1].detail
     assert rig.device.steps == (0, 0, 0)

@@ -11,7 +11,7 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceMode, StopKind
 from gemelo.services.stepper_gateway.links.frames import Ack, Code, decode
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, Moment
+from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, LinkInput, Moment, StepInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.profiles import examples
 from tests.stepper_gateway.harness import move
@@ -58,7 +58,7 @@ class Twins(VirtualArm):
         """The second gateway's process starts."""
         self.second = SecondGateway(self)
         self.second.start_core(self.arm, 2_000_000_000)
-        self.second.carry_out(self.second.core.on_link(True, "", self.second.moment))
+        self.second.handle(LinkInput(True, ""))
         self.device.report_status()
         return self.second
 
@@ -86,7 +86,7 @@ class Twins(VirtualArm):
     def _deliver(self) -> None:
         super()._deliver()
         if self.second is not None and self.now_us == self._next_beat:
-            self.second.carry_out(self.second.core.step(self.second.moment))
+            self.second.handle(StepInput())
 
 
 def accepted(driver: GatewayDriver, goal_id: str, arm: VirtualArm) -> bool:

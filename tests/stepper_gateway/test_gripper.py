@@ -19,6 +19,7 @@ from gemelo.schemas.device import DeviceCommandKind, InjectKind, InjectRequest, 
 from gemelo.schemas.gripper import GripperCommandGoal, GripperState
 from gemelo.schemas.robot import ServoGripper
 from gemelo.schemas.topics import GRIPPER_STATE
+from gemelo.tools.virtual_arm.gateway_driver import GripCancelInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.profiles import examples
 
@@ -151,7 +152,7 @@ def test_a_cancel_lets_the_jaws_stay_where_they_are():
     arm = opened()
     arm.grip(0.0)
     arm.run(0.25)
-    assert arm.cancel_grip() == ""
+    assert arm.handle(GripCancelInput("grip")) == ""
     status, _ = arm.finish_grip()
     arm.run(0.2)
     there = arm.device.opening
@@ -159,7 +160,7 @@ def test_a_cancel_lets_the_jaws_stay_where_they_are():
     arm.run(1.0)
     assert 0.015 < there < 0.04
     assert arm.device.opening == there
-    assert "is not being carried out" in arm.cancel_grip()
+    assert "is not being carried out" in arm.handle(GripCancelInput("grip"))
 
 
 def test_a_newer_goal_takes_over():

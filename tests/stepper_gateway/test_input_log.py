@@ -14,7 +14,6 @@ from gemelo.services.stepper_gateway.inputs import (
     SceneInput,
     StepInput,
     digest_of,
-    give,
     unpacked,
 )
 from gemelo.services.stepper_gateway.links.link import Kind
@@ -42,7 +41,7 @@ class Log:
     def run(self, seconds: float, is_on: bool = True) -> None:
         for _ in range(round(seconds / 0.02)):
             self.now += 0.02
-            self.log.give(StepInput(), self.moment)
+            self.log.handle(StepInput(), self.moment)
             self.log.step(self.moment, is_on)
 
     @property
@@ -77,14 +76,14 @@ def test_the_end_is_said_too():
 
 def test_each_input_has_its_moment_and_gives_the_same_again():
     log = Log()
-    log.log.give(LinkInput(True, ""), log.moment)
+    log.log.handle(LinkInput(True, ""), log.moment)
     log.run(2.0)
-    log.log.give(SceneInput(3, 4), log.moment)
+    log.log.handle(SceneInput(3, 4), log.moment)
     log.log.finish()
     again = GatewayCore(rm1(), BEGAN.session, BEGAN.parameters)
     others = GatewayCore(rm1(), BEGAN.session, BEGAN.parameters)
     for given in log.inputs[1:]:
-        assert give(again, given.input, given.moment) == give(others, given.input, given.moment)
+        assert again.handle(given.input, given.moment) == others.handle(given.input, given.moment)
     assert [given.moment.monotonic for given in log.inputs] == sorted(given.moment.monotonic for given in log.inputs)
 
 
@@ -112,7 +111,7 @@ def test_the_input_that_ends_the_core_is_said_before_its_error(monkeypatch):
     def broken(*_):
         raise ZeroDivisionError
 
-    monkeypatch.setattr(log.core, "on_link", broken)
+    monkeypatch.setattr(log.core, "handle", broken)
     with pytest.raises(ZeroDivisionError):
-        log.log.give(LinkInput(False, "gone"), log.moment)
+        log.log.handle(LinkInput(False, "gone"), log.moment)
     assert log.inputs[-1].input == LinkInput(False, "gone")

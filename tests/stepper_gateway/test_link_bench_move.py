@@ -14,6 +14,7 @@ from gemelo.schemas.topics import DEVICE_ECHO, JOINT_STATES, JOINT_TARGETS
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.common.session import CommandSession
 from gemelo.tools.cli.device.link_bench import SWING, measure, swinging
+from gemelo.tools.virtual_arm.gateway_driver import EchoInput, TargetsInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire, rm1
 from tests.stepper_gateway.harness import assert_within_limits
 
@@ -38,7 +39,7 @@ class VirtualNode:
         assert service is DEVICE_ECHO
         self._tickets += 1
         ticket = self._tickets
-        self._rig.carry_out(self._rig.core.on_echo(ticket, self._rig.moment))
+        self._rig.handle(EchoInput(ticket))
         assert self._rig.run(timeout, lambda: ticket in self._rig.echoed)
         return self._rig.echoed.pop(ticket)
 
@@ -59,7 +60,7 @@ class VirtualNode:
         rig = self._rig
 
         def put(targets: JointTargets) -> None:
-            rig.carry_out(rig.core.on_targets(targets, rig.moment))
+            rig.handle(TargetsInput(targets))
 
         return SimpleNamespace(put=put)
 

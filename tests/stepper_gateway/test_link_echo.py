@@ -10,13 +10,13 @@ import pytest
 
 from gemelo.schemas.device import EchoResponse
 from gemelo.tools.cli.device.link_bench import plot, result_of, text_of, write_csv
-from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver
+from gemelo.tools.virtual_arm.gateway_driver import EchoInput, GatewayDriver
 from gemelo.tools.virtual_arm.sketch_arm import SketchArm
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, VirtualWire
 
 
 def echo(arm: GatewayDriver, ticket: int = 1) -> EchoResponse:
-    arm.carry_out(arm.core.on_echo(ticket, arm.moment))
+    arm.handle(EchoInput(ticket))
     assert arm.run(3.0, lambda: ticket in arm.echoed)
     return arm.echoed.pop(ticket)
 

@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 
 from gemelo.schemas.device import DeviceState, DeviceStatus
-from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.visualizer.content.panel import PanelInputs, panel
 from gemelo.tools.cli.device import device_status
 from gemelo.tools.cli.device.device_snapshot import device_snapshot
 from gemelo.tools.cli.watch import doctor, state
+from gemelo.tools.virtual_arm.gateway_driver import PlannerInput, SceneInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.test_gateway_twins import Twins
 from tests.stepper_gateway.test_gateway_two_devices import TwoDevices
@@ -95,8 +95,8 @@ def test_what_is_to_mend_beside_an_online_device_is_in_every_view(cause: str) ->
     arm = VirtualArm().ready()
     if "planners" in cause:
         for number, instance in enumerate(("1.1.a", "2.2.b"), 1):
-            arm.core.on_planner(instance, True, arm.moment)
-            arm.core.on_scene(PlanningScene(version=number), instance)
+            arm.handle(PlannerInput(instance, True))
+            arm.handle(SceneInput(number, 0, instance))
     else:
         for _ in range(6):
             arm.receive(Kind.STATE, b"q1=10 q2=20")

@@ -12,6 +12,7 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode, OutputCommand, StopKind
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import JointTrajectory
+from gemelo.tools.virtual_arm.gateway_driver import CancelInput
 from gemelo.tools.virtual_arm.sketch_arm import SketchArm, ra_arm
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import move
@@ -204,7 +205,7 @@ def test_a_cancel_ends_when_the_sketch_has_had_its_last_message() -> None:
     assert arm.goal(ra_move(HOME, (QUARTER, 0.0, 0.0))).accepted
     arm.run(3.0)
     at = arm.now
-    assert arm.cancel() == ""
+    assert arm.handle(CancelInput("g")) == ""
     assert arm.finish()[0] is GoalStatusCode.CANCELED
     assert arm.now - at < 4.0
     assert settled(arm)

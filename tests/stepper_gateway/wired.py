@@ -13,7 +13,15 @@ from gemelo.libraries.mqtt.access import BrokerAccess
 from gemelo.schemas.device import InjectRequest, InjectResponse
 from gemelo.services.stepper_gateway.links.link import Link
 from gemelo.services.stepper_gateway.links.mqtt import MqttLink
-from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, Kind, Moment
+from gemelo.tools.virtual_arm.gateway_driver import (
+    FrameInput,
+    GatewayDriver,
+    InjectInput,
+    Kind,
+    LinkInput,
+    Moment,
+    StepInput,
+)
 from gemelo.tools.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.harness import move
 
@@ -53,12 +61,12 @@ class WiredGateway(GatewayDriver):
                 return True
             if time.monotonic() >= due:
                 due = time.monotonic() + 0.02
-                self.carry_out(self.core.step(self.moment))
+                self.handle(StepInput())
             self._woken.wait(max(0.0, due - time.monotonic()))
             self._woken.clear()
-            self.carry_out(self.core.on_link(self.link.connected, self.link.reason, self.moment))
+            self.handle(LinkInput(self.link.connected, self.link.reason))
             for received in self.link.take(64):
-                self.carry_out(self.core.on_received(received, self.moment))
+                self.handle(FrameInput(*received))
         return until is None or until()
 
     def ready(self) -> None:
@@ -71,6 +79,6 @@ class WiredGateway(GatewayDriver):
 
     def answer_to_press(self, request: InjectRequest) -> InjectResponse:
         """The answer of the virtual device."""
-        self.press(request)
+        self.handle(InjectInput(1, request))
         assert self.run(8.0, lambda: 1 in self.pressed)
         return self.pressed.pop(1)

@@ -25,7 +25,7 @@ from gemelo.schemas.topics import (
     Topic,
 )
 from gemelo.services.stepper_gateway.core import GatewayCore
-from gemelo.services.stepper_gateway.inputs import BeganInput, Given, Input, Reply, digest_of, give, unpacked
+from gemelo.services.stepper_gateway.inputs import BeganInput, Given, Input, Reply, digest_of, unpacked
 from gemelo.services.stepper_gateway.outputs import GoalFinished, GripperFinished, Output, Publish, SendFrame
 from gemelo.tools.replay.comparison import ABSENT, Comparison
 from gemelo.tools.replay.recorded import AGAIN, Heard, NotReplayable, Recorded
@@ -111,7 +111,7 @@ class GatewayAgain:
             return
         assert self._core is not None  # the first message begins with `BeganInput`
         try:
-            reply, outputs = give(self._core, given.input, given.moment)
+            reply, outputs = self._core.handle(given.input, given.moment)
         except Exception as error:
             self._differ(at, given.input, given.digest, f"the core ends by {type(error).__name__}: {error}")
             return

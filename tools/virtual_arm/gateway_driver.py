@@ -1,4 +1,4 @@
-"""Drives a gateway core without bus and process: asks it for things and keeps what it answers and publishes.
+"""Drives a gateway core without bus and process: gives it inputs, and keeps what it answers and publishes.
 
 This file is the only one of the room that knows the gateway's modules.
 """
@@ -22,7 +22,6 @@ from gemelo.schemas.device import (
     DeviceState,
     DeviceStopRequest,
     EchoResponse,
-    InjectRequest,
     InjectResponse,
     StopKind,
 )
@@ -37,12 +36,33 @@ from gemelo.schemas.motion import (
 )
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import Topic
-from gemelo.services.stepper_gateway.control.clients import MotionCaller
 from gemelo.services.stepper_gateway.core import GatewayCore
 from gemelo.services.stepper_gateway.device.command_arguments import KINDS
 from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
+from gemelo.services.stepper_gateway.inputs import (
+    CancelInput,
+    CommandInput,
+    ConfigureInput,
+    EchoInput,
+    FrameInput,
+    GiveControlInput,
+    GoalInput,
+    GripCancelInput,
+    GripInput,
+    InjectInput,
+    Input,
+    JoinControlInput,
+    LinkInput,
+    PlannerInput,
+    Reply,
+    SceneInput,
+    StepInput,
+    StopInput,
+    TakeControlInput,
+    TargetsInput,
+)
 from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
-from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.outputs import (
     Answer,
@@ -59,7 +79,10 @@ from gemelo.services.stepper_gateway.outputs import (
 )
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
-__all__ = ["GatewayDriver", "GatewayParameters", "Kind", "Moment", "MotionCaller", "asked"]
+__all__ = [
+    "CancelInput", "ConfigureInput", "EchoInput", "FrameInput", "GatewayDriver", "GatewayParameters", "GripCancelInput",
+    "InjectInput", "Kind", "LinkInput", "Moment", "PlannerInput", "SceneInput", "StepInput", "TargetsInput", "asked",
+]  # fmt: skip
 
 Ended = tuple[GoalStatusCode, FollowJointTrajectoryResult]
 
@@ -124,35 +147,32 @@ class GatewayDriver(ABC):
         """Names of all device events, oldest first."""
         return [event.event for event in self.published["device/events"]]
 
+    def handle(self, given: Input) -> Reply:
+        """Gives the core one input now, and carries out what comes of it; returns what it says at once."""
+        reply, outputs = self.core.handle(given, self.moment)
+        self.carry_out(outputs)
+        return reply
+
     def goal(
-        self,
-        goal: FollowJointTrajectoryGoal | JointTrajectory,
-        goal_id: str = "g",
-        caller: MotionCaller = MotionCaller(),  # noqa: B008 a tuple of texts
+        self, goal: FollowJointTrajectoryGoal | JointTrajectory, goal_id: str = "g", session: str = ""
     ) -> GoalVerdict:
         """Asks the gateway to follow a trajectory; returns its acceptance or refusal."""
         if isinstance(goal, JointTrajectory):
             goal = FollowJointTrajectoryGoal(trajectory=goal)
-        verdict, outputs = self.core.on_goal(goal_id, goal, self.moment, caller)
-        self.carry_out(outputs)
-        return verdict
+        return self._verdict(GoalInput(goal_id, goal, session))
 
     def finish(self, goal_id: str = "g", seconds: float = 60.0) -> Ended:
         """Lets time pass until the goal has ended, at most `seconds` [s]; returns status and result."""
         assert self.run(seconds, lambda: goal_id in self.finished), f"{goal_id} has not ended"
         return self.finished[goal_id]
 
-    def grip(
-        self,
-        position: float,
-        max_effort: float = 0.0,
-        goal_id: str = "grip",
-        caller: MotionCaller = MotionCaller(),  # noqa: B008 a tuple of texts
-    ) -> GoalVerdict:
+    def grip(self, position: float, max_effort: float = 0.0, goal_id: str = "grip", session: str = "") -> GoalVerdict:
         """Asks the gripper to open or close to `position` [m]; returns its acceptance or refusal."""
-        goal = GripperCommandGoal(position=position, max_effort=max_effort)
-        verdict, outputs = self.core.on_grip(goal_id, goal, self.moment, caller)
-        self.carry_out(outputs)
+        return self._verdict(GripInput(goal_id, GripperCommandGoal(position=position, max_effort=max_effort), session))
+
+    def _verdict(self, given: GoalInput | GripInput) -> GoalVerdict:
+        verdict = self.handle(given)
+        assert isinstance(verdict, GoalVerdict)
         return verdict
 
     def finish_grip(self, goal_id: str = "grip", seconds: float = 10.0) -> tuple[GoalStatusCode, GripperCommandResult]:
@@ -160,25 +180,9 @@ class GatewayDriver(ABC):
         assert self.run(seconds, lambda: goal_id in self.gripped), f"{goal_id} has not ended"
         return self.gripped.pop(goal_id)
 
-    def cancel_grip(self, goal_id: str = "grip") -> str:
-        """Cancels the gripper's goal; returns the reason if that is refused, else an empty text."""
-        reason, outputs = self.core.on_grip_cancel(goal_id, self.moment)
-        self.carry_out(outputs)
-        return reason
-
-    def cancel(self, goal_id: str = "g") -> str:
-        """Cancels the goal; returns the reason if that is refused, else an empty text."""
-        reason, outputs = self.core.on_cancel(goal_id, self.moment)
-        self.carry_out(outputs)
-        return reason
-
     def target(self, **positions: float) -> None:
         """Streams a target [rad] or [m] for the joints named."""
-        self.stream(JointTargets(name=tuple(positions), position=tuple(positions.values())))
-
-    def stream(self, targets: JointTargets, node: str = "") -> None:
-        """Hands the gateway one message of streamed targets of `node`."""
-        self.carry_out(self.core.on_targets(targets, self.moment, MotionCaller(node=node)))
+        self.handle(TargetsInput(JointTargets(name=tuple(positions), position=tuple(positions.values()))))
 
     def command(self, kind: DeviceCommandKind, ticket: int = 1, **positions: float) -> None:
         """Asks for the command of that number, with positions [rad] or [m] of the joints named."""
@@ -187,11 +191,9 @@ class GatewayDriver(ABC):
     def ask(self, wanted: DeviceCommand | StopKind, ticket: int = 1, session: str = "") -> None:
         """Asks for a command or a stop; its answer comes in `answers`."""
         if isinstance(wanted, StopKind):
-            self.carry_out(self.core.on_stop(DeviceStopRequest(kind=wanted), ticket, self.moment))
+            self.handle(StopInput(ticket, DeviceStopRequest(kind=wanted)))
         else:
-            self.carry_out(
-                self.core.on_command(DeviceCommandRequest(command=wanted), ticket, self.moment, MotionCaller(session))
-            )
+            self.handle(CommandInput(ticket, DeviceCommandRequest(command=wanted), session))
 
     def answer(self, wanted: DeviceCommand | StopKind, ticket: int = 1, seconds: float = 3.0) -> DeviceCommandResponse:
         """Asks for a command or a stop; returns its answer, at most `seconds` [s] later, after the next states."""
@@ -204,31 +206,22 @@ class GatewayDriver(ABC):
         """Asks for control, a share of it, or gives it back; the answer comes in `controlled`."""
         match request:
             case ControlTake():
-                self.carry_out(self.core.on_take_control(request, session, ticket, self.moment))
+                self.handle(TakeControlInput(ticket, request, session))
             case ControlJoin():
-                self.carry_out(self.core.on_join_control(request, session, ticket, self.moment))
+                self.handle(JoinControlInput(ticket, request, session))
             case ControlGive():
-                self.carry_out(self.core.on_give_control(request, ticket, self.moment))
+                self.handle(GiveControlInput(ticket, request))
 
     def configure(self, seconds: float = 6.0) -> ConfigureResponse:
         """Sends the device its configuration; returns the answer, at most `seconds` [s] later."""
-        self.ask_configuration(1)
+        self.handle(ConfigureInput(1))
         assert self.run(seconds, lambda: 1 in self.configured), "the configuration is not answered"
         self.run(0.1)
         return self.configured.pop(1)
 
-    def ask_configuration(self, ticket: int) -> None:
-        """Sends the device its configuration; the answer comes in `configured`."""
-        self.carry_out(self.core.on_configure(ticket, self.moment))
-
-    def press(self, request: InjectRequest, ticket: int = 1) -> None:
-        """Does something to the virtual device's world; the answer comes in `pressed`."""
-        self.carry_out(self.core.on_inject(request, ticket, self.moment))
-
     def receive(self, kind: Kind, payload: bytes, retained: bool = False) -> None:
         """Hands the gateway a payload as if it came over the wire."""
-        received = Received(kind, payload, retained, round(self.moment.monotonic * 1e9))
-        self.carry_out(self.core.on_received(received, self.moment))
+        self.handle(FrameInput(kind, payload, retained, round(self.moment.monotonic * 1e9)))
 
     def carry_out(self, outputs: list[Output]) -> None:
         """Sends the frames, and keeps everything else."""

@@ -17,7 +17,7 @@ from gemelo.schemas.robot import Dialect
 from gemelo.services.stepper_gateway.links.foreign import ra_messages
 from gemelo.services.stepper_gateway.links.foreign.ra_device import RaDevice
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Moment
+from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, LinkInput, Moment, StepInput
 from gemelo.tools.virtual_arm.virtual_arm import GATEWAY_ZERO, UNIX, rm1
 
 PERIOD = 0.02  # [s] of the gateway's loop
@@ -56,7 +56,7 @@ class SketchArm(GatewayDriver):
         self._down: list[tuple[float, bytes]] = []
         self._up: list[tuple[float, str, bytes]] = []
         self.start_core(self.arm, seed, GatewayParameters())
-        self.carry_out(self.core.on_link(True, "", self.moment))
+        self.handle(LinkInput(True, ""))
 
     @property
     def moment(self) -> Moment:
@@ -75,7 +75,7 @@ class SketchArm(GatewayDriver):
             self._exchange()
             if self.now >= self._beat:
                 self._beat += PERIOD
-                self.carry_out(self.core.step(self.moment))
+                self.handle(StepInput())
         return until is None or until()
 
     def _exchange(self) -> None:

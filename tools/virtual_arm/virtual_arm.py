@@ -20,7 +20,7 @@ from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.device_config import DeviceConfig
 from gemelo.schemas.message import Message, Vector
 from gemelo.schemas.robot import Motor
-from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Kind, Moment
+from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Kind, LinkInput, Moment, StepInput
 
 UNIX = 1_700_000_000_000_000_000  # [ns] at the start of virtual time
 GATEWAY_ZERO = 1000.0  # [s] of the gateway's monotonic clock at the start
@@ -112,7 +112,7 @@ class VirtualArm(GatewayDriver):
     def new_gateway(self, parameters: GatewayParameters | None = None) -> None:
         """The gateway's process starts, perhaps again."""
         self.start_core(self.arm, self.rng.randrange(1, 2**31), parameters)
-        self.carry_out(self.core.on_link(True, "", self.moment))
+        self.handle(LinkInput(True, ""))
         self.device.report_status()
 
     @property
@@ -148,7 +148,7 @@ class VirtualArm(GatewayDriver):
         """The gateway loses or regains its connection to the broker."""
         self.wire.is_cut = not up
         self.drop()
-        self.carry_out(self.core.on_link(up, "" if up else "the broker is gone", self.moment))
+        self.handle(LinkInput(up, "" if up else "the broker is gone"))
         if up:
             self.device.report_status()
 
@@ -200,8 +200,7 @@ class VirtualArm(GatewayDriver):
             if self.now_us == self._next_beat:
                 self._next_beat += PERIOD
                 if self.gateway_is_on and self.loop_is_on:
-                    absent = (self.absences,) if self.absences else ()
-                    self.carry_out(self.core.step(self.moment, *absent))
+                    self.handle(StepInput(self.absences))
         if self._device_runs:
             self.path.append(self.device.commanded_steps)
 

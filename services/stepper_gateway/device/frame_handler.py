@@ -7,8 +7,9 @@ from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import DEVICE_SHAFT, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS
 from gemelo.services.stepper_gateway.components import Components
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.inputs import FrameInput
 from gemelo.services.stepper_gateway.links.frames import Ack, BadFrame, CommandReply, StateFrame, SyncReply, decode
-from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.links.reports import (
     ConfigAckReport,
     EventReport,
@@ -39,7 +40,7 @@ class FrameHandler:
         self._components = parts
         self._device, self._controller = parts.device, parts.controller
 
-    def take(self, received: Received, moment: Moment) -> None:
+    def take(self, received: FrameInput, moment: Moment) -> None:
         """One payload; raises `BadFrame` for one that no device says."""
         payload, arrival = received.payload, received.arrival * 1e-9
         if received.retained and received.kind != Kind.STATUS:
@@ -62,7 +63,7 @@ class FrameHandler:
             case _:
                 self._on_frame(received, arrival, moment)
 
-    def _on_frame(self, received: Received, arrival: float, moment: Moment) -> None:
+    def _on_frame(self, received: FrameInput, arrival: float, moment: Moment) -> None:
         frame = decode(received.payload)
         match received.kind, frame:
             case Kind.STATE, StateFrame():

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from gemelo.schemas.scene import PlanningScene
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected
 
 MOST_UNHEARD = 10_000  # chosen: edits of one scene that may be missed in a row; more is no planner's version
@@ -27,6 +26,13 @@ class PlannedIn(NamedTuple):
         return cls(goal.scene_version, goal.scene_epoch)
 
 
+class SceneVersion(NamedTuple):
+    """All of a published scene that counts here."""
+
+    version: int
+    epoch: int
+
+
 class SceneVersions:
     """Compares goals with the newest scene of the living planner; before the first, every goal will do.
 
@@ -35,7 +41,7 @@ class SceneVersions:
 
     def __init__(self) -> None:
         self.dropped = 0  # scenes that no planner gives, or not the living one
-        self._newest: dict[str, PlanningScene] = {}  # by instance, the one that has published last at the end
+        self._newest: dict[str, SceneVersion] = {}  # by instance, the one that has published last at the end
         self._living: set[str] = set()
         self._holder: str | None = None  # the instance whose scene it is; None before the first that lives
 
@@ -47,7 +53,7 @@ class SceneVersions:
         (self._living.add if is_there else self._living.discard)(instance)
         self._choose()
 
-    def take(self, scene: PlanningScene, instance: str = "") -> str:
+    def take(self, scene: SceneVersion, instance: str = "") -> str:
         """A planner publishes its scene: after every change, and again after a restart; why it is dropped, or empty.
 
         Versions grow by one within an epoch, and go back only where a restart finds an older file.
@@ -93,7 +99,7 @@ class SceneVersions:
         )
 
     @property
-    def _scene(self) -> PlanningScene | None:
+    def _scene(self) -> SceneVersion | None:
         if self._holder is not None:
             return self._newest[self._holder]
         return next(reversed(self._newest.values()), None)
@@ -104,7 +110,7 @@ class SceneVersions:
         while len(self._newest) > MOST_PLANNERS:
             del self._newest[next(one for one in self._newest if one != self._holder)]
 
-    def _objection(self, scene: PlanningScene, instance: str) -> str:
+    def _objection(self, scene: SceneVersion, instance: str) -> str:
         if scene.version < 0:
             return f"version {scene.version} is negative"
         newest = self._newest.get(instance)
