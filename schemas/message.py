@@ -37,7 +37,10 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
             elif (found is tuple or found is list) and value:
                 # A quick answer first; the sum is finite only where each number is.
                 if type(value[0]) is float:
-                    if not has_finite_sum(value):
+                    try:
+                        if not isfinite(sum(value)):
+                            break
+                    except (TypeError, OverflowError):
                         break
                 elif not UNSURE.isdisjoint(map(type, value)):
                     break
@@ -62,9 +65,16 @@ def _look_at(kind: type[Message]) -> Callable[[Message], tuple[Any, ...]]:
     _fields_of[kind] = fields
     if len(fields) > 1:
         _values_of[kind] = attrgetter(*fields)
+    elif fields:
+        only = attrgetter(*fields)
+        _values_of[kind] = lambda message: (only(message),)
     else:
-        _values_of[kind] = lambda message: tuple(getattr(message, field) for field in fields)
+        _values_of[kind] = _no_values
     return _values_of[kind]
+
+
+def _no_values(_message: Message) -> tuple[Any, ...]:
+    return ()
 
 
 def _declared(kind: type[Message]) -> dict[str, object]:

@@ -95,14 +95,16 @@ class StatePublisher:
         known = complete(self._arm.model, positions) if self._has_mimics else positions
         return FrameTransforms(
             transforms=tuple(
-                FrameTransform(
-                    stamp=stamp,
-                    parent=joint.parent,
-                    child=joint.child,
-                    transform=to_message(joint_transform(joint, known[joint.name], self._origins[joint.name])),
-                )
-                for joint in self._moving
-                if joint.name in known
+                [
+                    FrameTransform(
+                        stamp=stamp,
+                        parent=joint.parent,
+                        child=joint.child,
+                        transform=to_message(joint_transform(joint, known[joint.name], self._origins[joint.name])),
+                    )
+                    for joint in self._moving
+                    if joint.name in known
+                ]
             )
         )
 

@@ -7,10 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from msgspec.structs import replace
-
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.schemas.device import ConfigureResponse, DeviceCommandKind, DeviceStatus
+from gemelo.schemas.device import ConfigureResponse, DeviceCommandKind
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import DEVICE_STATUS
@@ -18,7 +16,7 @@ from gemelo.services.stepper_gateway.components import Components
 from gemelo.services.stepper_gateway.control.clients import MotionCaller
 from gemelo.services.stepper_gateway.device.command_arguments import STOPS, kind_of
 from gemelo.services.stepper_gateway.device.frame_handler import FrameHandler
-from gemelo.services.stepper_gateway.device.gateway_device import status_of
+from gemelo.services.stepper_gateway.device.gateway_device import StatusWatch
 from gemelo.services.stepper_gateway.device.other_writers import Strangers
 from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
 from gemelo.services.stepper_gateway.goals.scene_versions import SceneVersion
@@ -81,7 +79,7 @@ class GatewayCore:
         self.bad_frames = 0
         self._bad_reported = -1.0e9  # [s] monotonic
         self._strangers = Strangers(arm.device.name)
-        self._told: DeviceStatus | None = None
+        self._status = StatusWatch(self.device)
         self._stepped: float | None = None  # [s] monotonic
 
     def handle(self, given: Input, moment: Moment) -> tuple[Reply, list[Output]]:
@@ -272,8 +270,6 @@ class GatewayCore:
         self._components.command_handler.tell_listeners(moment)
         self._components.control.tell(moment)
         warning = self._components.goals.scenes.rivals or self._strangers.text(moment.monotonic)
-        status = status_of(self.device, moment, warning)
-        if status != self._told:
-            self._told = status
-            self._components.out.publish(DEVICE_STATUS, replace(status, stamp=moment.unix))
+        if (status := self._status.changed(moment, warning)) is not None:
+            self._components.out.publish(DEVICE_STATUS, status)
         return self._components.out.take()

@@ -12,12 +12,13 @@ from gemelo.firmware.platform.host.link import REPORTS, Connected, Item, MqttMes
 from gemelo.firmware.platform.host.network import offline_status
 from gemelo.schemas.simulation import WireConditions
 from gemelo.services.stepper_gateway.links.connection import ReceiveQueue
-from gemelo.services.stepper_gateway.links.link import Kind, Received
+from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, Kind, Received
 from gemelo.tools.simulation.virtual_clock import VirtualClock
 
 # A broker keeps status, event and configuration until they are delivered. Heartbeats are spared because two lost ones
 # hold the device, as they should: who wants that cuts the wire.
 SPARED = (Kind.STATUS, Kind.EVENT, Kind.HB, Kind.CONFIG, Kind.CONFIG_ACK)
+REPORT_KINDS = {kind.value: kind for kind in FROM_DEVICE if kind.value in REPORTS}
 CUT = "the wire of the simulation is cut: `arm.sim.wire.restore()`"
 
 
@@ -89,9 +90,9 @@ class MemoryWire:
         self.break_off()
 
     def publish(self, frame: OutFrame) -> None:
-        if not self.is_connected or frame.kind not in REPORTS:
+        if not self.is_connected or frame.kind not in REPORT_KINDS:
             return
-        kind = Kind(frame.kind)
+        kind = REPORT_KINDS[frame.kind]
         if kind is Kind.STATUS:
             return self._retain(frame.payload)
         self._to_gateway(kind, frame.payload)

@@ -252,6 +252,8 @@ class VirtualClock:
             self._plan_at(turns, at if at > self.now else self.now)
 
     def _wake(self, turns: LoopTurns) -> None:
+        if turns.at is not None and turns.at <= self.now:  # its turn is due already, and finds the task
+            return
         with self.baton:
             if not turns.is_busy:  # else it is looked at after its turn
                 self._plan_at(turns, self.now)

@@ -52,6 +52,7 @@ class ControlHolder:
         self._was_given = False
         self._claim: Claim | None = None
         self._notes: list[Note] = []
+        self._seen: tuple[object, ...] | None = None  # of what `state` says, when `has_changed` was asked last
         self.refused: list[tuple[int, str]] = []  # tickets of claims that came to nothing, and why
         self.granted: list[int] = []  # tickets of claims that were granted
 
@@ -81,6 +82,12 @@ class ControlHolder:
         if self._claim is not None:
             return f"{self._claim.words} takes control"
         return f"{self._holder.words}, who holds control, is gone" if self._holder and self.is_gone else ""
+
+    def has_changed(self) -> bool:
+        """True where `take_notes` or `state` may say something else than when this was asked last."""
+        facts = (self._holder, self._claim, self.is_gone, self._was_given, self._number, *self._members.values())
+        before, self._seen = self._seen, facts
+        return bool(self._notes) or facts != before
 
     def state(self) -> ControlState:
         """What everybody may know, without a stamp."""

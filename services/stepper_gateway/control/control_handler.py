@@ -127,6 +127,8 @@ class ControlHandler:
 
     def tell(self, moment: Moment) -> None:
         """Publishes who holds control where that has changed, and writes it to the log."""
+        if not self._control.has_changed():
+            return
         for level, text in self._control.take_notes():
             self._device.out.log(level, text)
         state = self._control.state()

@@ -122,21 +122,25 @@ class CommandHandler:
 
     def tell_listeners(self, moment: Moment) -> None:
         """Hand the answers to the gateway's own commands to those who wait for them."""
+        if not self._heard:
+            return
         heard, self._heard = self._heard, []
         for listener, response in heard:
             listener(response, moment)
 
     def send_due(self, moment: Moment) -> None:
         """Send what is new or was not answered."""
-        if not self._device.session.link_up:
-            return
         device, session = self._device, self._device.session
+        if not session.link_up or device.commands.is_empty:
+            return
         is_reachable = not device.unreachable_reason(moment)
         for frame in device.commands.due(moment, session.clock, session.boot_id, is_reachable):
             device.out.send(Kind.CMD, encode(frame), urgent=frame.cmd in STOPPING)
 
     def step(self, moment: Moment) -> None:
         """Give up what was not answered in time; a STOP of our own is asked for again."""
+        if self._device.commands.is_empty:
+            return
         for command in self._device.commands.expired(moment):
             state = self._device.session.latest
             if command.kind == DeviceCommandKind.HOLD and state is not None:

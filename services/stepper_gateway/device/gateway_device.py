@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+from msgspec.structs import replace
+
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceEvent, DeviceStatus
 from gemelo.schemas.system import LogLevel
@@ -76,28 +80,64 @@ class GatewayDevice:
         self.out.log(level, log_text or (f"{event}: {detail}" if detail else event))
 
 
-def status_of(device: GatewayDevice, moment: Moment, warning: str = "") -> DeviceStatus:
-    """Without a stamp; only the boot that says its states is described. `warning` is what else a person has to mend.
+class StatusWatch:
+    """Notices where the device's status has changed: what it is made of is compared before the message is made."""
 
-    A silent device is offline, whatever a broker has retained.
-    """
-    unreachable_reason, session = device.unreachable_reason(moment), device.session
-    report = session.status or StatusReport(online=False)
-    return DeviceStatus(
-        online=not unreachable_reason,
-        reason=unreachable_reason or device.not_ready_reason(),
-        device=device.arm.device.name,
-        firmware=report.firmware,
-        boot_id=session.boot_id,
-        reset_cause=report.reset_cause,
-        joints=report.joints,
-        tick_hz=report.tick_hz,
-        queue_capacity=report.queue_capacity,
-        config_crc32=device.configuration.device_crc32,
-        wanted_crc32=device.configuration.crc32,
-        virtual=report.virtual,
-        open_loop=report.open_loop,
-        speaks=session.is_fresh(moment, device.parameters.state_timeout),
-        deaf_since=session.deaf_since(moment, device.parameters.state_timeout),
-        warning=warning,
-    )
+    def __init__(self, device: GatewayDevice) -> None:
+        self._device = device
+        self._facts: StatusFacts | None = None  # of the last one
+        self._reported: DeviceStatus | None = None
+
+    def changed(self, moment: Moment, warning: str) -> DeviceStatus | None:
+        """The status, stamped, if it is another than the last one; `warning` is what else a person has to mend."""
+        facts = StatusFacts.of(self._device, moment, warning)
+        if facts == self._facts:
+            return None
+        self._facts, status = facts, facts.status(self._device)
+        if status == self._reported:
+            return None
+        self._reported = status
+        return replace(status, stamp=moment.unix)
+
+
+class StatusFacts(NamedTuple):
+    """All of a status that changes; only the boot that says its states is described."""
+
+    unreachable_reason: str
+    not_ready_reason: str
+    report: StatusReport | None
+    boot_id: int
+    speaks: bool
+    deaf_since: int  # [ns] UNIX time, 0: it hears
+    warning: str
+
+    @classmethod
+    def of(cls, device: GatewayDevice, moment: Moment, warning: str) -> StatusFacts:
+        """A silent device is offline, whatever a broker has retained."""
+        session, timeout = device.session, device.parameters.state_timeout
+        if not (unreachable := device.unreachable_reason(moment)):
+            return cls("", device.not_ready_reason(), session.status, session.boot_id, True, 0, warning)
+        speaks, deaf_since = session.is_fresh(moment, timeout), session.deaf_since(moment, timeout)
+        return cls(unreachable, "", session.status, session.boot_id, speaks, deaf_since, warning)
+
+    def status(self, device: GatewayDevice) -> DeviceStatus:
+        """The message, without a stamp."""
+        report = self.report or StatusReport(online=False)
+        return DeviceStatus(
+            online=not self.unreachable_reason,
+            reason=self.unreachable_reason or self.not_ready_reason,
+            device=device.arm.device.name,
+            firmware=report.firmware,
+            boot_id=self.boot_id,
+            reset_cause=report.reset_cause,
+            joints=report.joints,
+            tick_hz=report.tick_hz,
+            queue_capacity=report.queue_capacity,
+            config_crc32=report.config_crc32,
+            wanted_crc32=device.configuration.crc32,
+            virtual=report.virtual,
+            open_loop=report.open_loop,
+            speaks=self.speaks,
+            deaf_since=self.deaf_since,
+            warning=self.warning,
+        )

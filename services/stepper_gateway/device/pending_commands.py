@@ -108,8 +108,13 @@ class PendingCommands:
         """True if no command but a stop may be added until the device has answered others."""
         return sum(not command.is_stop for command in self._pending) >= MOST_UNDER_WAY
 
+    @property
+    def is_empty(self) -> bool:
+        """True if no command is under way."""
+        return not self._pending
+
     def is_pending(self, kind: DeviceCommandKind) -> bool:
-        return any(command.kind == kind for command in self._pending)
+        return bool(self._pending) and any(command.kind == kind for command in self._pending)
 
     def not_ready_reason(self) -> str:
         """Why nothing may be started now, empty if it may."""

@@ -33,7 +33,7 @@ class Questions:
 
     def begin_anew(self) -> None:
         """The link has come, or another boot: what has not been answered says nothing of it."""
-        self._unanswered = 0
+        self._unanswered = self._deaf_since = 0
 
     def ask(self, boot_id: int, moment: Moment) -> Sync:
         """One more question, now."""
@@ -55,7 +55,7 @@ class Questions:
     def on_answer(self, t0: int, arrival_us: int) -> None:
         """The question of `t0` [us] is answered."""
         self._open.remove(t0)
-        self._unanswered, self.answered = 0, arrival_us * 1e-6
+        self._unanswered, self._deaf_since, self.answered = 0, 0, arrival_us * 1e-6
 
     def is_late(self, now: float) -> bool:
         """True if an answer is missing at `now` [s] monotonic."""
@@ -67,9 +67,7 @@ class Questions:
 
     def deaf_since(self, moment: Moment) -> int:
         """[ns] UNIX time since when nothing is answered; 0 while it is. The same at every call until an answer."""
-        if not self.is_deaf(moment.monotonic):
-            self._deaf_since = 0
-        elif not self._deaf_since:
+        if self.is_deaf(moment.monotonic) and not self._deaf_since:
             self._deaf_since = moment.unix_at(self._unanswered_since)
         return self._deaf_since
 

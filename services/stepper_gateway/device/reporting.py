@@ -41,7 +41,7 @@ class Reporter:
         return positions
 
     def _rates(self, rates: tuple[float, ...], scale: float = 1.0) -> Vector:
-        return tuple(rate * scale / joint.steps.per_unit for joint, rate in zip(self._joints, rates, strict=True))
+        return tuple([rate * scale / joint.steps.per_unit for joint, rate in zip(self._joints, rates, strict=True)])
 
     def joint_state(self, state: StateFrame, stamp: int, is_open_loop: bool = False) -> JointState:
         """The measured joints; in open loop what was sent, and marked as that."""
@@ -64,7 +64,7 @@ class Reporter:
 
     def step_errors(self, point: PathPoint, state: StateFrame, stamp: int) -> StepErrors:
         """Commanded minus executed [steps]."""
-        error = tuple(wanted - done for wanted, done in zip(point.steps, state.steps, strict=True))
+        error = tuple([wanted - done for wanted, done in zip(point.steps, state.steps, strict=True)])
         self._max_error = [max(a, abs(b)) for a, b in zip(self._max_error, error, strict=True)]
         return StepErrors(
             stamp=stamp,
@@ -85,9 +85,9 @@ class Reporter:
             fault=state.fault,
             fault_joint=joint_name(self._arm, state.fault_joint),
             armed=bool(state.flags & StateFlag.ARMED),
-            referenced=tuple(bool(state.referenced >> index & 1) for index in range(len(state.steps))),
+            referenced=tuple([bool(state.referenced >> index & 1) for index in range(len(state.steps))]),
             inputs=input_names(self._arm, state),
-            outputs=tuple(one.name for index, one in enumerate(self._arm.outputs) if state.outputs >> index & 1),
+            outputs=tuple([one.name for index, one in enumerate(self._arm.outputs) if state.outputs >> index & 1]),
             speed=state.speed,
             name=self._names if len(state.steps) == len(self._names) else (),
             steps=state.steps,
@@ -125,9 +125,9 @@ class Reporter:
             name=self._names,
             dt=frame.dt_us * 1e-6,
             time=sent.time_us * 1e-6,
-            position=tuple(knot.position for knot in sent.knots),
-            velocity=tuple(knot.velocity for knot in sent.knots),
-            acceleration=tuple(knot.acceleration for knot in sent.knots),
+            position=tuple([knot.position for knot in sent.knots]),
+            velocity=tuple([knot.velocity for knot in sent.knots]),
+            acceleration=tuple([knot.acceleration for knot in sent.knots]),
             steps=frame.positions,
             step_rate=frame.velocities,
         )

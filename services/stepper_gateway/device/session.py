@@ -49,6 +49,7 @@ ONE_NAME = (
     "folder, a virtual device beside a board, or two boards that were provisioned alike"
 )
 NUMBERS = {2: "two", 3: "three"}
+MODES = {mode.value: mode for mode in DeviceMode}
 OLD_BOOTS = 16  # remembered, so that a late frame of one is no reboot; chosen: more than a broker keeps frames of
 
 
@@ -79,12 +80,8 @@ class DeviceSession:
         self.latest: StateFrame | None = None  # of any number of joints
         self.state_arrival = -1.0e9  # [s] monotonic
         self.boot_id = 0
+        self.status: StatusReport | None = None  # what the present boot has said about itself
         self.clock = ClockSync()
-
-    @property
-    def status(self) -> StatusReport | None:
-        """What the present boot has said about itself."""
-        return self._reports.get(self.boot_id)
 
     @property
     def is_open_loop(self) -> bool:
@@ -138,13 +135,14 @@ class DeviceSession:
         self._reports[status.boot_id] = status
         if len(self._reports) > OLD_BOOTS:
             del self._reports[next(boot for boot in self._reports if boot != self.boot_id)]
+        self.status = self._reports.get(self.boot_id)
 
     def on_state(self, state: StateFrame, arrival: float, timeout: float) -> tuple[bool, bool]:
         """(is it news, does it tell of a new boot); raises `BadFrame` for one that no device says.
 
         `arrival` [s] monotonic; states older than `timeout` [s] count as a pause.
         """
-        if state.mode not in DeviceMode._value2member_map_:
+        if state.mode not in MODES:
             raise BadFrame(f"a state with the unknown mode {state.mode}")
         is_fresh = arrival - self.state_arrival <= timeout
         if is_fresh and state.boot_id == self.boot_id:
@@ -267,7 +265,7 @@ class DeviceSession:
 
     @property
     def mode(self) -> DeviceMode:
-        return DeviceMode(self.latest.mode) if self.latest is not None else DeviceMode.BOOT
+        return MODES[self.latest.mode] if self.latest is not None else DeviceMode.BOOT
 
     def unreachable_reason(self, moment: Moment, timeout: float) -> str:
         """Why the device cannot be reached: no link, no state for `timeout` [s], a second device, no answer, or
@@ -302,7 +300,7 @@ class DeviceSession:
             self._old_boots = [*self._old_boots[1 - OLD_BOOTS :], self.boot_id]
         self._old_boots = [boot for boot in self._old_boots if boot != boot_id]
         self._others.forget(boot_id)
-        self.boot_id = boot_id
+        self.boot_id, self.status = boot_id, self._reports.get(boot_id)
         self.latest = None
         self._doubted, self._checks = None, StateChecks()
         self.clock.reset()

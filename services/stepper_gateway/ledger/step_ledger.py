@@ -240,6 +240,8 @@ class LedgerKeeper:
             row.evidence = replace(row.evidence, incidents=row.evidence.incidents + doubt)
 
     def _keep(self, moment: Moment) -> None:
+        if moment.monotonic - self._written < KEEP_SOON:
+            return
         record = self.record()
         if record is None or record == self._last:
             return

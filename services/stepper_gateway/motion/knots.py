@@ -51,8 +51,8 @@ class StepEncoder:
         """The nearest knot within the device's limits."""
         positions = zip(self._scales, knot.position, self._lower, self._upper, strict=True)
         return StepKnot(
-            tuple(min(max(scale.to_q8(p), low), high) for scale, p, low, high in positions),
-            tuple(round(v * rate) for rate, v in zip(self._rates, knot.velocity, strict=True)),
+            tuple([min(max(scale.to_q8(p), low), high) for scale, p, low, high in positions]),
+            tuple([round(v * rate) for rate, v in zip(self._rates, knot.velocity, strict=True)]),
         )
 
 
