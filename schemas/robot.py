@@ -216,7 +216,10 @@ class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
     dialect: Dialect = Dialect.GEMELO
     serial_baud: Annotated[int, Meta(ge=9_600, le=3_000_000)] = 921_600  # of its serial line, as it was provisioned
     message_time: Annotated[float, Meta(ge=0.6, le=10.0)] = 2.0  # [s] that one message of dialect "ra" may take
-    telemetry_time: Annotated[float, Meta(ge=0.01, le=2.0)] = 0.1  # [s] between two words of a sketch of dialect "ra"
+    # Longer than half a second, and no silence of a second would show that the sketch has lost a message.
+    telemetry_time: Annotated[float, Meta(ge=0.01, le=0.5)] = 0.1  # [s] between two words of a sketch of dialect "ra"
+    # Assumed for PubSubClient on an ESP32: its loop() takes 60 to 200 us.
+    loop_time: Annotated[float, Meta(ge=1e-5, le=0.01)] = 0.0002  # [s] longest pass of that sketch's loop()
     text_hz: Annotated[float, Meta(ge=1.0, le=100.0)] = 25.0  # [Hz] of lines in dialect "text"
     text_decimals: Annotated[int, Meta(ge=2, le=9)] = 6  # of a radian or metre in them; 4 are coarser than many a step
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from gemelo.tools.bench import old_dialects
+from gemelo.tools.bench import old_dialects, ra_remainder
 
 
 def test_no_step_remains_of_random_messages(monkeypatch) -> None:
-    monkeypatch.setattr(old_dialects, "MESSAGES", 500)
-    assert old_dialects.ra_remainder_steps().met
+    monkeypatch.setattr(ra_remainder, "MESSAGES", 500)
+    monkeypatch.setattr(ra_remainder, "MESSAGE_TIMES", (2.0,))
+    figure = ra_remainder.ra_remainder_steps()
+    assert figure.met
+    assert "20 to 250 us" in figure.note
 
 
 def test_a_line_and_its_answer_take_at_least_what_their_baud_rate_makes_them_take(monkeypatch) -> None:

@@ -80,9 +80,18 @@ def test_what_cannot_be_followed_is_refused_with_the_reason(payload: bytes, reas
         RaIntake(rm1()).take(payload, STANDS)
 
 
+def test_a_message_without_q3_switches_its_output_and_moves_nothing() -> None:
+    """The seed's sketch obeys what is there, and moves only by all joints."""
+    intake = RaIntake(rm1())
+    wanted = intake.take(b'{"q1": 1, "q2": 1, "avanzar": 1}', STANDS)
+    assert (wanted.moves, wanted.output) == (None, True)
+    assert "q3 missing" in wanted.objection
+    assert intake.target is None
+
+
 def test_the_output_alone_moves_nothing() -> None:
     intake = RaIntake(rm1())
-    assert intake.take(b'{"avanzar": 1}', STANDS) == (None, True)
+    assert intake.take(b'{"avanzar": 1}', STANDS) == (None, True, "")
     assert intake.target is None
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import math
 import random
+from dataclasses import replace
 
+import msgspec
 import pytest
 
 from gemelo.schemas.actions import GoalStatusCode
@@ -113,7 +115,7 @@ def test_a_loop_that_blocks_for_a_moment_loses_nothing() -> None:
     assert arm.goal(ra_move(HOME, (QUARTER, 0.0, 0.0))).accepted
     for _ in range(4):
         arm.run(1.3)
-        arm.sketch.block(0.6)
+        arm.sketch.block(0.2)
     assert arm.finish()[0] is GoalStatusCode.SUCCEEDED
     assert settled(arm)
     assert arm.sketch.shafts[0] == 4666
@@ -134,6 +136,51 @@ def test_a_reconnection_in_a_move_ends_it_and_the_position_is_not_known_any_more
     assert "position_lost" in arm.events()
     assert [m for m in arm.messages_sent[sent:] if b"q1" in m] == [], "nothing resumes by itself"
     assert "gemelo reference" in arm.goal(ra_move(HOME, (0.1, 0.0, 0.0)), "next").reason
+
+
+@pytest.mark.parametrize("telemetry_time", [0.02, 0.1, 0.5])
+def test_a_sketch_that_restarts_in_a_message_is_noticed_however_soon_it_speaks_again(telemetry_time: float) -> None:
+    """It was not within ten words: 593 steps were lost, and the move succeeded."""
+    arm = ra_arm()
+    arm = replace(arm, device=msgspec.structs.replace(arm.device, telemetry_time=telemetry_time))
+    world = SketchArm(arm).referenced()
+    assert world.goal(move(HOME, (QUARTER, 0.0, 0.0), arm=arm)).accepted
+    assert world.run(20.0, lambda: abs(world.sketch.motors[0].remaining) > 500)
+    at = world.now
+    world.sketch.restart(min(max(0.3, 5.0 * telemetry_time), 1.1))
+    status, result = world.finish()
+    assert world.sketch.discarded > 0
+    assert status is GoalStatusCode.ABORTED
+    assert world.now - at < 1.0 + 0.1, "a second of silence is enough, whatever the telemetry is"
+    assert "the sketch was silent for" in result.error_string
+    assert "gemelo reference" in result.error_string
+    assert "position_lost" in world.events()
+    assert "rebooted" not in world.events()
+    world.run(1.0)
+    ledger = world.published["step_ledger"][-1]
+    assert ledger.confidence == (0.0, 0.0, 0.0)
+    assert "gemelo reference" in world.goal(move(HOME, (0.1, 0.0, 0.0), arm=arm), "next").reason
+
+
+def test_a_message_that_was_lost_with_its_connection_ends_the_move() -> None:
+    """The broker sends back what it has passed on: what does not come back is not at the sketch."""
+    arm = SketchArm().referenced()
+    assert arm.goal(ra_move(HOME, (QUARTER, 0.0, 0.0))).accepted
+    arm.run(4.0)
+    arm.drops = 1
+    status, result = arm.finish()
+    assert status is GoalStatusCode.ABORTED
+    assert "lost with a connection" in result.error_string
+    assert "position_lost" in arm.events()
+
+
+def test_nothing_is_sent_to_a_sketch_that_is_silent_just_now() -> None:
+    arm = SketchArm().referenced()
+    arm.is_cut = True
+    arm.run(0.5)
+    assert arm.goal(ra_move(HOME, (0.1, 0.0, 0.0))).accepted
+    arm.run(0.3)
+    assert not [message for message in arm.messages_sent if b"q1" in message]
 
 
 OLD_DRIVER = b'{"q1":2.5,"q2":0,"q3":0.0,"avanzar":0}'

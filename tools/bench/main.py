@@ -78,7 +78,7 @@ FIGURES = {
     "simulate_start_ms": FigureRow("simulation:simulate_start_ms", "ms"),
     "lost_of_45000_at_25hz": FigureRow("virtual_time:lost_of_45000_at_25hz", "chunks"),
     "seed_move_percent": FigureRow("old_dialects:seed_move_percent", "%"),
-    "ra_remainder_steps": FigureRow("old_dialects:ra_remainder_steps", "steps"),
+    "ra_remainder_steps": FigureRow("ra_remainder:ra_remainder_steps", "steps"),
     "text_link_ms": FigureRow("old_dialects:text_link_ms", "ms"),
     "clock_sync_error_us": FigureRow("virtual_time:clock_sync_error_us", "us"),
     "hold_reaction_ms": FigureRow("virtual_time:hold_reaction_ms", "ms"),

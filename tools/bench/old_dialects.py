@@ -1,4 +1,4 @@
-"""Figures of the dialects that people's boards speak already: remainders, the text line's round trip, a seed's move.
+"""Figures of the dialects that people's boards speak already: the text line's round trip, and a seed's move.
 
 `seed_move_percent` is a 90 degree move at the motor's shaft, against the relative moves of the seed's Arduino sketch.
 Both run on the same virtual motor with the pull-out curve of robot.toml. The seed's steps are those of the virtual
@@ -7,10 +7,8 @@ sketch, where a new target is the PRESENT position plus the message's steps, wha
 
 from __future__ import annotations
 
-import json
 import math
 import os
-import random
 import re
 import select
 import threading
@@ -24,13 +22,11 @@ import msgspec
 
 from gemelo.firmware.bindings.device import CoreDevice
 from gemelo.firmware.bindings.motor import VirtualMotor
-from gemelo.firmware.platform.host.sketch import AustinStepper, HostSketch
+from gemelo.firmware.platform.host.sketch import AustinStepper
 from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.libraries.arm.model.description import ArmDescription, heard_by_the_board
-from gemelo.libraries.arm.motors.relative_moves import ramp_of
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.schemas.robot import Dialect
-from gemelo.services.stepper_gateway.links.foreign.ra_messages import joints_message
 from gemelo.services.stepper_gateway.links.foreign.text_exchange import TextExchange
 from gemelo.services.stepper_gateway.links.foreign.text_messages import AnswerReader, line_of
 from gemelo.services.stepper_gateway.links.serial_port import open_port
@@ -38,8 +34,6 @@ from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_sampl
 from gemelo.tools.bench.scenes import rm1
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, tcp_wire
 
-MESSAGES = 10_000
-LARGEST_MOVE = 20_000  # [steps] more than a turn of rm1's first joint
 BAUD = 115_200
 ANSWER = re.compile(rb"<[AN][^>]*>\n")  # the frames of our own protocol between them are left out
 BITS_OF_A_BYTE = 10  # 8N1
@@ -48,27 +42,8 @@ RATE = 25.0  # [Hz]
 PUBLISHED = 29.8  # [ms] mean of the old driver, at 12.5 Hz
 
 
-def ra_remainder_steps() -> Figure:
-    """Commanded steps minus those that a sketch makes of random messages, the largest of all joints [steps]."""
-    rng = random.Random(3)
-    ramps = tuple(ramp_of(joint.drive) for joint in rm1().joints)
-    worst = 0
-    for truncates in (True, False):
-        sketch, left = HostSketch(ramps, truncates), [0] * len(ramps)
-        for _ in range(MESSAGES):
-            move = [rng.randint(-LARGEST_MOVE, LARGEST_MOVE) for _ in ramps]
-            message = json.loads(joints_message(move, ramps, False))
-            left = [
-                old + steps - sketch.steps(message[ramp.name], ramp)
-                for old, steps, ramp in zip(left, move, ramps, strict=True)
-            ]
-        worst = max(worst, *map(abs, left))
-    note = f"of {MESSAGES} random messages to a sketch that truncates and to one that rounds, with floats of 24 bits"
-    return Figure(median=worst, p99=worst, goal="0", met=worst == 0, note=note)
-
-
 def text_link_ms() -> Figure:
-    """Round trip [ms] of `<SEQ,...>` at 25 Hz, over a pseudo-terminal, to the firmware's text mode."""
+    """From a line `<SEQ,...>` to its ACK [ms], at 25 Hz over a pseudo-terminal to the firmware's text mode."""
     device = msgspec.structs.replace(rm1().device, dialect=Dialect.TEXT)
     arm = heard_by_the_board(replace(rm1(), device=device))
     with closing(PacedBoard(arm)) as board:

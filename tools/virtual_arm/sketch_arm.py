@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import msgspec
 
-from gemelo.firmware.platform.host.sketch import HostSketch
+from gemelo.firmware.platform.host.sketch import PASS, HostSketch
 from gemelo.libraries.arm.model.description import ArmDescription, heard_by_the_board
 from gemelo.libraries.arm.motors.relative_moves import ramp_of
 from gemelo.schemas.device import DeviceCommandKind
@@ -41,6 +41,7 @@ class SketchArm(GatewayDriver):
         delay: float = 0.005,
         jitter: float = 0.0,
         truncates: bool = True,
+        pass_time: float = PASS,
         seed: int = 1,
     ) -> None:
         super().__init__()
@@ -50,9 +51,13 @@ class SketchArm(GatewayDriver):
         self._beat = 0.0
         boots = itertools.count(1001)
         self.device = RaDevice(self.arm, lambda: next(boots), GATEWAY_ZERO)
-        self.sketch = HostSketch([ramp_of(joint.drive) for joint in self.arm.joints], truncates)
+        self.sketch = HostSketch(
+            [ramp_of(joint.drive) for joint in self.arm.joints], truncates, pass_time=pass_time, seed=seed,
+            telemetry_time=self.arm.device.telemetry_time,
+        )  # fmt: skip
         self.messages_sent: list[bytes] = []
         self.is_cut = False  # between the sketch and the broker
+        self.drops = 0  # messages that will be lost with a connection before they are at the broker
         self._down: list[tuple[float, bytes]] = []
         self._up: list[tuple[float, str, bytes]] = []
         self.start_core(self.arm, seed, GatewayParameters())
@@ -92,7 +97,9 @@ class SketchArm(GatewayDriver):
             self.device.hear(topic, payload, False, monotonic)
         for message in self.device.advance(monotonic):
             self.messages_sent.append(message)
-            if not self.is_cut:
+            if self.drops:
+                self.drops -= 1
+            elif not self.is_cut:
                 self._down.append((self._arrival(self._down[-1][0] if self._down else 0.0), message))
         for kind, report in self.device.take():
             self.receive(kind, report)

@@ -1,22 +1,25 @@
 """A sketch as people have it: relative moves on `ra/juntas` by AccelStepper, in virtual time.
 
 Written from the published behaviour: the ramp of D. Austin, "Generate stepper-motor speed profiles in real time"
-(2005), with the first interval 0.676 c0; move() counts from the present position; one step at most in every pass of
-the loop; telemetry every 100 ms; a reconnection that blocks the loop, in which the motors stand.
+(2005), with the first interval 0.676 c0; move() counts from the present position; run() makes one step at most in every
+pass of the loop, and only when one is due by the time since the last; telemetry every 100 ms; a reconnection that
+blocks the loop, in which the motors stand.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import random
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from gemelo.libraries.arm.motors.relative_moves import Ramp
 
-PASS = 40e-6  # [s] of one loop(), without what blocks it
-PUBLISH = 0.002  # [s] that the two messages of the telemetry block it
+PASS = 150e-6  # [s] mean of one loop(), without what blocks it; assumed: PubSubClient on an ESP32 takes 60 to 200 us
+JITTER = 0.3  # of a pass, either way; chosen: so that passes and steps never keep in step
+PUBLISH = 0.0006  # [s] that each of the two messages of the telemetry blocks it; assumed, on an ESP32
 TELEMETRY = 0.1  # [s]
 FIRST = 0.676  # of the exact first interval: what the approximation lacks
 
@@ -44,6 +47,15 @@ class AustinStepper:
     def due(self) -> float | None:
         """[s] when its next step is due; None: it stands."""
         return self._last + self._wait if self._wait else None
+
+    @property
+    def stepped(self) -> float:
+        """[s] when it made its last step: at the start of a pass; minus infinity before the first."""
+        return self._last
+
+    def restart(self) -> None:
+        """The board starts anew: what was left of a move is not made."""
+        self._target, self._wait, self._count = self.position, 0.0, 0
 
     def move(self, relative: int) -> None:
         """From where it is now: what was left of another move is forgotten."""
@@ -86,16 +98,22 @@ class HostSketch:
     led: bool = False
     state: bytes = b'{"estado": 1}'  # published on ra/estados
     sensors: bytes = b'{"ultra": 42}'  # and on ra/sensores
+    pass_time: float = PASS  # [s] mean of one loop()
+    jitter: float = JITTER  # of each pass, either way
+    publish: float = PUBLISH  # [s] that each message of the telemetry holds loop() up
+    telemetry_time: float = TELEMETRY  # [s]
+    seed: int = 1  # of the passes
     moves: int = 0
-    discarded: int = 0  # [steps] of moves that another one has ended
+    discarded: int = 0  # [steps] of moves that another one, or a restart, has ended
     motors: tuple[AustinStepper, ...] = ()
-    _now: float = 0.0
-    _free: float = 0.0  # [s] until then the loop is blocked
+    _free: float = 0.0  # [s] when the next pass begins
+    _is_starting: bool = False  # after a restart, until its first pass
     _telemetry: float = 0.0
     _inbox: list[bytes] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.motors = tuple(AustinStepper(ramp.speed, ramp.acceleration) for ramp in self.ramps)
+        self._random = random.Random(self.seed)
 
     @property
     def shafts(self) -> tuple[int, ...]:
@@ -107,34 +125,54 @@ class HostSketch:
 
     def block(self, seconds: float) -> None:
         """A reconnection, or anything else that holds loop() up for `seconds` [s]: no step is made meanwhile."""
-        self._free = max(self._now, self._free) + seconds
+        self._free += seconds
+
+    def restart(self, seconds: float) -> None:
+        """A reset: it speaks again after `seconds` [s]; what was left of a move, or came meanwhile, is lost."""
+        self._inbox.clear()
+        self._is_starting = True
+        self.block(seconds)
+        for motor in self.motors:
+            self.discarded += abs(motor.remaining)
+            motor.restart()
 
     def receive(self, payload: bytes) -> None:
         """A message on ra/juntas; it is read in the next pass of the loop."""
-        self._inbox.append(payload)
+        if not self._is_starting:
+            self._inbox.append(payload)
 
     def advance(self, now: float) -> list[tuple[str, bytes]]:
         """Let time pass until `now` [s]; the messages that were published."""
         said: list[tuple[str, bytes]] = []
+        if not self.is_on:
+            self._free = max(self._free, now)
         while self.is_on and self._free <= now:
-            at = max(self._free, self._now)
+            self._is_starting = False
             self._read()
-            due = [motor for motor in self.motors if motor.due is not None]
-            next_step = min((motor.due or 0.0 for motor in due), default=math.inf)
-            soonest = max(at, min(next_step, self._telemetry))
-            if soonest > now:
-                self._now = self._free = now
+            steps = min((motor.due for motor in self.motors if motor.due is not None), default=math.inf)
+            at = self._idle(min(steps, self._telemetry, now))
+            if at > now:
                 break
-            for motor in due:
-                if (motor.due or 0.0) <= soonest:
-                    motor.step(soonest)
-            self._now = self._free = soonest + PASS
-            if soonest >= self._telemetry:
-                self._telemetry = soonest + TELEMETRY
-                self._free += PUBLISH
+            for motor in self.motors:
+                if motor.due is not None and motor.due <= at:
+                    motor.step(at)
+            self._free += self._pass()
+            if at >= self._telemetry:
+                self._telemetry = at + self.telemetry_time
                 said += [("ra/estados", self.state), ("ra/sensores", self.sensors)]
-        self._now = now
+                self.block(2.0 * self.publish)
         return said
+
+    def _idle(self, until: float) -> float:
+        """[s] the start of the first pass at `until` [s] or later: those before it have nothing to do."""
+        longest = self.pass_time * (1.0 + self.jitter)
+        while self._free < until:
+            self._free += max(1, int((until - self._free) / longest)) * self._pass()
+        return self._free
+
+    def _pass(self) -> float:
+        """[s] that a pass takes."""
+        return self.pass_time * self._random.uniform(1.0 - self.jitter, 1.0 + self.jitter)
 
     def _read(self) -> None:
         for payload in self._inbox:

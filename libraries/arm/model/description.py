@@ -16,7 +16,7 @@ from gemelo.libraries.arm.model.robot_file import read_robot_data, read_text, ty
 from gemelo.libraries.arm.model.srdf import SrdfModel, read_srdf
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint, UrdfModel, read_urdf
 from gemelo.libraries.arm.model.virtual_drive import NO_MOTORS, TO_DRIVE, lacks_motors, with_virtual_drive
-from gemelo.libraries.arm.motors.relative_moves import ramp_of
+from gemelo.libraries.arm.motors.relative_moves import loop_of, ramp_of
 from gemelo.libraries.arm.motors.speed import speed_limits
 from gemelo.libraries.arm.motors.steps import StepScale, step_scale
 from gemelo.schemas.deployment import DeviceKind
@@ -187,7 +187,7 @@ def _heard_joint(joint: Joint, device: DeviceRecord) -> Joint:
     joint = replace(joint, drive=msgspec.structs.replace(joint.drive, homing=None))
     if device.dialect is not Dialect.RA:
         return joint
-    speed = ramp_of(joint.drive).path_speed(device.message_time, device.telemetry_time) / joint.steps.per_unit
+    speed = ramp_of(joint.drive).path_speed(device.message_time, loop_of(device)) / joint.steps.per_unit
     return replace(joint, velocity=min(joint.velocity, speed))
 
 

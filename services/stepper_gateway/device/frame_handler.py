@@ -28,8 +28,12 @@ RENEWED = (
     "were sent under its session; it has begun a fresh session"
 )
 LOST = (DeviceMode.FAULT, DeviceMode.ESTOP, DeviceMode.UNREFERENCED, DeviceMode.HOMING, DeviceMode.BOOT)
-TROUBLE = ("fault", "hold", "late", "underrun", "estop", "homing_stopped", "text_lost", "inject_refused")
+TROUBLE = (
+    "fault", "hold", "late", "underrun", "estop", "homing_stopped", "text_lost", "inject_refused", "position_lost",
+)  # fmt: skip
 MOTION = {"started": "from", "finished": "at"}  # how the place of a motion's event is introduced
+POSITION_LOST = "position_lost"  # the event of a board of another dialect, which begins anew by it
+RESTARTED = "the device has restarted"
 BY_A_PERSON = "command"  # the detail of what somebody has asked for
 
 
@@ -39,6 +43,7 @@ class FrameHandler:
     def __init__(self, parts: Components) -> None:
         self._components = parts
         self._device, self._controller = parts.device, parts.controller
+        self._position_lost = ""  # why a board of another dialect begins anew, until its next boot is met
 
     def take(self, received: FrameInput, moment: Moment) -> None:
         """One payload; raises `BadFrame` for one that no device says."""
@@ -58,6 +63,7 @@ class FrameHandler:
                 readings = decode_sensors(payload)
                 self._components.sensors.on_readings(readings, arrival, moment)
                 self._components.gripper.on_readings(readings, arrival)
+                self._components.echoes.on_readings(readings, arrival)
             case Kind.SHAFT:
                 self._on_shaft(decode_report(ShaftReport, payload), arrival, moment)
             case _:
@@ -102,6 +108,9 @@ class FrameHandler:
         self._components.ledger.on_event(event, moment)
         if event.event in STOPPED:
             self._on_stopped(event, moment)
+        elif event.event == POSITION_LOST:
+            self._position_lost = event.detail
+            self._components.start_over(event.detail, moment)
         self._components.injections.on_event(event)
 
     def _on_stopped(self, event: EventReport, moment: Moment) -> None:
@@ -119,8 +128,9 @@ class FrameHandler:
         device, controller = self._device, self._controller
         is_news, is_reboot = device.session.on_state(state, arrival, device.parameters.state_timeout)
         if is_reboot:
-            reason = "the device has restarted"
-            device.event("rebooted", f"{reason}: its position and boot id are read anew", moment)
+            reason, self._position_lost = self._position_lost or RESTARTED, ""
+            if reason == RESTARTED:
+                device.event("rebooted", f"{reason}: its position and boot id are read anew", moment)
             self._components.start_over(reason, moment)
             self._components.injections.on_reboot()
         if not is_news:

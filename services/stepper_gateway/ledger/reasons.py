@@ -9,7 +9,10 @@ from gemelo.services.stepper_gateway.ledger.confidence import AGE, TURNS, Eviden
 
 def open_loop_reason() -> str:
     """Of a board with another dialect."""
-    return "this board does not say what it has executed: no joint can be verified over its wire"
+    return (
+        "this board does not say what it has executed: no joint can be verified over its wire, and a message that it "
+        "has lost without falling silent is not noticed"
+    )
 
 
 def remedy(joint: Joint) -> str:

@@ -25,6 +25,7 @@ class RequestedMotion(NamedTuple):
 
     moves: tuple[Fraction, ...] | None  # [steps] by joint, relative
     output: bool | None
+    objection: str = ""  # why the joints that it names do not move, though its output is switched
 
 
 class RaIntake:
@@ -79,9 +80,10 @@ class RaIntake:
         if len(missing) == len(self._names) and output is not None:
             return RequestedMotion(None, bool(output))
         if missing:
-            raise RefusedMessage(
-                f"{', '.join(missing)} missing: the sketch moves only by {', '.join(self._names)} together"
-            )
+            objection = f"{', '.join(missing)} missing: the sketch moves only by {', '.join(self._names)} together"
+            if output is None:
+                raise RefusedMessage(objection)
+            return RequestedMotion(None, bool(output), objection)
         moves = zip(self._joints, self._names, strict=True)
         steps = tuple(_degrees(found[name], name) * joint.steps.steps_per_turn / 360 for joint, name in moves)
         return RequestedMotion(steps, None if output is None else bool(output))

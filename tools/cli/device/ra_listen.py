@@ -74,7 +74,8 @@ class Listener:
             self._tell()
 
     def close(self) -> None:
-        """Leave the broker; without targets the gateway brakes."""
+        """Leave the broker; without targets the gateway brakes. What it keeps of us says that nobody is here."""
+        self._client.publish(STATES, b"", retain=True)
         self._client.disconnect()
         stop_loop(self._client)
 
@@ -107,6 +108,8 @@ class Listener:
         except RefusedMessage as refused:
             print(f"refused: {refused}", flush=True)
             return
+        if wanted.objection:
+            print(f"refused: {wanted.objection}; {OUTPUT} is switched", flush=True)
         self._is_following = self._is_following or wanted.moves is not None
         if wanted.output is not None:
             self._switch(wanted.output)
@@ -148,8 +151,9 @@ class Listener:
         if now < self._telemetry or state is None or self._state.is_stale:
             return
         self._telemetry = now + TELEMETRY
-        self._client.publish(STATES, json.dumps({"estado": int(state.mode)}))
+        mode = int(state.mode)
+        self._client.publish(STATES, json.dumps({"estado": mode, "Estado": mode}), retain=True)
         readings = self._sensors.message
         if readings is not None and not self._sensors.is_stale:
             said = {name: round(value, 3) for name, value in zip(readings.name, readings.value, strict=True)}
-            self._client.publish(READINGS, json.dumps(said))
+            self._client.publish(READINGS, json.dumps({**said, "Estado": mode}))

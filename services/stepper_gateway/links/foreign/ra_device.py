@@ -9,15 +9,26 @@ import msgspec
 
 from gemelo.libraries.arm.device.device_config import reference_steps
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.libraries.arm.motors.relative_moves import ramp_of
+from gemelo.libraries.arm.motors.relative_moves import MARGIN, loop_of, ramp_of
 from gemelo.services.stepper_gateway.links.foreign import ra_messages
 from gemelo.services.stepper_gateway.links.foreign.ra_sender import RaSender
 from gemelo.services.stepper_gateway.links.foreign.stand_in import Report, StandIn
 from gemelo.services.stepper_gateway.links.link import Kind
 
 NAME = "an AccelStepper sketch on ra/juntas"
-SILENCE = 10.0  # words of its telemetry that a sketch may miss before it counts as gone; chosen: QoS 0 loses some
-
+AT_REST = 10.0  # words of its telemetry that a sketch may miss before it counts as gone; chosen: QoS 0 loses some
+# Chosen: a board that starts anew is back on its network after more than three words at 10 Hz.
+IN_A_MESSAGE = 3.0  # words that it may miss while it has a message to do, but never less than a network delays one
+LONGEST_SILENCE = 1.0  # [s] whatever its telemetry is; chosen: a restart takes longer
+UNSEEN = 1.0  # [s] after which the broker has not passed a message on; chosen: longer than a slow network takes
+SILENT = (
+    "the sketch was silent for {silence:.2f} s with a message to do: it has started anew, lost its network or stood "
+    "still, and where the arm is is not known. Put it into its reference pose, then run `gemelo reference`"
+)
+LOST = (
+    "the broker has not passed on the last message of steps: it was lost with a connection, and where the arm is is "
+    "not known. Put it into its reference pose, then run `gemelo reference`"
+)
 OWN = 64  # messages of ours that are known when the broker sends them back; chosen: those of a minute and more
 OTHER = (
     "another program sends ra/juntas too, and the sketch has moved by it: where the arm is is not known. End that "
@@ -32,17 +43,20 @@ class RaDevice:
     def __init__(self, arm: ArmDescription, new_boot: Callable[[], int], now: float) -> None:
         """Nobody knows where the sketch's joints are: a person has to say it, with REFERENCE."""
         self._ramps = tuple(ramp_of(joint.drive) for joint in arm.joints)
-        self._telemetry_time, steps = arm.device.telemetry_time, reference_steps(arm)
+        self._loop, steps = loop_of(arm.device), reference_steps(arm)
         self._stand_in = StandIn(arm, NAME, steps, new_boot, now)
-        self._sender = RaSender(self._ramps, steps, self._telemetry_time)
+        self._sender = RaSender(self._ramps, steps, self._loop)
         self._heard = -1.0e9  # [s] the sketch's latest word
-        self._is_online = self._is_lost = False
+        self._is_online = False
         self._output = False
         self._said_output: bool | None = None  # None: not known at the sketch
         self._estado: float | None = None
         self._bad, self._complained = 0, -1.0e9  # how many, and [s] when one was told of last
         self._reports: list[Report] = []
         self._own: deque[bytes] = deque(maxlen=OWN)
+        self._unseen: bytes | None = None  # the newest move, until the broker has sent it back
+        self._moved = -1.0e9  # [s] when it was sent
+        self._sees_own = False  # the broker sends our messages back to us
         self._others, self._told_others = 0, -1.0e9  # messages of another program, and [s] when they were told of last
 
     @property
@@ -79,27 +93,20 @@ class RaDevice:
     def advance(self, now: float) -> list[bytes]:
         """Let time pass until `now` [s] monotonic; what is to be published on ra/juntas then."""
         self._stand_in.advance(now)
-        if now - self._heard > SILENCE * self._telemetry_time:
-            self._miss(now)
-            return []
+        self._watch(now)
         if not self._is_online:
-            self._is_online, self._said_output = True, None
-            self._stand_in.report_status()
-            if self._is_lost:
-                self._is_lost = False
-                detail = "the sketch was silent in a motion: where the arm is is not known"
-                self._say(Kind.EVENT, {"event": "position_lost", "t_us": 0, "detail": detail})
+            return []
         messages = self._messages(now)
         self._own.extend(messages)
         return messages
 
     def take(self) -> list[Report]:
-        """What the gateway is to hear; nothing while the sketch is silent."""
+        """What the gateway is to receive, with why a motion has ended first; nothing while the sketch is silent."""
         if not self._is_online:
             self._stand_in.discard()
             self._reports.clear()
             return []
-        said, self._reports = self._stand_in.take(self._is_settled) + self._reports, []
+        said, self._reports = self._reports + self._stand_in.take(self._is_settled), []
         return said
 
     @property
@@ -111,7 +118,9 @@ class RaDevice:
         move = self._sender.take(self._stand_in.steps, not self._stand_in.is_moving, now)
         if move is not None:
             self._said_output = output
-            return [ra_messages.joints_message(move, self._ramps, output)]
+            message = ra_messages.joints_message(move, self._ramps, output)
+            self._unseen, self._moved = message, now
+            return [message]
         if output != self._said_output:
             self._said_output = output
             return [ra_messages.output_message(output)]
@@ -119,30 +128,55 @@ class RaDevice:
 
     def _hear_joints(self, payload: bytes, now: float) -> None:
         """What the broker has passed on to the sketch: by another's move nobody knows any more where the arm is."""
-        if payload in self._own or not ra_messages.moves(payload, self._ramps):
+        if payload in self._own:
+            if payload == self._unseen:
+                self._unseen, self._sees_own = None, True
+            return
+        if not ra_messages.moves(payload, self._ramps):
             return
         self._others += 1
         if self._stand_in.is_referenced or self._stand_in.is_moving or not self._is_settled:
-            self._stand_in.start(self.sent, False, now)
-            self._sender = RaSender(self._ramps, self.sent, self._telemetry_time)
+            self._start(False, now)
             self._told_others = -1.0e9
         if now - self._told_others >= COMPLAINTS:
             self._told_others = now
-            event = {"event": "position_lost", "t_us": self._stand_in.device_us(now)}
-            self._say(
-                Kind.EVENT, {**event, "detail": f"{OTHER} ({self._others} so far: {payload.decode(errors='replace')})"}
-            )
+            self._say_lost(f"{OTHER} ({self._others} so far: {payload.decode(errors='replace')})", now)
 
-    def _miss(self, now: float) -> None:
-        """The sketch has fallen silent: a motion does not go on, and what it did of the last message is not known."""
-        if not self._is_online:
-            return
-        self._is_online = False
-        if self._stand_in.is_moving or not self._is_settled:
-            is_known = self._sender.is_done
-            self._is_lost = not is_known
-            self._stand_in.start(self.sent, is_known, now)
-            self._sender = RaSender(self._ramps, self.sent, self._telemetry_time)
+    def _watch(self, now: float) -> None:
+        """Presence: what a sketch that fell silent in a message did of it is not known, and no motion goes on."""
+        silence = now - self._heard
+        if self._is_online and not self._sender.is_done:
+            if silence > self._patience(IN_A_MESSAGE):
+                return self._lose(SILENT.format(silence=silence), now)
+            if self._sees_own and self._unseen is not None and now - self._moved > UNSEEN:
+                return self._lose(LOST, now)
+        is_present = silence <= self._patience(AT_REST)
+        if self._is_online and not is_present and (self._stand_in.is_moving or not self._is_settled):
+            self._start(True, now)  # nothing of the motion was sent yet
+        if is_present and not self._is_online:
+            self._said_output = None
+            self._stand_in.report_status()
+        self._is_online = is_present
+
+    def _patience(self, words: float) -> float:
+        """[s] of silence that so many words of its telemetry make."""
+        telemetry_time = self._loop.telemetry_time
+        return min(LONGEST_SILENCE, max(words * telemetry_time, telemetry_time + MARGIN))
+
+    def _lose(self, detail: str, now: float) -> None:
+        self._start(False, now)
+        self._say_lost(detail, now)
+
+    def _start(self, is_known: bool, now: float) -> None:
+        """Begin anew where all that was sent ends; `is_known`: the sketch has done all of it."""
+        self._stand_in.start(self.sent, is_known, now)
+        self._sender = RaSender(self._ramps, self.sent, self._loop)
+        self._sender.heard(self._heard)
+        self._unseen = None
+
+    def _say_lost(self, detail: str, now: float) -> None:
+        t_us = self._stand_in.device_us(now)
+        self._say(Kind.EVENT, {"event": "position_lost", "t_us": t_us, "detail": detail})
 
     def _tell(self, values: dict[str, float], now: float) -> None:
         t_us = self._stand_in.device_us(now)

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import msgspec
 
-from gemelo.libraries.arm.motors.relative_moves import Ramp
+from gemelo.libraries.arm.motors.relative_moves import LOOP_READING, Ramp
 
 JOINTS, STATES, SENSORS = "ra/juntas", "ra/estados", "ra/sensores"
 OUTPUT = "avanzar"
+READINGS = ("ultra", "bateria", "estado", LOOP_READING)
 LARGEST = 256  # [bytes] standard: PubSubClient's buffer, and nothing that the sketch says is longer
 DECIMALS = 9  # of a degree: far below the margin; chosen for short messages
 LEAST_MARGIN = 2.0**-10  # [steps] chosen: above every rounding near 0, below what a step shows
@@ -70,10 +71,13 @@ def read_states(payload: bytes) -> Telemetry:
 
 
 def read_sensors(payload: bytes) -> Telemetry:
-    """`{"ultra": int}`, `{"bateria": float}`, or `{"Estado": int, "ultra": int}`; raises `BadRaMessage`."""
-    values = {name: value for name, value in _numbers(payload).items() if name in ("ultra", "bateria", "estado")}
+    """`{"ultra": int}`, `{"bateria": float}`, or `{"Estado": int, "ultra": int}`; raises `BadRaMessage`.
+
+    With each, or alone, `{"loop_us": int}`: the longest pass of the sketch's loop() since the message before.
+    """
+    values = {name: value for name, value in _numbers(payload).items() if name in READINGS}
     if not values:
-        raise BadRaMessage(f'{SENSORS} without "ultra", "bateria" or "Estado": {_shown(payload)}')
+        raise BadRaMessage(f'{SENSORS} without "ultra", "bateria", "Estado" or "{LOOP_READING}": {_shown(payload)}')
     return Telemetry(values)
 
 

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gemelo.libraries.arm.motors.relative_moves import GATHERING, LONGEST_GAP, MARGIN, Ramp
+from gemelo.libraries.arm.motors.relative_moves import GATHERING, LONGEST_GAP, MARGIN, Loop, Ramp
 
 
 class RaSender:
     """The steps of one arm; `now` is [s] on any clock that only goes forward."""
 
-    def __init__(self, ramps: Sequence[Ramp], steps: Sequence[int], telemetry_time: float) -> None:
-        """The sketch stands at `steps`, and says something every `telemetry_time` [s] while its loop runs."""
-        self._longest_gap = LONGEST_GAP * telemetry_time
-        self._ramps = tuple(ramps)
+    def __init__(self, ramps: Sequence[Ramp], steps: Sequence[int], loop: Loop) -> None:
+        """The sketch stands at `steps`, and sends a word of telemetry every so often while its loop runs."""
+        self._longest_gap = LONGEST_GAP * loop.telemetry_time
+        self._ramps, self._loop = tuple(ramps), loop
         self.sent = list(steps)  # absolute: where the sketch's shafts are when it has done all
         self._due = -1.0e9  # [s] when the last message has surely ended
         self._heard = -1.0e9  # [s] the sketch's latest word
@@ -49,9 +49,12 @@ class RaSender:
         if self._behind_since is None:
             self._behind_since = now
         is_gathered = is_at_rest or now - self._behind_since >= GATHERING
-        if not (self.is_done and is_gathered):
+        # A sketch that is silent just now may have lost its connection, and the message with it.
+        is_present = now - self._heard <= self._longest_gap
+        if not (self.is_done and is_gathered and is_present):
             return None
         self.sent = list(commanded)
         self._behind_since = None
-        self._due = now + MARGIN + max(r.duration(count) for r, count in zip(self._ramps, move, strict=True))
+        longest = max(ramp.duration(count, self._loop) for ramp, count in zip(self._ramps, move, strict=True))
+        self._due = now + MARGIN + longest
         return move
