@@ -265,6 +265,7 @@ class EchoResponse(Message, frozen=True, kw_only=True):
 
     answered: bool = False
     round_trip: float = 0.0  # [s] gateway to device and back, without the device's own thinking time
+    waiting: float = 0.0  # [s] that time: of a board that reads lines, until the next one was due
     reason: str = ""  # why there is no answer
 
 

@@ -34,6 +34,8 @@ from gemelo.services.panel.words.step_text import step_text
 from gemelo.services.panel.words.words import SENTENCES, Words
 from gemelo.services.stepper_gateway.device.command_handler import NOT_NOW, REMEDIES, complaint
 from gemelo.services.stepper_gateway.device.session import DEAF, ONE_NAME
+from gemelo.services.stepper_gateway.links.foreign.ra_device import LOST, SILENT
+from gemelo.services.stepper_gateway.links.foreign.text_device import LOST_IN_A_MOTION, MUTE
 from gemelo.services.stepper_gateway.links.frames import Code
 from tests.table import table
 
@@ -131,7 +133,7 @@ NOT_ON_THE_PAGE = {  # of files, logs and clients that a page does not have, and
     "services/stepper_gateway/goals/active_goal.py": ("{}; {}; {} steps from the goal", "{}; nothing moved for it"),
     "services/stepper_gateway/goals/scene_versions.py": ("version {} is ", "it comes from {}", "a process that "),
     "services/stepper_gateway/device/state_checks.py": ("a state that ",),
-    "services/stepper_gateway/device/echoes.py": ("too many measurements", "no link to the device"),
+    "services/stepper_gateway/device/echoes.py": ("too many measurements", "no link to the device", "its longest pass"),
     "services/planner/jog/jog_command.py": ("a jog command ", "a twist is given in"),
     "gemelo/api/arm.py": ("an arc goes by", "a path needs", "start a plan", "plan a request", "jog by a", "ask with a"),
     "gemelo/api/connection.py": ("no {} of {} at the router",),
@@ -256,6 +258,11 @@ BEYOND = 'joint "a": 3.2000 rad is beyond the upper limit 2.9497 rad; stay withi
          "12"),
         ('the device is not usable: two devices call themselves "rm1": boot 00000001 (virtual); boot 00000002 (board): '
          f"{ONE_NAME}", "se llama «rm1» (boot 00000001 (virtual); boot 00000002 (board))"),
+        (SILENT.format(silence=0.31), "El sketch calló 0.31 s con un mensaje por hacer"),
+        (LOST, "El broker no entregó el último mensaje de pasos"),
+        (f'no link to device "rm1": {MUTE.format(silence=1.2, baud=115200)} (port /dev/ttyUSB0)',
+         "trabaja la placa a 115200 baudios?"),
+        (LOST_IN_A_MOTION.format(mute=MUTE.format(silence=1.2, baud=115200)), "Estaba en movimiento y no se sabe"),
         (f'device "rm1" {DEAF} (for 12 s)', "Sin latidos se detiene solo. (desde hace 12 s)"),
         ("cup is not seen by overhead, and nothing else: is it in the image, lit, and not behind the arm? `gemelo "
          "camera view`", "overhead no ve cup, ni nada más"),

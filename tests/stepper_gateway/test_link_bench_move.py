@@ -70,9 +70,9 @@ def session_of(rig: VirtualArm) -> CommandSession:
 
 
 def bench(rig: VirtualArm, swing: Callable[[float], None], seconds: float) -> list[float | None]:
-    trips, took = measure(session_of(rig), 25.0, round(25.0 * seconds), swing)
-    assert took == pytest.approx(seconds, abs=0.1)
-    return trips
+    measured = measure(session_of(rig), 25.0, round(25.0 * seconds), swing)
+    assert measured.took == pytest.approx(seconds, abs=0.1)
+    return measured.trips
 
 
 def test_the_joint_swings_about_where_it_was_and_the_wire_is_as_quick_as_before() -> None:

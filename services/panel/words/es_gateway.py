@@ -75,6 +75,21 @@ _DEVICE: dict[str, str] = {
     "the device was given another configuration ({sum})": "El equipo recibió otra configuración ({sum}).",
     "the device has another configuration": "El equipo tiene otra configuración.",
     "the device has restarted": "El equipo se reinició.",
+    "the sketch was silent for {time} s with a message to do: it has started anew, lost its network or stood still, "
+    "and where the arm is is not known. Put it into its reference pose, then run `gemelo reference`": "El sketch calló "
+    "{time} s con un mensaje por hacer: se reinició, perdió la red o se quedó parado, y no se sabe dónde está el "
+    "brazo. Póngalo en su posición de referencia y pulse «Declarar la referencia».",
+    "the broker has not passed on the last message of steps: it was lost with a connection, and where the arm is is "
+    "not known. Put it into its reference pose, then run `gemelo reference`": "El broker no entregó el último mensaje "
+    "de pasos: se perdió con una conexión, y no se sabe dónde está el brazo. Póngalo en su posición de referencia y "
+    "pulse «Declarar la referencia».",
+    'no link to device "{name}": no line was answered for {time} s: is the wire plugged in, is it this port, has the '
+    "board {baud} baud? (port {port})": "El equipo «{name}» no respondió a ninguna línea en {time} s: ¿está el cable, "
+    "es este puerto ({port}), trabaja la placa a {baud} baudios?",
+    "no line was answered for {time} s: is the wire plugged in, is it this port, has the board {baud} baud? It was in "
+    "a motion, and where the arm is is not known: run `gemelo reference` when it answers": "No se respondió a ninguna "
+    "línea en {time} s: ¿está el cable, es este puerto, trabaja la placa a {baud} baudios? Estaba en movimiento y no "
+    "se sabe dónde está el brazo: declare la referencia cuando responda.",
     "the device has restarted: its position and boot id are read anew": "El equipo se reinició: se lee de nuevo dónde "
     "está.",
     "the device is offline: {reason}": "El equipo no está conectado: {reason}",

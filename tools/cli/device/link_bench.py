@@ -8,6 +8,7 @@ import statistics
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 
@@ -25,6 +26,7 @@ SILENCE = "nothing heard of the arm: is stepper_gateway running? `gemelo node li
 PATIENCE = 2.0  # [s] for one answer, the bus included
 PUBLISHED = "29.8 ms mean at 12.5 Hz; wanted: 25 Hz, below 10 ms, jitter below 2 ms, 0 lost of 1000"
 SWING = 4.0  # [s] of one turn of --move
+SHOWN = 0.5  # [ms] of waiting; chosen: a board of ours thinks for less
 SIZE, EDGE = (720, 240), 40  # of the plot
 
 
@@ -40,6 +42,15 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     p99: float | None = None
     jitter: float | None = None  # mean difference of neighbours, as RFC 3550 means it
     largest: float | None = None
+    waiting: float | None = None  # median, that a question waited for the board's next line; it is in no other figure
+
+
+class Measured(NamedTuple):
+    """What the questions of one run brought."""
+
+    trips: list[float | None]  # [s] of each; None: it was lost
+    waits: list[float]  # [s] that each which was answered waited at the device
+    took: float  # [s] altogether
 
 
 def add_options(parser: Parser) -> None:
@@ -57,8 +68,8 @@ def run(options: Options) -> ExitCode:
         raise usage("--rate: at most 200 Hz: the wire carries the arm's own frames too")
     with connect() as session:
         swing = swinging(session, options.move) if options.move else lambda _elapsed: None
-        trips, took = measure(session, options.rate, options.count, swing)
-    result = result_of(trips, options.rate, took)
+        measured = measure(session, options.rate, options.count, swing)
+    trips, result = measured.trips, result_of(measured, options.rate)
     folder = options.out or project_root() / session.deployment.paths.out
     folder.mkdir(parents=True, exist_ok=True)
     write_csv(folder / "link_bench.csv", trips, options.rate)
@@ -67,11 +78,9 @@ def run(options: Options) -> ExitCode:
     return ExitCode.OK if result.lost == 0 else ExitCode.FAILED
 
 
-def measure(
-    session: CommandSession, rate: float, count: int, swing: Callable[[float], None]
-) -> tuple[list[float | None], float]:
-    """Round trips [s] at `rate` [1/s], None for a lost one, and what all of them took [s]; Ctrl-C ends it early."""
-    node, trips = session.node, list[float | None]()
+def measure(session: CommandSession, rate: float, count: int, swing: Callable[[float], None]) -> Measured:
+    """The round trips of `count` questions at `rate` [1/s]; Ctrl-C ends it early."""
+    node, trips, waits = session.node, list[float | None](), list[float]()
     began = node.monotonic()
     try:
         for index in range(count):
@@ -79,10 +88,11 @@ def measure(
             swing(node.monotonic() - began)
             answer = session.node.call(DEVICE_ECHO, EchoRequest(), timeout=PATIENCE)
             trips.append(_trip(answer, is_first=index == 0))
+            waits += [answer.waiting] if answer.answered else []
     except KeyboardInterrupt:
         if not trips:
             raise
-    return trips, node.monotonic() - began
+    return Measured(trips, waits, node.monotonic() - began)
 
 
 def _trip(answer: EchoResponse, is_first: bool) -> float | None:
@@ -109,8 +119,9 @@ def swinging(session: CommandSession, assignment: str) -> Callable[[float], None
     return swing
 
 
-def result_of(trips: Sequence[float | None], rate: float, took: float) -> Result:
-    """The figures of round trips [s] that `took` [s] altogether."""
+def result_of(measured: Measured, rate: float) -> Result:
+    """The figures of a run at `rate` [1/s]."""
+    trips, waits, took = measured
     found = [1e3 * trip for trip in trips if trip is not None]
     base = Result(rate=rate, reached=len(trips) / took if took else 0.0, count=len(trips), lost=len(trips) - len(found))
     if not found:
@@ -124,6 +135,7 @@ def result_of(trips: Sequence[float | None], rate: float, took: float) -> Result
         p99=ordered[min(len(ordered) - 1, int(0.99 * len(ordered)))],
         jitter=statistics.fmean(steps) if steps else 0.0,
         largest=ordered[-1],
+        waiting=1e3 * statistics.median(waits) if waits else None,
     )
 
 
@@ -133,6 +145,8 @@ def text_of(result: Result, folder: Path) -> str:
     for name in ("median", "mean", "p99", "jitter", "largest"):
         value = getattr(result, name)
         rows.append((name, "-" if value is None else f"{value:.3f} ms"))
+    if result.waiting is not None and result.waiting >= SHOWN:
+        rows.append(("waiting apart", f"{result.waiting:.3f} ms until the board's next line"))
     said = table(("round trip", "measured"), rows)
     return f"{said}\n\npublished for the old driver: {PUBLISHED}\n{folder}/link_bench.csv, link_bench.svg"
 

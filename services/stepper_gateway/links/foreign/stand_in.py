@@ -98,11 +98,15 @@ class StandIn:
         self._device.advance(until)
         self._advanced = max(self._advanced, now)
 
-    def answer_sync(self, sync: Sync, now: float) -> None:
-        """Answer a question for the clock at `now` [s], later than it came: with what the board's own wire took."""
-        t_us = self.device_us(now)
+    def answer_sync(self, sync: Sync, asked: float, sent: float, now: float) -> None:
+        """Answer a question that came at `asked` [s], went over the board's own wire at `sent` and is answered `now`.
+
+        The wire counts, the waiting for it does not: that is the time which the device took.
+        """
+        half = 0.5 * (now - sent)
+        taken, answered = self.device_us(asked + half), self.device_us(sent + half)
         self._reports.append(
-            (Kind.SYNC_R, encode(SyncReply(boot_id=self._device.boot_id, t0=sync.t0, t1=t_us, t2=t_us)))
+            (Kind.SYNC_R, encode(SyncReply(boot_id=self._device.boot_id, t0=sync.t0, t1=taken, t2=answered)))
         )
 
     def take(self, is_settled: bool) -> list[Report]:

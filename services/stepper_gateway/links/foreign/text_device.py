@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Callable
+from typing import NamedTuple
 
 import msgspec
 
@@ -15,8 +17,23 @@ from gemelo.services.stepper_gateway.links.frames import BadFrame, Sync, decode
 from gemelo.services.stepper_gateway.links.link import Kind
 
 NAME = "a board that speaks <SEQ,J1,...>"
-SILENCE = 2.0  # [s] without an answer to any line, after which the board is not there; chosen: all RETRIES have failed
+# Chosen: all RETRIES have failed, and the gateway has not yet concluded from its questions that the board is deaf.
+SILENCE = 1.2  # [s] without an answer to any line, after which the board is not there
+STILL_SILENT = 0.4  # [s] the same, of a board that has not answered since it was missed
+PROBE = 1.0  # [s] between two repetitions of the newest line to a board that is not there
 TELLING = 10.0  # [s] between two summaries of the line; chosen: the log stays readable
+MOST_QUESTIONS = 8  # that wait for a line; chosen: more than the gateway asks between two
+MUTE = "no line was answered for {silence:g} s: is the wire plugged in, is it this port, has the board {baud} baud?"
+LOST_IN_A_MOTION = (
+    "{mute} It was in a motion, and where the arm is is not known: run `gemelo reference` when it answers"
+)
+
+
+class Question(NamedTuple):
+    """One for the clock, which waits for a line."""
+
+    sync: Sync
+    asked: float  # [s] when it came
 
 
 class TextDevice:
@@ -25,16 +42,25 @@ class TextDevice:
     Nothing is sent until a person has said with REFERENCE where the joints stand: the board moves to whatever it reads.
     """
 
-    def __init__(self, arm: ArmDescription, new_boot: Callable[[], int], now: float) -> None:
-        self._arm = arm
+    def __init__(self, arm: ArmDescription, new_boot: Callable[[], int], now: float, baud: int) -> None:
+        """`baud` is that of the port, for what a person is told."""
+        self._arm, self._baud = arm, baud
         self._stand_in = StandIn(arm, NAME, reference_steps(arm), new_boot, now)
         self._reader, self.exchange = AnswerReader(), TextExchange()
-        self._target: tuple[int, ...] | None = None  # [steps] of the newest line
-        self._due = self._told = now  # [s] of the next line, and of the latest summary
+        self._target: tuple[int, ...] | None = None  # [steps] of the newest line; None: none of this reference
+        self._is_confirmed = True  # a line with this target was answered, or it is where the board stands
+        self._due = self._told = self._probed = now  # [s] of the next line, the latest summary and the latest probe
         self._asked_at: float | None = None  # [s] since when lines are not answered
-        self._questions: list[Sync] = []  # that wait for the answer to a line
-        self._is_online = True
+        self._is_missed = False  # it has not answered since it was missed last
+        self._waiting: list[Question] = []  # for the next line
+        self._carried: OrderedDict[int, list[Question]] = OrderedDict()  # by the number of the line that they wait for
+        self._objection = ""
         self._reports: list[Report] = []
+
+    @property
+    def objection(self) -> str:
+        """Why the board counts as not there; empty if it is."""
+        return self._objection
 
     def receive(self, kind: Kind, payload: bytes, now: float) -> None:
         """A frame of the gateway's at `now` [s]; a question for the clock waits until the board answers a line."""
@@ -44,21 +70,24 @@ class TextDevice:
             except BadFrame:
                 question = None
             if isinstance(question, Sync):
-                self._questions = [*self._questions[-7:], question]
+                self._waiting = [*self._waiting[1 - MOST_QUESTIONS :], Question(question, now)]
                 return
+        self._stand_in.advance(now)
+        before = self._stand_in.steps
         self._stand_in.receive(kind, payload, now)
+        if kind is Kind.CMD and self._stand_in.steps != before:
+            self._target, self._is_confirmed = None, True  # a person has said where the board stands
 
     def hear(self, data: bytes, now: float) -> None:
         """Bytes of the board's, at `now` [s] monotonic."""
         for answer in self._reader.feed(data):
             is_first = self.exchange.on_answer(answer, now)
-            self._asked_at = None
+            self._asked_at, self._is_missed = None, False
             if answer.refusal and is_first:
                 self._say({"event": "line_refused", "detail": f"line {answer.seq}: {answer.refusal}"}, now)
             if is_first:
-                for question in self._questions:
-                    self._stand_in.answer_sync(question, now)
-                self._questions.clear()
+                self._is_confirmed = self._is_confirmed or self.exchange.is_newest(answer.seq)
+                self._answer_questions(answer.seq, now)
 
     def advance(self, now: float) -> list[bytes]:
         """Let time pass until `now` [s] monotonic; the lines to write then."""
@@ -66,59 +95,85 @@ class TextDevice:
         self._watch(now)
         if not self._stand_in.is_referenced:
             return []
-        lines = self._lines(now)
+        lines = self._probe(now) if self._objection else self._lines(now)
         if lines and self._asked_at is None:
             self._asked_at = now
         return lines
 
     def take(self) -> list[Report]:
-        """What the gateway is to hear; nothing while the board is silent."""
-        if not self._is_online:
+        """What the gateway is to receive, with why a motion has ended first; nothing while the board is silent."""
+        if self._objection:
             self._stand_in.discard()
             self._reports.clear()
             return []
-        said, self._reports = self._stand_in.take(self._is_settled) + self._reports, []
+        said, self._reports = self._reports + self._stand_in.take(self._is_settled), []
         return said
 
     @property
     def _is_settled(self) -> bool:
-        newest = self.exchange.newest
-        is_sent = self._target is None or self._target == self._stand_in.steps
-        return is_sent and (newest is None or newest.is_answered)
+        """A line that only asks for the clock says the target again, and unsettles nothing."""
+        return self._target in (None, self._stand_in.steps) and self._is_confirmed
 
     def _lines(self, now: float) -> list[bytes]:
         steps = self._stand_in.steps
         is_new = steps != self._target
-        if now >= self._due and (is_new or (self._questions and not self.exchange.is_waiting)):
+        if now >= self._due and (is_new or (self._waiting and not self.exchange.is_waiting)):
             period = 1.0 / self._arm.device.text_hz
             self._due = self._due + period if now - self._due < period else now + period
             return [self._line(steps, now)]
-        again = self.exchange.again(now)
+        # What was sent before this reference is no longer where the board is to be.
+        again = self.exchange.again(now) if self._target is not None else None
         return [again] if again is not None else []
+
+    def _probe(self, now: float) -> list[bytes]:
+        """The newest line again, from time to time: by its answer the board is there."""
+        if now - self._probed < PROBE:
+            return []
+        self._probed = now
+        return [self._line(self._stand_in.steps, now)]
 
     def _line(self, steps: tuple[int, ...], now: float) -> bytes:
         positions = [joint.steps.to_position(count) for joint, count in zip(self._arm.joints, steps, strict=True)]
         payload = line_of(self.exchange.next_seq, positions, self._arm.device.text_decimals)
-        self.exchange.sent(payload, now)
+        seq = self.exchange.sent(payload, now)
+        self._is_confirmed = self._is_confirmed and self._target in (None, steps)
         self._target = steps
+        if self._waiting:
+            self._carried[seq], self._waiting = self._waiting, []
+        while len(self._carried) > MOST_QUESTIONS:
+            self._carried.popitem(last=False)
         return payload
+
+    def _answer_questions(self, seq: int, now: float) -> None:
+        """Those that line `seq` was sent with: what they waited for it is no time of the wire."""
+        sent = self.exchange.sent_at(seq)
+        for question in self._carried.pop(seq, []):
+            self._stand_in.answer_sync(question.sync, question.asked, sent, now)
 
     def _watch(self, now: float) -> None:
         """Presence, and a summary now and then."""
-        is_silent = self._asked_at is not None and now - self._asked_at > SILENCE
-        if is_silent and self._is_online and (self._stand_in.is_moving or not self._is_settled):
-            self._stand_in.start(self._stand_in.steps, False, now)
-            self._target, self._asked_at, is_silent = None, None, False
-            detail = f"no line was answered for {SILENCE:g} s of a motion: where the arm is is not known"
-            self._say({"event": "position_lost", "detail": detail}, now)
-        if self._is_online and is_silent:
-            self._is_online = False
-        elif not self._is_online and not is_silent:
-            self._is_online = True
+        longest = STILL_SILENT if self._is_missed else SILENCE
+        if self._asked_at is not None and now - self._asked_at > longest and not self._objection:
+            self._miss(longest, now)
+        elif self._objection and self._asked_at is None:
+            self._objection = ""
             self._stand_in.report_status()
         if now - self._told >= TELLING and self.exchange.counts.lines:
             self._told = now
             self._say({"event": "text_link", "detail": self.exchange.summary()}, now)
+
+    def _miss(self, silence: float, now: float) -> None:
+        """The board is silent: at rest it counts as not there until it answers, and a motion is lost."""
+        mute = MUTE.format(silence=silence, baud=self._baud)
+        self._is_missed = True
+        if not self._stand_in.is_moving and self._is_settled:
+            self._objection, self._probed = mute, now
+            return
+        self._stand_in.start(self._stand_in.steps, False, now)
+        self._target, self._is_confirmed, self._asked_at = None, True, None
+        self._waiting.clear()
+        self._carried.clear()
+        self._say({"event": "position_lost", "detail": LOST_IN_A_MOTION.format(mute=mute)}, now)
 
     def _say(self, event: dict[str, object], now: float) -> None:
         report = {**event, "t_us": self._stand_in.device_us(now)}

@@ -66,6 +66,14 @@ class TextExchange:
         """The line that was sent last."""
         return next(reversed(self._lines.values())) if self._lines else None
 
+    def is_newest(self, seq: int) -> bool:
+        """True if `seq` is the number of the line that was sent last."""
+        return bool(self._lines) and next(reversed(self._lines)) == seq
+
+    def sent_at(self, seq: int) -> float:
+        """[s] when line `seq`, which is remembered, was sent first."""
+        return self._lines[seq].first
+
     def sent(self, payload: bytes, now: float) -> int:
         """A new line goes out at `now` [s]; its number."""
         seq, self._seq = self._seq, (self._seq + 1) % SEQ_MODULUS

@@ -24,7 +24,7 @@ class TextLink:
         self._line: OpenPort | None = None
         self._reason = f"the serial port {port} has not been opened yet"
         self._stop = threading.Event()
-        self.device = TextDevice(arm, lambda: secrets.randbelow((1 << 32) - 1) + 1, time.monotonic())
+        self.device = TextDevice(arm, lambda: secrets.randbelow((1 << 32) - 1) + 1, time.monotonic(), baud)
         self._adapter = Adapter(self.device, self._write, wake)
         self._thread = threading.Thread(
             target=keep_connected, args=(self._connection, self._stop), name="text-link", daemon=True
@@ -33,11 +33,13 @@ class TextLink:
 
     @property
     def connected(self) -> bool:
-        return self._line is not None
+        return self._line is not None and not self.device.objection
 
     @property
     def reason(self) -> str:
-        return "" if self.connected else self._reason
+        if self._line is None:
+            return self._reason
+        return f"{self.device.objection} (port {self._port})" if self.device.objection else ""
 
     def send(self, kind: Kind, payload: bytes, urgent: bool = False) -> bool:
         return self.connected and self._adapter.put(FrameFor(kind, payload))

@@ -1,0 +1,96 @@
+"""A gateway that drives a board of dialect "text", in one virtual time."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Callable
+from dataclasses import replace
+
+import msgspec
+
+from gemelo.libraries.arm.model.description import ArmDescription, heard_by_the_board
+from gemelo.schemas.device import DeviceCommandKind
+from gemelo.schemas.robot import Dialect
+from gemelo.services.stepper_gateway.links.foreign.text_device import TextDevice
+from gemelo.services.stepper_gateway.links.link import Kind
+from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, LinkInput, Moment, StepInput
+from gemelo.tools.virtual_arm.virtual_arm import GATEWAY_ZERO, UNIX, rm1
+
+PERIOD = 0.02  # [s] of the gateway's loop
+STEP = 0.001  # [s] of virtual time
+TRIP = 0.009  # [s] of a line and its answer; chosen: what both take at 115,200 baud, and the board between them
+BAUD = 115_200
+
+_LINE = re.compile(rb"<(\d+),([-+0-9.,]+)>\n")
+
+
+def text_arm() -> ArmDescription:
+    """rm1 behind a board that reads `<SEQ,J1,...>`."""
+    arm = rm1()
+    return heard_by_the_board(replace(arm, device=msgspec.structs.replace(arm.device, dialect=Dialect.TEXT)))
+
+
+class TextArm(GatewayDriver):
+    """The board answers every line `trip` [s] later, while it answers."""
+
+    def __init__(self, *, trip: float = TRIP, seed: int = 1) -> None:
+        super().__init__()
+        self.arm, self.now, self._trip = text_arm(), 0.0, trip
+        self.answers_lines = True
+        self.lines: list[tuple[float, tuple[float, ...]]] = []  # [s] and [rad] or [m] of each
+        self._answers: list[tuple[float, bytes]] = []  # that are under way, with [s] of their arrival
+        self._beat = 0.0
+        boots = itertools.count(1001)
+        self.device = TextDevice(self.arm, lambda: next(boots), GATEWAY_ZERO, BAUD)
+        self._link = (True, "")
+        self.start_core(self.arm, seed, GatewayParameters())
+        self.handle(LinkInput(*self._link))
+
+    @property
+    def moment(self) -> Moment:
+        return Moment(UNIX + round(self.now * 1e9), GATEWAY_ZERO + self.now)
+
+    def send(self, kind: Kind, payload: bytes) -> None:
+        if not self.device.objection:
+            self.device.receive(kind, payload, self.moment.monotonic)
+
+    def run(self, seconds: float, until: Callable[[], bool] | None = None) -> bool:
+        """Lets `seconds` [s] pass, or less: until `until`; whether that came true."""
+        end = self.now + seconds
+        while self.now < end:
+            if until is not None and until():
+                return True
+            self.now += STEP
+            self._exchange()
+            if self.now >= self._beat:
+                self._beat += PERIOD
+                self.handle(StepInput())
+        return until is None or until()
+
+    def _exchange(self) -> None:
+        monotonic = self.moment.monotonic
+        while self._answers and self._answers[0][0] <= self.now:
+            self.device.hear(self._answers.pop(0)[1], monotonic)
+        for line in self.device.advance(monotonic):
+            self._read(line)
+        link = (not self.device.objection, self.device.objection)
+        if link != self._link:
+            self._link = link
+            self.handle(LinkInput(*link))
+        for kind, report in self.device.take():
+            self.receive(kind, report)
+
+    def _read(self, line: bytes) -> None:
+        found = _LINE.fullmatch(line)
+        assert found is not None, line
+        self.lines.append((self.now, tuple(float(number) for number in found[2].split(b","))))
+        if self.answers_lines:
+            self._answers.append((self.now + self._trip, b"<ACK,%s,%d>\n" % (found[1], round(self.now * 1e6))))
+
+    def referenced(self) -> TextArm:
+        """A person has said where the joints are: it accepts goals."""
+        assert self.run(4.0, lambda: not self.core.device.unreachable_reason(self.moment))
+        self.command(DeviceCommandKind.REFERENCE, 99)
+        assert self.run(3.0, lambda: 99 in self.answers and not self.reason_not_ready), self.reason_not_ready
+        return self
