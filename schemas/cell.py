@@ -13,7 +13,7 @@ import msgspec
 from msgspec import Meta
 
 from gemelo.schemas.message import Message
-from gemelo.schemas.robot import Edges, NotNegative, Positive
+from gemelo.schemas.robot_record import Edges, NotNegative, Positive
 
 CellName = Annotated[str, Meta(pattern="^[a-z][a-z0-9_]*$")]  # a camera's is part of a key on the bus
 Point = tuple[float, float, float]  # [m]

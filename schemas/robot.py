@@ -13,23 +13,15 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Annotated
 
-import msgspec
 from msgspec import Meta
 
 from gemelo.schemas.device_config import InputRole, Pull, SensorKind
+from gemelo.schemas.grippers.kinds import Gripper
+from gemelo.schemas.robot_record import KeyPart, NotNegative, Pin, Positive, RobotRecord
 
-KeyPart = Annotated[str, Meta(pattern="^[A-Za-z0-9_-]+$")]  # part of a key on the bus or of an MQTT topic
-Pin = Annotated[int, Meta(ge=0, le=63)]  # GPIO
-NotNegative = Annotated[float, Meta(ge=0.0)]
-Positive = Annotated[float, Meta(gt=0.0)]
-Edges = tuple[Positive, Positive, Positive]  # (3,) [m] of a box
 LEAST_CLEARANCE, MOST_CLEARANCE, CLEARANCE = 0.0005, 0.05, 0.004  # [m] bounds and default of what is kept free
 Clearance = Annotated[float, Meta(ge=LEAST_CLEARANCE, le=MOST_CLEARANCE)]  # [m]
 AtLeastHalfAStep = Annotated[float, Meta(ge=0.5)]  # rounding to whole steps alone is off by as much
-
-
-class RobotRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A table of robot.toml; an unknown key is an error."""
 
 
 class Transmission(StrEnum):
@@ -166,41 +158,6 @@ class Dialect(StrEnum):
     GEMELO = "gemelo"  # the frames of firmware/PROTOCOL.md
     RA = "ra"  # MQTT: relative degrees on ra/juntas, for an AccelStepper sketch
     TEXT = "text"  # serial: <SEQ,J1,...,Jn> in radians, answered by <ACK,SEQ,TIMESTAMP_US>
-
-
-class GripperRecord(RobotRecord, frozen=True, kw_only=True):
-    """What every gripper has. Openings are between the jaws."""
-
-    open: Positive  # [m]
-    closed: NotNegative = 0.0  # [m]
-    effort: Positive  # [N] that it closes with, by its data sheet: nothing measures it
-    tolerance: Positive = 0.001  # [m] from the goal that counts as there
-    jaw: Edges | None = None  # of one jaw, in the tool frame: along x, along y (the way it moves), beyond it along z
-
-
-class OutputGripper(GripperRecord, frozen=True, kw_only=True, tag_field="kind", tag="output"):
-    """A valve or a relay: open or closed, and nothing says when it is there but its travel time."""
-
-    output: str  # name of an [[output]]
-    closes: bool = True  # False: switched on, it opens
-    travel_time: Positive = 0.3  # [s] from one end to the other
-
-
-PulseWidth = Annotated[int, Meta(ge=500, le=2500)]  # [us]
-
-
-class ServoGripper(GripperRecord, frozen=True, kw_only=True, tag_field="kind", tag="servo"):
-    """A hobby servo on a pin: 50 pulses a second, whose length the opening follows in proportion."""
-
-    pin: Pin
-    open_us: PulseWidth
-    closed_us: PulseWidth
-    speed: Positive  # [m/s] of the opening; slower than the servo turns by itself
-    sensor: str = ""  # name of an analog [[sensor]] in mm or m that reads the opening; empty: it is not measured
-    off_at_estop: bool = False  # the pulses end: what it holds falls
-
-
-Gripper = OutputGripper | ServoGripper
 
 
 class DeviceRecord(RobotRecord, frozen=True, kw_only=True):

@@ -17,7 +17,9 @@ from gemelo.libraries.arm.model.gripper import opening_of, pulse_of
 from gemelo.libraries.runtime.serial_frames import LARGEST, JsonFrame
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.device_config import DeviceConfig, config_text
-from gemelo.schemas.robot import Gripper, Motor, ServoGripper
+from gemelo.schemas.grippers.gripper import PulseDrive
+from gemelo.schemas.grippers.kinds import Gripper
+from gemelo.schemas.robot import Motor
 
 LARGEST_OUTPUT = 1024
 UNCONFIGURED = DeviceConfig(name="", joints=())
@@ -69,9 +71,10 @@ class CoreDevice:
             except MotorError as error:
                 raise MotorError(f"the motor of joint {index + 1}: {error}") from error
             self._library.gemelo_set_motor(self._handle, index, c.byref(record))
-        self._gripper = gripper if isinstance(gripper, ServoGripper) else None
-        if self._gripper is not None:
-            horn = horn_record(self._gripper, self._config.sensors, gripper_unit)
+        drive = gripper.drive if gripper is not None else None
+        self._servo = drive if isinstance(drive, PulseDrive) else None
+        if self._servo is not None:
+            horn = horn_record(self._servo, self._config.sensors, gripper_unit)
             self._library.gemelo_set_horn(self._handle, c.byref(horn))
         true = _positions(start if shaft is None else shaft)
         self._library.gemelo_start(self._handle, _positions(start), true, referenced)
@@ -316,24 +319,24 @@ class CoreDevice:
     @property
     def opening(self) -> float | None:
         """[m] that the jaws of a servo gripper truly stand apart; None without one."""
-        return None if self._gripper is None else opening_of(self._gripper, self._snapshot().horn_us)
+        return None if self._servo is None else opening_of(self._servo, self._snapshot().horn_us)
 
     def put_object(self, width: float) -> bool:
         """Put something `width` [m] wide between the jaws, 0 for nothing; False where they are closer than that."""
-        if self._gripper is None:
+        if self._servo is None:
             return False
         if width <= 0.0:
             self._library.gemelo_take_object(self._handle)
             return True
         if (self.opening or 0.0) < width - 1e-6:
             return False
-        self._library.gemelo_put_object(self._handle, pulse_of(self._gripper, width))
+        self._library.gemelo_put_object(self._handle, pulse_of(self._servo, width))
         return True
 
     @property
     def has_jaws(self) -> bool:
         """It has a servo gripper, between whose jaws something can be put."""
-        return self._gripper is not None
+        return self._servo is not None
 
     def freeze(self, seconds: float) -> None:
         """Blocks the slot task for `seconds` [s]; only the interrupt runs."""

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from gemelo.firmware.bindings.library import MAX_CURVE, HornRecord, MotorRecord, load_library
 from gemelo.libraries.arm.model.gripper import METRES, pulse_speed
 from gemelo.schemas.device_config import UNUSED, SensorConfig
-from gemelo.schemas.robot import Motor, ServoGripper
+from gemelo.schemas.grippers.gripper import PulseDrive
+from gemelo.schemas.robot import Motor
 
 MARGIN = 1.25  # a servo turns faster than it is asked to
 
@@ -32,16 +33,16 @@ def motor_record(motor: Motor) -> MotorRecord:
     return record
 
 
-def horn_record(gripper: ServoGripper, sensors: Sequence[SensorConfig], unit: str = "mm") -> HornRecord:
+def horn_record(drive: PulseDrive, sensors: Sequence[SensorConfig], unit: str = "mm") -> HornRecord:
     """The core's form of a servo; `unit` is that of the sensor that reads the opening."""
     names = [sensor.name for sensor in sensors]
     return HornRecord(
-        speed_us_s=pulse_speed(gripper) * MARGIN,
-        open_us=gripper.open_us,
-        closed_us=gripper.closed_us,
-        open_value=gripper.open / METRES[unit],
-        closed_value=gripper.closed / METRES[unit],
-        sensor=names.index(gripper.sensor) if gripper.sensor in names else UNUSED,
+        speed_us_s=pulse_speed(drive) * MARGIN,
+        open_us=drive.open_us,
+        closed_us=drive.closed_us,
+        open_value=drive.open / METRES[unit],
+        closed_value=drive.closed / METRES[unit],
+        sensor=names.index(drive.sensor) if drive.sensor in names else UNUSED,
     )
 
 

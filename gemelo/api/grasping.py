@@ -10,7 +10,7 @@ from gemelo.api.units import Point, Pose
 from gemelo.libraries.arm.frames.transforms import IDENTITY, Quaternion, Rigid, compose, from_axis_angle, rotate
 from gemelo.libraries.arm.model.jaws import jaw_edges
 from gemelo.schemas.cell import Thing
-from gemelo.schemas.robot import Gripper
+from gemelo.schemas.grippers.kinds import Gripper
 
 GAP = 0.003  # [m] between the thing's top and the tool, and between the jaws' tips and the table
 OVERLAP = 0.004  # [m] of the jaws' length that must be beside the thing

@@ -16,7 +16,8 @@ from gemelo.libraries.runtime.actions import ActionClient, GoalHandle
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import InjectKind, InjectRequest
 from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
-from gemelo.schemas.robot import Gripper, ServoGripper
+from gemelo.schemas.grippers.gripper import PulseDrive
+from gemelo.schemas.grippers.kinds import Gripper
 from gemelo.schemas.scene import SceneGrip, SceneRelease
 from gemelo.schemas.topics import DEVICE_INJECT, DEVICE_STATUS, GRIPPER_COMMAND, GRIPPER_STATE
 
@@ -72,7 +73,7 @@ class Gripping:
         """
         gripper = self._gripper()
         position = opening_of(gripper, to)
-        if isinstance(gripper, ServoGripper) and self._is_virtual() and not self._holds():
+        if isinstance(gripper.drive, PulseDrive) and self._is_virtual() and not self._holds():
             self._put_between(position)
         before = self._session.newest(GRIPPER_STATE)
         goal = GripperCommandGoal(position=position, max_effort=max_effort)

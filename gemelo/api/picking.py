@@ -22,7 +22,7 @@ from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, from_axis_angle
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.cell import Place, PosePlace, Thing
-from gemelo.schemas.robot import Gripper
+from gemelo.schemas.grippers.kinds import Gripper
 
 APPROACH = 0.04  # [m] the straight way down to a thing, and up with it
 SLOW = 0.05  # [m/s] down and up

@@ -13,7 +13,8 @@ from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.device_config import ServoConfig
-from gemelo.schemas.robot import OutputGripper, ServoGripper
+from gemelo.schemas.grippers.output import OutputGripper
+from gemelo.schemas.grippers.servo import ServoGripper
 from tests.arm.editing import edit
 
 URDF = Path(__file__).resolve().parents[2] / "urdf"

@@ -10,7 +10,7 @@ from gemelo import BadArgument
 from gemelo.api.gripping import opening_of, opens
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.gripper import GripperState
-from gemelo.schemas.robot import Gripper
+from gemelo.schemas.grippers.kinds import Gripper
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from gemelo.api.units import Pose
 from gemelo.libraries.arm.frames.transforms import from_axis_angle, rotate
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.cell import ColourThing, TagThing
-from gemelo.schemas.robot import Gripper
+from gemelo.schemas.grippers.kinds import Gripper
 
 BEYOND = 0.016  # [m] rm1's jaws
 

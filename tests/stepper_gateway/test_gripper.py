@@ -17,7 +17,7 @@ from gemelo.libraries.arm.model.gripper import opening_of, pulse_of
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandKind, InjectKind, InjectRequest, OutputCommand, StopKind
 from gemelo.schemas.gripper import GripperCommandGoal, GripperState
-from gemelo.schemas.robot import ServoGripper
+from gemelo.schemas.grippers.servo import ServoGripper
 from gemelo.schemas.topics import GRIPPER_STATE
 from gemelo.tools.virtual_arm.gateway_driver import GripCancelInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
@@ -306,4 +306,4 @@ def test_the_servo_command_has_its_number_of_the_wire():
 @examples(quick=15, full=50)
 @given(st.floats(0.0, OPEN))
 def test_an_opening_is_a_pulse_and_back(opening: float):
-    assert opening_of(servo(), pulse_of(servo(), opening)) == pytest.approx(opening, abs=1e-12)
+    assert opening_of(servo().drive, pulse_of(servo().drive, opening)) == pytest.approx(opening, abs=1e-12)

@@ -9,7 +9,8 @@ from gemelo.libraries.arm.checks.findings import Finding, error
 from gemelo.libraries.arm.errors import suggestion
 from gemelo.libraries.arm.model.description import ROBOT_FILE
 from gemelo.schemas.device_config import InputRole, SensorKind
-from gemelo.schemas.robot import Input, RobotFile, Sensor, ServoGripper
+from gemelo.schemas.grippers.gripper import PulseDrive
+from gemelo.schemas.robot import Input, RobotFile, Sensor
 
 RESERVED_NAMES = ("t_us", "boot_id")  # by the message that carries the readings
 
@@ -51,8 +52,9 @@ def _signals(robot: RobotFile) -> Iterable[tuple[int, str]]:
     signals += [(output.pin, f'"{output.name}"') for output in robot.output]
     signals += [(sensor.pin, f'"{sensor.name}"') for sensor in robot.sensor]
     signals += [(sensor.trigger_pin, f'"{sensor.name}"\'s trigger_pin') for sensor in robot.sensor]
-    if isinstance(robot.gripper, ServoGripper):
-        signals.append((robot.gripper.pin, "the gripper's pin"))
+    drive = robot.gripper.drive if robot.gripper is not None else None
+    if isinstance(drive, PulseDrive):
+        signals.append((drive.pin, "the gripper's pin"))
     return ((pin, user) for pin, user in signals if pin is not None)
 
 

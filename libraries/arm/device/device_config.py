@@ -14,7 +14,8 @@ from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.libraries.arm.model.gripper import pulse_speed
 from gemelo.libraries.arm.motors.steps import Q8, StepScale
 from gemelo.schemas.device_config import DeviceConfig, HomingConfig, JointConfig, ServoConfig
-from gemelo.schemas.robot import Homing, HomingDirection, PinLevel, ServoGripper
+from gemelo.schemas.grippers.gripper import PulseDrive
+from gemelo.schemas.robot import Homing, HomingDirection, PinLevel
 
 # Knots are rounded to 1/256 step and sampled from profiles that touch their limits.
 HEADROOM = 1.02
@@ -71,16 +72,16 @@ def _joint(joint: Joint, arm: ArmDescription) -> JointConfig:
 
 
 def _servo(arm: ArmDescription) -> ServoConfig | UnsetType:
-    gripper = arm.gripper
-    if not isinstance(gripper, ServoGripper):
+    drive = arm.gripper.drive if arm.gripper is not None else None
+    if not isinstance(drive, PulseDrive):
         return UNSET
     return ServoConfig(
         name=SERVO_NAME,
-        pin=gripper.pin,
-        lower_us=min(gripper.open_us, gripper.closed_us),
-        upper_us=max(gripper.open_us, gripper.closed_us),
-        speed_us_s=round(pulse_speed(gripper)),
-        off_at_estop=gripper.off_at_estop,
+        pin=drive.pin,
+        lower_us=min(drive.open_us, drive.closed_us),
+        upper_us=max(drive.open_us, drive.closed_us),
+        speed_us_s=round(pulse_speed(drive)),
+        off_at_estop=drive.off_at_estop,
     )
 
 

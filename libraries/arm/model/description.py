@@ -20,13 +20,13 @@ from gemelo.libraries.arm.motors.relative_moves import loop_of, ramp_of
 from gemelo.libraries.arm.motors.speed import speed_limits
 from gemelo.libraries.arm.motors.steps import StepScale, step_scale
 from gemelo.schemas.deployment import DeviceKind
+from gemelo.schemas.grippers.kinds import Gripper
 from gemelo.schemas.robot import (
     CLEARANCE,
     DeviceRecord,
     Dialect,
     DigitalOutput,
     Driver,
-    Gripper,
     Input,
     RobotFile,
     Sensor,

@@ -7,7 +7,8 @@ from pathlib import Path
 from gemelo.libraries.arm.errors import DescriptionError, suggestion
 from gemelo.libraries.arm.model.robot_file import line_of
 from gemelo.schemas.device_config import SensorKind
-from gemelo.schemas.robot import OutputGripper, RobotFile, Sensor, ServoGripper
+from gemelo.schemas.grippers.gripper import Drive, PulseDrive
+from gemelo.schemas.robot import RobotFile, Sensor
 
 METRES = {"mm": 0.001, "m": 1.0}  # [m] of a sensor's unit
 LEAST_PULSES = 100  # [us] between open and closed: a servo cannot tell less apart from noise
@@ -19,38 +20,43 @@ def require_gripper(robot: RobotFile, path: Path, text: str) -> None:
     gripper = robot.gripper
     if gripper is None:
         return
-    key, reason = "", ""
+    key, reason = gripper.fault()
     if gripper.open <= gripper.closed:
         key, reason = "open", f"{gripper.open:g} m is not wider than closed, {gripper.closed:g} m: write the wider one"
-    elif isinstance(gripper, OutputGripper):
-        names = [output.name for output in robot.output]
-        if gripper.output not in names:
-            key, reason = "output", f'"{gripper.output}" is no [[output]]{suggestion(gripper.output, names)}'
-    else:
-        key, reason = _servo_fault(gripper, robot)
+    elif not reason:
+        key, reason = _drive_fault(gripper.drive, robot)
     if reason:
         raise DescriptionError(f"{path}, line {line_of(('gripper', key), text)}: [gripper] {key} {reason}")
 
 
-def _servo_fault(gripper: ServoGripper, robot: RobotFile) -> tuple[str, str]:
+def _drive_fault(drive: Drive, robot: RobotFile) -> tuple[str, str]:
     """The key that is wrong and why; both empty if none is."""
-    if abs(gripper.open_us - gripper.closed_us) < LEAST_PULSES:
+    if isinstance(drive, PulseDrive):
+        return _pulse_fault(drive, robot)
+    names = [output.name for output in robot.output]
+    if drive.output not in names:
+        return "output", f'"{drive.output}" is no [[output]]{suggestion(drive.output, names)}'
+    return "", ""
+
+
+def _pulse_fault(drive: PulseDrive, robot: RobotFile) -> tuple[str, str]:
+    if abs(drive.open_us - drive.closed_us) < LEAST_PULSES:
         return "open_us", (
-            f"{gripper.open_us} us and closed_us {gripper.closed_us} us are nearer than {LEAST_PULSES} us: "
+            f"{drive.open_us} us and closed_us {drive.closed_us} us are nearer than {LEAST_PULSES} us: "
             "write the pulses that open and close it"
         )
-    if not LEAST_PULSE_SPEED <= pulse_speed(gripper) <= MOST_PULSE_SPEED:
-        metres = (gripper.open - gripper.closed) / abs(gripper.open_us - gripper.closed_us)
+    if not LEAST_PULSE_SPEED <= pulse_speed(drive) <= MOST_PULSE_SPEED:
+        metres = (drive.open - drive.closed) / abs(drive.open_us - drive.closed_us)
         return "speed", (
-            f"{gripper.speed:g} m/s is {pulse_speed(gripper):.0f} us/s of pulse: write "
+            f"{drive.speed:g} m/s is {pulse_speed(drive):.0f} us/s of pulse: write "
             f"{LEAST_PULSE_SPEED * metres:.2g} to {MOST_PULSE_SPEED * metres:.2g} m/s"
         )
-    if not gripper.sensor:
+    if not drive.sensor:
         return "", ""
     names = [sensor.name for sensor in robot.sensor]
-    if gripper.sensor not in names:
-        return "sensor", f'"{gripper.sensor}" is no [[sensor]]{suggestion(gripper.sensor, names)}'
-    return "sensor", _sensor_fault(robot.sensor[names.index(gripper.sensor)])
+    if drive.sensor not in names:
+        return "sensor", f'"{drive.sensor}" is no [[sensor]]{suggestion(drive.sensor, names)}'
+    return "sensor", _sensor_fault(robot.sensor[names.index(drive.sensor)])
 
 
 def _sensor_fault(sensor: Sensor) -> str:
@@ -61,18 +67,18 @@ def _sensor_fault(sensor: Sensor) -> str:
     return ""
 
 
-def pulse_speed(gripper: ServoGripper) -> float:
+def pulse_speed(drive: PulseDrive) -> float:
     """[us/s] by which the pulse changes."""
-    return gripper.speed * abs(gripper.open_us - gripper.closed_us) / (gripper.open - gripper.closed)
+    return drive.speed * abs(drive.open_us - drive.closed_us) / (drive.open - drive.closed)
 
 
-def pulse_of(gripper: ServoGripper, opening: float) -> float:
+def pulse_of(drive: PulseDrive, opening: float) -> float:
     """[us] of the pulse that opens the jaws to `opening` [m]."""
-    share = (opening - gripper.closed) / (gripper.open - gripper.closed)
-    return gripper.closed_us + share * (gripper.open_us - gripper.closed_us)
+    share = (opening - drive.closed) / (drive.open - drive.closed)
+    return drive.closed_us + share * (drive.open_us - drive.closed_us)
 
 
-def opening_of(gripper: ServoGripper, pulse_us: float) -> float:
+def opening_of(drive: PulseDrive, pulse_us: float) -> float:
     """[m] between the jaws under a pulse of `pulse_us` [us]."""
-    share = (pulse_us - gripper.closed_us) / (gripper.open_us - gripper.closed_us)
-    return gripper.closed + share * (gripper.open - gripper.closed)
+    share = (pulse_us - drive.closed_us) / (drive.open_us - drive.closed_us)
+    return drive.closed + share * (drive.open - drive.closed)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.gripper import GripperState
-from gemelo.schemas.robot import Gripper, ServoGripper
+from gemelo.schemas.grippers.gripper import PulseDrive
+from gemelo.schemas.grippers.kinds import Gripper
 from gemelo.schemas.scene import BoxShape, SceneObject
 
 JAW = (0.01, 0.005, 0.02)  # [m] the edges of a jaw that robot.toml does not give
@@ -52,7 +53,13 @@ def jaws_apart(arm: ArmDescription, state: GripperState | None) -> float:
     return min(max(round(within / APART) * APART, arm.gripper.closed), arm.gripper.open)
 
 
+def opening_sensor(arm: ArmDescription) -> str:
+    """The name of the sensor that reads the opening; "" where none does."""
+    drive = arm.gripper.drive if arm.gripper is not None else None
+    return drive.sensor if isinstance(drive, PulseDrive) else ""
+
+
 def gripper_unit(arm: ArmDescription) -> str:
-    """The unit of the sensor that reads the jaws; "mm" where none does."""
-    name = arm.gripper.sensor if isinstance(arm.gripper, ServoGripper) else ""
+    """The unit of the sensor that reads the opening; "mm" where none does."""
+    name = opening_sensor(arm)
     return next((sensor.unit for sensor in arm.sensors if sensor.name == name), "mm")

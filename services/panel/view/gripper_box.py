@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gemelo.schemas.robot import Gripper
+from gemelo.schemas.grippers.kinds import Gripper
 from gemelo.services.panel.model.readings import Readings
 from gemelo.services.panel.view.kit import Kit, note, set_if_new
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gemelo.libraries.arm.model.gripper import METRES
-from gemelo.libraries.arm.model.jaws import gripper_unit
+from gemelo.libraries.arm.model.jaws import gripper_unit, opening_sensor
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandResponse, DeviceMode
 from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
@@ -52,7 +52,7 @@ class GripperExecutor:
         self._gripper = device.arm.gripper
         self._jaws: Jaws | None = jaws_of(device.arm)
         self._metres = METRES[gripper_unit(device.arm)]  # [m] of the sensor's unit
-        self._sensor = getattr(self._gripper, "sensor", "")
+        self._sensor = opening_sensor(device.arm)
         self._reading, self._read = 0.0, -1e9  # [m], [s] monotonic
         self._grip: ActiveGrip | None = None
         self._stalled = False

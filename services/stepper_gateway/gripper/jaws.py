@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.model.gripper import opening_of, pulse_of
 from gemelo.schemas.device import DeviceCommandKind
-from gemelo.schemas.robot import OutputGripper, ServoGripper
+from gemelo.schemas.grippers.gripper import PulseDrive, SwitchDrive
 from gemelo.services.stepper_gateway.device.pending_commands import Arguments
 from gemelo.services.stepper_gateway.goals.rejections import invalid
 from gemelo.services.stepper_gateway.links.frames import StateFrame
@@ -18,7 +18,7 @@ Sending = tuple[DeviceCommandKind, Arguments]
 
 
 class Jaws(ABC):
-    """What a kind of gripper can do, and what the device's states say of it."""
+    """What a way of driving a gripper can do, and what the device's states say of it."""
 
     commanded: float | None = None  # [m] of the device's output now; None: nothing was commanded since its start
     target: float | None = None  # [m] that the device goes to
@@ -56,11 +56,11 @@ class Jaws(ABC):
 class ServoJaws(Jaws):
     """The pulse goes to its target at the configured speed."""
 
-    def __init__(self, gripper: ServoGripper) -> None:
-        self._gripper = gripper
+    def __init__(self, drive: PulseDrive) -> None:
+        self._drive = drive
 
     def require(self, position: float) -> None:
-        _require_within(position, self._gripper.closed, self._gripper.open)
+        _require_within(position, self._drive.closed, self._drive.open)
 
     def sending(self, position: float) -> Sending:
         return DeviceCommandKind.SERVO, Arguments(argument=self._pulse(position))
@@ -69,41 +69,41 @@ class ServoJaws(Jaws):
         return DeviceCommandKind.SERVO, Arguments(index=1)
 
     def travel_time(self, position: float) -> float:
-        gripper = self._gripper
-        way = gripper.open - gripper.closed if self.commanded is None else abs(position - self.commanded)
-        return way / gripper.speed
+        drive = self._drive
+        way = drive.open - drive.closed if self.commanded is None else abs(position - self.commanded)
+        return way / drive.speed
 
     def on_state(self, state: StateFrame, now: float) -> None:
-        self.commanded = opening_of(self._gripper, state.servo_us) if state.servo_us else None
-        self.target = opening_of(self._gripper, state.servo_target_us) if state.servo_target_us else None
+        self.commanded = opening_of(self._drive, state.servo_us) if state.servo_us else None
+        self.target = opening_of(self._drive, state.servo_target_us) if state.servo_target_us else None
 
     def is_overruled(self, position: float) -> bool:
-        return self.target is None or abs(pulse_of(self._gripper, self.target) - self._pulse(position)) > 0.5
+        return self.target is None or abs(pulse_of(self._drive, self.target) - self._pulse(position)) > 0.5
 
     def _pulse(self, position: float) -> int:
-        return round(pulse_of(self._gripper, position))
+        return round(pulse_of(self._drive, position))
 
 
 class OutputJaws(Jaws):
     """Open or closed; how far it is on its way is known by its travel time alone."""
 
-    def __init__(self, gripper: OutputGripper, arm: ArmDescription) -> None:
-        self._gripper = gripper
-        self._index = [output.name for output in arm.outputs].index(gripper.output)
+    def __init__(self, drive: SwitchDrive, arm: ArmDescription) -> None:
+        self._drive = drive
+        self._index = [output.name for output in arm.outputs].index(drive.output)
         self._from = 0.0  # [m]
         self._switched = -1e9  # [s] monotonic
 
     def require(self, position: float) -> None:
-        gripper = self._gripper
-        _require_within(position, gripper.closed, gripper.open)
-        if not self._is_closed(position) and abs(position - gripper.open) > SLACK:
+        drive = self._drive
+        _require_within(position, drive.closed, drive.open)
+        if not self._is_closed(position) and abs(position - drive.open) > SLACK:
             raise invalid(
-                f"gripper: {position * 1000:g} mm: output {gripper.output!r} knows only closed, "
-                f"{gripper.closed * 1000:g} mm, and open, {gripper.open * 1000:g} mm: choose one of them"
+                f"gripper: {position * 1000:g} mm: output {drive.output!r} knows only closed, "
+                f"{drive.closed * 1000:g} mm, and open, {drive.open * 1000:g} mm: choose one of them"
             )
 
     def sending(self, position: float) -> Sending:
-        is_on = self._is_closed(position) == self._gripper.closes
+        is_on = self._is_closed(position) == self._drive.closes
         return DeviceCommandKind.OUTPUT, Arguments(index=self._index, argument=int(is_on))
 
     def stopping(self) -> Sending | None:
@@ -111,17 +111,17 @@ class OutputJaws(Jaws):
 
     def travel_time(self, position: float) -> float:
         share = 1.0 if self.commanded is None else abs(position - self.commanded) / self._travel
-        return self._gripper.travel_time * share
+        return self._drive.travel_time * share
 
     def on_state(self, state: StateFrame, now: float) -> None:
-        is_closed = bool(state.outputs >> self._index & 1) == self._gripper.closes
-        target = self._gripper.closed if is_closed else self._gripper.open
+        is_closed = bool(state.outputs >> self._index & 1) == self._drive.closes
+        target = self._drive.closed if is_closed else self._drive.open
         if self.target is None or self.commanded is None:
             self._from = target
         elif target != self.target:
             self._from, self._switched = self.commanded, now
         self.target = target
-        most = (now - self._switched) / self._gripper.travel_time * self._travel
+        most = (now - self._switched) / self._drive.travel_time * self._travel
         way = target - self._from
         self.commanded = target if abs(way) <= most else self._from + (most if way > 0.0 else -most)
 
@@ -130,21 +130,18 @@ class OutputJaws(Jaws):
 
     @property
     def _travel(self) -> float:
-        return self._gripper.open - self._gripper.closed
+        return self._drive.open - self._drive.closed
 
     def _is_closed(self, position: float) -> bool:
-        return abs(position - self._gripper.closed) <= SLACK
+        return abs(position - self._drive.closed) <= SLACK
 
 
 def jaws_of(arm: ArmDescription) -> Jaws | None:
     """The jaws of robot.toml's gripper; None without one."""
-    match arm.gripper:
-        case ServoGripper() as gripper:
-            return ServoJaws(gripper)
-        case OutputGripper() as gripper:
-            return OutputJaws(gripper, arm)
-        case _:
-            return None
+    if arm.gripper is None:
+        return None
+    drive = arm.gripper.drive
+    return ServoJaws(drive) if isinstance(drive, PulseDrive) else OutputJaws(drive, arm)
 
 
 def _require_within(position: float, closed: float, opened: float) -> None:
