@@ -1,4 +1,4 @@
-"""What every [gripper] of robot.toml has, and the two ways in which the controller board drives one."""
+"""The keys that every [gripper] of robot.toml has, and the two ways in which the controller board drives one."""
 
 from __future__ import annotations
 
