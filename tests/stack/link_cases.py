@@ -1,4 +1,4 @@
-"""The table of links that fail in the middle of a move, and what ARCHITECTURE.md allows to come of each."""
+"""The table of links that fail in the middle of a move, and what docs/inside/failures.md allows to come of each."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ CASES = (
 
 
 def expected(case: Case) -> tuple[tuple[str, str], ...]:
-    """What ARCHITECTURE.md's table allows: what the arm does, with what the client hears.
+    """What docs/inside/failures.md's table allows: what the arm does, with what the client hears.
 
     The board holds after 0.5 s without a heartbeat, so a short cut or a slow way there may hold the arm or not; a
     client is missed after the lease of 1 s. Over 300 ms each way a session that was lost does not open again: its
@@ -72,7 +72,7 @@ def expected(case: Case) -> tuple[tuple[str, str], ...]:
 
 
 def told_within(case: Case, status: str, rested: float) -> float:
-    """[s] since the beginning of the fault within which ARCHITECTURE.md's table has the client hear `status`.
+    """[s] since the beginning of the fault within which docs/inside/failures.md's table has the client hear `status`.
 
     The arm came to rest at `rested` [s]. A link that is only slow may break at any moment until then.
     """

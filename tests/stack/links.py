@@ -71,7 +71,7 @@ class Row:
     heard: str  # by the client: the goal's status, ServerLost or NoAnswer
     why: str
     told_after: float  # [s] from the beginning of the fault, by the client's clock
-    told_within: float  # [s] of the same beginning: what ARCHITECTURE.md allows
+    told_within: float  # [s] of the same beginning: what docs/inside/failures.md allows
     arm: str  # FINISHED or HELD
     ready_after: float  # [s] from the heal until every process of every host is ready; inf: never
     again: str  # how the next move ended

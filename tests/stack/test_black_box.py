@@ -18,7 +18,7 @@ from gemelo.tools.cli.common.errors import ExitCode
 from tests.runtime.support import until
 from tests.stack.gemelo import gemelo
 
-SECTION = re.compile(r"^## What happened\?\n.*?```bash\n(.*?)```", re.DOTALL | re.MULTILINE)
+SECTION = re.compile(r"^# What happened\?\n.*?```bash\n(.*?)```", re.DOTALL | re.MULTILINE)
 MAGIC = b"\x89MCAP0\r\n"  # with which a file of MCAP begins and ends
 FILE = "out/recordings/….mcap"
 SAVED = 25.0  # [s] 3 s of what follows, 10 s between two files, the census's 5 s, and a slow machine
@@ -100,7 +100,7 @@ def test_a_killed_planner_and_an_emergency_stop_are_told_afterwards(stack, opera
     gemelo(stack, "reset")
 
 
-def test_the_six_lines_of_the_readme_say_what_happened(stack, operator, tmp_path):
+def test_the_six_lines_of_the_page_say_what_happened(stack, operator, tmp_path):
     """Ledger, black boxes and replay, as they are printed there, on a stack whose arm has just been stopped.
 
     In a recording of its own: strays of other tests are in the one before.
@@ -111,7 +111,7 @@ def test_the_six_lines_of_the_readme_say_what_happened(stack, operator, tmp_path
     stop_in_a_move(stack, operator)
     gemelo(stack, "device", "press", "release")
     gemelo(stack, "reset")
-    found = SECTION.search((stack.root / "README.md").read_text(encoding="utf-8"))
+    found = SECTION.search((stack.root / "docs/what_happened.md").read_text(encoding="utf-8"))
     assert found is not None
     lines = [shlex.split(line, comments=True) for line in found[1].splitlines()]
     assert [words[:3] if words[1] == "blackbox" else words[:2] for words in lines] == [

@@ -200,7 +200,7 @@ def words_of(error: StackError) -> list[str]:
 
 
 def meddled(fault: Fault, ended: str, reason: str) -> list[str]:
-    """That a process which takes no part in a move, as ARCHITECTURE.md's table has it, had to do with its end."""
+    """That a process which takes no part in a move, as docs/inside/failures.md has it, had to do with its end."""
     if fault.of not in BYSTANDERS or ended == "succeeded" or is_starved(reason):
         return []
     return [f"{fault.of} takes no part in a move, and yet it ended {ended}: {reason or 'no reason was given'}"]

@@ -65,7 +65,7 @@ from gemelo.tools.chaos.replays import (
     replayed_later,
 )
 
-READY = 20.0  # [s] after the heal in which every process is ready again: ARCHITECTURE.md's table, on a busy machine
+READY = 20.0  # [s] after the heal in which every process is ready again: docs/inside/failures.md, on a busy machine
 
 
 @dataclass(frozen=True)

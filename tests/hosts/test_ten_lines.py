@@ -1,4 +1,4 @@
-"""The ten lines of "Several machines" in README.md are commands that there are, for files and places that there are."""
+"""The ten lines of docs/several_hosts.md, and of its Spanish page, are commands and files that there are."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from gemelo.tools.cli.main import parse
 from gemelo.tools.hosts.layout import extras
 from tests.hosts.sites import site
 
-SECTION = re.compile(r"^## Several machines\n.*?```\n(.*?)```", re.DOTALL | re.MULTILINE)
+SECTION = re.compile(r"^## (?:In ten lines|En diez líneas)\n.*?```\n(.*?)```", re.DOTALL | re.MULTILINE)
+PAGES = ("docs/several_hosts.md", "docs/es/varios_equipos.md")
 
 
-def lines() -> list[list[str]]:
+def lines(page: str = PAGES[0]) -> list[list[str]]:
     """The words of each line, without its comment."""
-    found = SECTION.search((project_root() / "README.md").read_text(encoding="utf-8"))
+    found = SECTION.search((project_root() / page).read_text(encoding="utf-8"))
     assert found is not None
     return [shlex.split(line, comments=True) for line in found[1].splitlines()]
 
@@ -25,6 +26,11 @@ def test_they_are_ten_from_a_sites_file_to_a_move():
     assert len(words) == 10
     assert (project_root() / words[0][1]).is_file()
     assert words[-1][:2] == ["gemelo", "move"]
+
+
+def test_they_are_the_same_in_spanish():
+    english, spanish = map(lines, PAGES)
+    assert english == spanish
 
 
 def test_each_command_of_gemelo_is_one_that_it_takes_for_the_hosts_of_the_example(tmp_path):
