@@ -1,6 +1,6 @@
 # What a person does with gemelo. Everything here needs only `deploy/bootstrap`, which `make setup` runs.
 .DEFAULT_GOAL := help
-.PHONY: help setup up down test test-all check coverage format docs demo bench recordings lock clean
+.PHONY: help setup up down test test-all check coverage format docs picture demo bench recordings lock clean
 MAKEFLAGS += --no-print-directory
 unexport PYTHONDONTWRITEBYTECODE # where it is set, every process compiles its libraries anew: 3 s of CPU for the page alone
 bin := .venv/bin
@@ -73,8 +73,11 @@ format: setup ## let ruff, clang-format and gofmt write
 	@git ls-files '*.h' '*.hpp' '*.cpp' | xargs -r $(bin)/clang-format -i
 	@! command -v gofmt >/dev/null || gofmt -w services
 
-docs: setup ## docs/api.md from the docstrings of gemelo
-	@$(bin)/python docs/make_api.py
+docs: setup ## these pages as a site with a search, in English and Spanish: out/site/index.html
+	@deploy/docs
+
+picture: setup ## docs/move.gif anew: one move on the page, as Chromium draws it
+	@$(bin)/python docs/make_picture.py
 
 demo: setup ## a sine and a tour, without a display: out/demo.json, recording, picture
 	@$(bin)/python -m gemelo.tools.demo
@@ -88,7 +91,7 @@ bench: setup ## the figures: out/bench.json
 recordings: setup ## the recordings that `make test` replays, made anew: tests/replay/recordings
 	@$(bin)/python -m gemelo.tools.replay.make_recordings
 
-lock: setup ## resolve pyproject.toml anew into requirements.lock
+lock: setup ## resolve pyproject.toml anew into requirements.lock and deploy/tools/docs.lock
 	@deploy/lock
 
 clean: ## remove everything that setup and runs made

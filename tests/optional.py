@@ -53,6 +53,13 @@ def need(name: str) -> None:
         _go_without(lack(name))
 
 
+def need_site() -> None:
+    """Skips all that a fixture is for where the packages of the site have not been installed; .ci/run does, so there it
+    fails."""
+    if not (OPTIONAL.parents[1] / ".gemelo/docs/bin/mkdocs").exists():
+        _go_without("the packages of the site are missing: make docs")
+
+
 def need_root(file: str, with_taps: bool = False) -> None:
     """Skips all that a fixture is for where network namespaces (and TAP devices) cannot be made.
 

@@ -10,13 +10,20 @@ import pytest
 from gemelo.libraries.runtime.deployment import project_root
 
 ROOT = project_root()
-LOCKS = [ROOT / "requirements.lock", ROOT / "deploy/tools/uv.lock", ROOT / "deploy/tools/go.lock"]
+LOCKS = [
+    ROOT / "requirements.lock",
+    ROOT / "deploy/tools/docs.lock",
+    ROOT / "deploy/tools/uv.lock",
+    ROOT / "deploy/tools/go.lock",
+]
 
 
-def requirements():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    extras = [name for names in project["optional-dependencies"].values() for name in names]
-    return project["dependencies"] + extras
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+EXTRAS = [name for names in PYPROJECT["project"]["optional-dependencies"].values() for name in names]
+REQUIREMENTS = {
+    "requirements.lock": PYPROJECT["project"]["dependencies"] + EXTRAS,
+    "deploy/tools/docs.lock": PYPROJECT["dependency-groups"]["docs"],
+}
 
 
 @pytest.mark.parametrize("lock", LOCKS, ids=lambda lock: lock.name)
@@ -34,9 +41,10 @@ def test_every_package_of_a_lock_is_pinned_by_hash(lock):
         assert "--hash=sha256:" in entry, entry
 
 
-def test_every_requirement_is_pinned_and_locked_at_that_version():
-    locked = (ROOT / "requirements.lock").read_text()
-    for requirement in requirements():
+@pytest.mark.parametrize("lock", REQUIREMENTS)
+def test_every_requirement_is_pinned_and_locked_at_that_version(lock):
+    locked = (ROOT / lock).read_text()
+    for requirement in REQUIREMENTS[lock]:
         pin = requirement.split(";")[0].strip()  # what follows is where it is installed
         assert "==" in pin, f"{requirement} is not pinned"
         assert f"\n{pin} " in f"\n{locked}", f"{requirement} is not in the lock: make lock"
