@@ -82,6 +82,7 @@ class DeviceState(Message, frozen=True, kw_only=True):
     bad_frames: int = 0
     round_trip: float = 0.0  # [s] latest clock synchronisation
     round_trip_age: float = 0.0  # [s] since that was measured: since the device has answered a question
+    is_round_trip_of_wire: bool = True  # False: nothing has come back over the board's own wire yet, or ever does
 
 
 class DeviceEvent(Message, frozen=True, kw_only=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gemelo.schemas.device import DeviceStatus
+from gemelo.schemas.device import DeviceState, DeviceStatus
 
 OLD = 2.0  # [s] of a round trip, beyond which it says nothing of the link as it is; it is measured twice a second
 UNKNOWN = "no reason is known"
@@ -17,6 +17,13 @@ def round_trip_text(round_trip: float, age: float) -> str:
     """`round trip 2.3 ms`, and `measured 40 s ago` where it is old: `round_trip` [s], measured `age` [s] ago."""
     trip = f"round trip {1e3 * round_trip:.1f} ms"
     return f"{trip}, measured {age:.0f} s ago" if is_old(age) else trip
+
+
+def state_round_trip_text(state: DeviceState, more_age: float = 0.0) -> str:
+    """The round trip of a state that came `more_age` [s] ago."""
+    if not state.is_round_trip_of_wire:
+        return "round trip not measured"
+    return round_trip_text(state.round_trip, state.round_trip_age + more_age)
 
 
 def deaf_for(status: DeviceStatus, now: int) -> float:

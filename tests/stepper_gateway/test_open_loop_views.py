@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.device_link import state_round_trip_text
 from gemelo.schemas.motion import FollowJointTrajectoryResult
 from gemelo.services.panel.words.words import Words
 from gemelo.services.visualizer.content.panel import PanelInputs, panel
@@ -14,6 +15,7 @@ from gemelo.tools.cli.device import device_status
 from gemelo.tools.cli.motion.move_report import MoveReport, summary
 from gemelo.tools.cli.watch.state import snapshot, text_of
 from gemelo.tools.virtual_arm.sketch_arm import SketchArm
+from gemelo.tools.virtual_arm.text_arm import TextArm
 from tests.stepper_gateway.harness import move
 from tests.stepper_gateway.test_ra_sketch import HOME
 
@@ -47,6 +49,20 @@ def test_gemelo_device_status_says_it_beside_the_device(moved: SketchArm) -> Non
     who = device_status.who_it_is(newest(moved, "device/status"), 0)
     assert "SENT, NOT VERIFIED" in who
     assert "sketch" in who
+
+
+def test_no_view_shows_a_round_trip_that_the_boards_wire_has_not_made(moved: SketchArm) -> None:
+    """0.4 ms were shown: what the gateway's own stand-in takes."""
+    line, state = TextArm(), newest(moved, "device/state")
+    line.run(1.0)
+    for seen in (state, newest(line, "device/state")):
+        assert state_round_trip_text(seen) == "round trip not measured"
+    text = text_of(
+        snapshot(moved.arm, newest(moved, "joint_states"), None, state, newest(moved, "device/status"), None)
+    )
+    assert "round trip" not in text
+    line.referenced().run(1.0)
+    assert state_round_trip_text(newest(line, "device/state")) in ("round trip 9.0 ms", "round trip 10.0 ms")
 
 
 def test_the_viewers_panel_says_it(moved: SketchArm) -> None:

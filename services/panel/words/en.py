@@ -90,6 +90,7 @@ ENGLISH: dict[str, str] = {
     "inputs": "Switches",
     "link": "Link, there and back",
     "measured_ago": "{trip}, measured {age} s ago",
+    "not_measured": "not measured",
     "arm": "Switch the drivers on",
     "disarm": "Switch the drivers off",
     "home": "Home",

@@ -90,6 +90,7 @@ SPANISH: dict[str, str] = {
     "inputs": "Interruptores",
     "link": "Enlace, ida y vuelta",
     "measured_ago": "{trip}, medido hace {age} s",
+    "not_measured": "sin medir",
     "arm": "Encender los motores",
     "disarm": "Apagar los motores",
     "home": "Buscar el origen",

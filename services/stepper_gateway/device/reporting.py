@@ -6,6 +6,7 @@ from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState, ShaftPositions
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.message import Vector
+from gemelo.schemas.robot import Dialect
 from gemelo.services.stepper_gateway.device.clock import ClockSync
 from gemelo.services.stepper_gateway.device.readiness import input_names, joint_name
 from gemelo.services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, StateFlag, StateFrame, code_name
@@ -102,7 +103,14 @@ class Reporter:
             bad_frames=state.bad_frames,
             round_trip=clock.round_trip,
             round_trip_age=age,
+            is_round_trip_of_wire=self._answers_over_its_wire(state),
         )
+
+    def _answers_over_its_wire(self, state: StateFrame) -> bool:
+        """True if the board itself answers the questions for its clock: one that reads lines, with lines."""
+        dialect = self._arm.device.dialect
+        is_referenced = bool(state.referenced) and state.mode != DeviceMode.UNREFERENCED
+        return dialect is Dialect.GEMELO or (dialect is Dialect.TEXT and is_referenced)
 
     def shaft(self, report: ShaftReport, stamp: int) -> ShaftPositions:
         """A virtual device's true shafts; raises `BadFrame` for one of another arm."""

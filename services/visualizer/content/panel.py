@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from gemelo.schemas.control import ControlState
 from gemelo.schemas.device import DeviceMode, DeviceState, DeviceStatus, SensorReadings, ShaftPositions
 from gemelo.schemas.device_faults import explain
-from gemelo.schemas.device_link import offline_word, reason_text, round_trip_text
+from gemelo.schemas.device_link import offline_word, reason_text, state_round_trip_text
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.ledger import StepLedger, StoppingDistance
 
@@ -195,6 +195,6 @@ def _numbers(inputs: PanelInputs) -> str:
     boot = f"firmware {inputs.status.firmware} · " if inputs.status is not None and inputs.status.firmware else ""
     return (
         f"path {state.time_scale:.0%} of its speed · {state.buffered * 1e3:.0f} ms queued · "
-        f"{round_trip_text(state.round_trip, state.round_trip_age)}\n\n"
+        f"{state_round_trip_text(state)}\n\n"
         f"{boot}under-runs {state.underruns} · refused {state.refused} · bad frames {state.bad_frames}"
     )

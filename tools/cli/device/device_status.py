@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from gemelo.schemas.device import DeviceMode, DeviceState, DeviceStatus
-from gemelo.schemas.device_link import offline_word, reason_text, round_trip_text
+from gemelo.schemas.device_link import offline_word, reason_text, state_round_trip_text
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
@@ -130,7 +130,7 @@ def _named(heading: str, parts: dict[str, bool], yes: str, no: str) -> list[str]
 
 
 def _link(state: DeviceState, age: float) -> str:
-    trip = round_trip_text(state.round_trip, state.round_trip_age + age)
+    trip = state_round_trip_text(state, age)
     return (
         f"{trip}, {state.buffered:.2f} s of path queued; since boot "
         f"{state.underruns} under-runs, {state.refused} refused, {state.bad_frames} bad frames"

@@ -25,7 +25,7 @@ from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.deployment import Deployment, MqttSection, RouterSection, Wire
 from gemelo.schemas.device import DeviceState, DeviceStatus
 from gemelo.schemas.device_faults import fault_text
-from gemelo.schemas.device_link import offline_text, round_trip_text
+from gemelo.schemas.device_link import offline_text, state_round_trip_text
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.system import NodeInfo
 from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS
@@ -319,7 +319,7 @@ def device(status: DeviceStatus | None, state: DeviceState | None, up: str, now:
         return Diagnosis(
             Verdict.WARNING, "device", fault_text(state.fault), "`gemelo reset`, when a person has seen why"
         )
-    trip = "" if state is None else f", {round_trip_text(state.round_trip, state.round_trip_age)}"
+    trip = "" if state is None else f", {state_round_trip_text(state)}"
     return Diagnosis(Verdict.OK, "device", f"{status.device} is online{trip}")
 
 

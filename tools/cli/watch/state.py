@@ -141,7 +141,7 @@ def snapshot(
         reason=_reason(status, now),
         time_scale=device.time_scale if device else None,
         buffered=device.buffered if device else None,
-        round_trip=device.round_trip if device else None,
+        round_trip=device.round_trip if device and device.is_round_trip_of_wire else None,
         round_trip_age=device.round_trip_age + age if device else None,
         speaks=bool(status and status.speaks),
         warning=status.warning if status else "",

@@ -53,6 +53,7 @@ class DeviceTab:
             rows.append((esc(words("inputs")), esc(", ".join(state.inputs) or "-")))
             trip, age = f"{1000 * self._round_trip.of(state.round_trip):.0f} ms", state.round_trip_age + readings.age
             trip = words("measured_ago", trip=trip, age=f"{age:.0f}") if is_old(age) else trip
+            trip = trip if state.is_round_trip_of_wire else words("not_measured")
             rows.append((esc(words("link")), esc(trip)))
             for name, handle in self.outputs.items():
                 handle.show(name in state.outputs)

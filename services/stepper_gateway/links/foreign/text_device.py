@@ -19,8 +19,8 @@ from gemelo.services.stepper_gateway.links.link import Kind
 NAME = "a board that speaks <SEQ,J1,...>"
 # Chosen: all RETRIES have failed, and the gateway has not yet concluded from its questions that the board is deaf.
 SILENCE = 1.2  # [s] without an answer to any line, after which the board is not there
-STILL_SILENT = 0.4  # [s] the same, of a board that has not answered since it was missed
-PROBE = 1.0  # [s] between two repetitions of the newest line to a board that is not there
+STILL_SILENT = 0.4  # [s] the same, of a board that has not answered since it was missed; chosen: five lost lines
+PROBE = 1.0  # [s] between two repetitions of the newest line to a board that is not there; chosen: it is back at once
 TELLING = 10.0  # [s] between two summaries of the line; chosen: the log stays readable
 MOST_QUESTIONS = 8  # that wait for a line; chosen: more than the gateway asks between two
 MUTE = "no line was answered for {silence:g} s: is the wire plugged in, is it this port, has the board {baud} baud?"
