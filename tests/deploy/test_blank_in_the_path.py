@@ -40,7 +40,10 @@ def folder(tmp_path: Path) -> Path:
 def copied(folder: Path, *names: str) -> None:
     """These folders and files of the project, without what was built in them."""
     for name in names:
-        if (ROOT / name).is_dir():
+        if (ROOT / name).is_symlink():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).symlink_to((ROOT / name).readlink())
+        elif (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("build", "*.so", "__pycache__"))
         else:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)

@@ -31,7 +31,8 @@ def tracked() -> tuple[PurePosixPath, ...]:
         text=True,
         check=True,
     )
-    return tuple(PurePosixPath(line) for line in listed.stdout.splitlines() if (ROOT / line).is_file())
+    paths = [PurePosixPath(line) for line in listed.stdout.splitlines()]
+    return tuple(path for path in paths if (ROOT / path).is_file() or (ROOT / path).is_symlink())
 
 
 @cache
