@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from gemelo.api.arguments import Target
 from gemelo.api.homing_report import HomingReport
@@ -23,6 +24,16 @@ class Error(Exception):
     """
 
 
+class ArgumentRange(NamedTuple):
+    """An argument whose `value` is out of its range; all in `unit`, "" for a number without one."""
+
+    argument: str
+    value: float
+    least: float  # 0: what is above it
+    most: float
+    unit: str
+
+
 class BadArgument(Error, ValueError):
     """An argument that cannot be meant: unknown, contradictory, not finite, or in another unit. Nothing was asked.
 
@@ -33,8 +44,9 @@ class BadArgument(Error, ValueError):
     joint "brazo_joint": 30 rad is beyond its limits, ... rad: if it is in degrees, write gemelo.deg(30)
     """
 
-    def __init__(self, reason: str, remedy: str = "") -> None:
+    def __init__(self, reason: str, remedy: str = "", out_of: ArgumentRange | None = None) -> None:
         super().__init__(f"{reason}: {remedy}" if remedy else reason)
+        self.out_of = out_of  # the range, where the argument is out of one
         self.reason = reason  # without the remedy
         self.remedy = remedy  # what to write instead; empty where the reason says it
 

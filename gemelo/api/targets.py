@@ -12,7 +12,7 @@ from gemelo.api.arguments import Joints as Joints
 from gemelo.api.arguments import Target as Target
 from gemelo.api.arguments import ToolGoal
 from gemelo.api.arguments import Waypoint as Waypoint
-from gemelo.api.errors import BadArgument
+from gemelo.api.errors import ArgumentRange, BadArgument
 from gemelo.api.units import Pose
 from gemelo.libraries.arm.errors import suggestion
 from gemelo.libraries.arm.frames.transforms import from_rpy
@@ -50,6 +50,11 @@ def as_target(goal: ToolGoal) -> Target:
     return cast(Target, dict(goal))
 
 
+def not_connected(_target: str, _source: str) -> Pose:
+    """The `LookUp` where no arm is connected; raises `BadArgument`."""
+    raise BadArgument("offset= begins where the tool is now, which only a connected arm knows: give position=")
+
+
 def request_of(arm: ArmDescription, target: Target, look_up: LookUp) -> PlanRequest:
     """The planner's request; raises `BadArgument` for what cannot be meant."""
     _require_known(target, Target)
@@ -60,18 +65,21 @@ def request_of(arm: ArmDescription, target: Target, look_up: LookUp) -> PlanRequ
         start=None if start is None else joint_state(arm, start, "from_joints"),
         velocity_scaling=speed,
         acceleration_scaling=_share("acceleration", target.get("acceleration", speed)),
-        allowed_time=_positive("allowed_time", target.get("allowed_time", _usual_time(target)), "s", LONGEST_PLAN),
+        allowed_time=_positive("allowed_time", target.get("allowed_time", _usual_time_of(target)), "s", LONGEST_PLAN),
         clearance=_clearance(target),
         motion=_motion_of(target),
         timing=Timing.TIME_OPTIMAL if target.get("time_optimal") else Timing.JERK_LIMITED,
     )
 
 
-def _usual_time(target: Target) -> float:
-    """[s] that a plan is allowed where nothing is said: more for each point on the way, as far as a planner grants."""
-    via = target.get("via", ())
-    points = len(via) if isinstance(via, Sequence) else 0
+def usual_time(points: int) -> float:
+    """[s] that a plan by so many points on the way is allowed where nothing is said, as far as a planner grants it."""
     return min(ALLOWED + ALLOWED_OF_A_POINT * points, MOST_ALLOWED)
+
+
+def _usual_time_of(target: Target) -> float:
+    via = target.get("via", ())
+    return usual_time(len(via) if isinstance(via, Sequence) else 0)
 
 
 def ik_request(
@@ -96,7 +104,7 @@ def goal_of(arm: ArmDescription, target: Target, look_up: LookUp) -> PoseGoal | 
         said = f"not both {' and '.join(given)}" if given else "none is given"
         raise BadArgument(f"say where to by one of named=, joints=, position=, pose= and offset=: {said}")
     if given[0] in ("named", "joints"):
-        _refuse_with(target, given[0], (*ToolGoal.__annotations__, "through", "center"))
+        _refuse_with(target, f"{given[0]}=", (*ToolGoal.__annotations__, "through", "center"))
     if "named" in target:
         return named_goal(arm, target["named"])
     if "joints" in target:
@@ -187,7 +195,7 @@ def turned(owner: str, values: Iterable[float]) -> tuple[float, float, float, fl
 def _pose_goal(arm: ArmDescription, target: Target, look_up: LookUp) -> PoseGoal:
     turns = [name for name in ("orientation", "rpy", "pose", "along") if name in target]
     if len(turns) > 1:
-        raise BadArgument(f"say how the tool is turned once, not by {' and '.join(turns)}")
+        raise BadArgument(f"say how the tool is turned once, not by {'= and '.join(turns)}=")
     if "axis" in target and "along" not in target:
         raise BadArgument("axis= is an axis of the tool: say with along= in which direction it is to point")
     if "offset" in target:
@@ -277,7 +285,8 @@ def _motion_of(target: Target) -> Motion:
     if kind == "free":
         attempts = target.get("attempts", 1)
         if not 1 <= attempts <= MOST_ATTEMPTS:
-            raise BadArgument(f"attempts={attempts} is not from 1 to {MOST_ATTEMPTS}")
+            out_of = ArgumentRange("attempts", attempts, 1, MOST_ATTEMPTS, "")
+            raise BadArgument(f"attempts={attempts} is not from 1 to {MOST_ATTEMPTS}", out_of=out_of)
         return FreeMotion(planner_id=target.get("planner", ""), seed=target.get("seed", 0), attempts=attempts)
     if kind == "ptp":
         return PointToPoint()
@@ -328,7 +337,8 @@ def _share(name: str, value: float) -> float:
     found = number(name, value)
     if not 0.0 < found <= 1.0:
         hint = f": {found:g} per cent is {found / 100.0:g}" if 1.0 < found <= 100.0 else ""
-        raise BadArgument(f"{name}={found:g} is not in (0, 1], a share of the joints' limits{hint}")
+        out_of = ArgumentRange(name, found, 0.0, 1.0, "share")
+        raise BadArgument(f"{name}={found:g} is not in (0, 1], a share of the joints' limits{hint}", out_of=out_of)
     return found
 
 
@@ -339,17 +349,21 @@ def _clearance(target: Target) -> float | None:
     found = number("clearance", target["clearance"])
     if not LEAST_CLEARANCE <= found <= MOST_CLEARANCE:
         hint = f": if it is in millimetres, write gemelo.mm({found:g})" if found > MOST_CLEARANCE else ""
-        raise BadArgument(f"clearance={found:g} m is not from {LEAST_CLEARANCE:g} to {MOST_CLEARANCE:g} m{hint}")
+        raise BadArgument(
+            f"clearance={found:g} m is not from {LEAST_CLEARANCE:g} to {MOST_CLEARANCE:g} m{hint}",
+            out_of=ArgumentRange("clearance", found, LEAST_CLEARANCE, MOST_CLEARANCE, "m"),
+        )
     return found
 
 
 def _positive(name: str, value: float, unit: str, most: float) -> float:
     found = number(name, value)
+    out_of = ArgumentRange(name, found, 0.0, most, unit)
     if not found > 0.0:
-        raise BadArgument(f"{name}={found:g} is not above 0")
+        raise BadArgument(f"{name}={found:g} is not above 0", out_of=out_of)
     if found > most:
         hint = f": if it is in millimetres, write gemelo.mm({found:g})" if unit.startswith("m") else ""
-        raise BadArgument(f"{name}={found:g} {unit} is more than {most:g}{hint}")
+        raise BadArgument(f"{name}={found:g} {unit} is more than {most:g}{hint}", out_of=out_of)
     return found
 
 

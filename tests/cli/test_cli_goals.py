@@ -10,33 +10,36 @@ from hypothesis import strategies as st
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.device import ReferenceCommand
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
-from gemelo.schemas.planning import JointGoal, NamedGoal, PoseGoal, Refusal
+from gemelo.schemas.planning import Goal, JointGoal, NamedGoal, PoseGoal, Refusal
 from gemelo.tools.cli.bus.request_text import as_typed, refusal_text
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.common.units import parse_joints
 from gemelo.tools.cli.device.device import reference_request
 from gemelo.tools.cli.main import parse
 from gemelo.tools.cli.motion.move_report import MoveReport, summary, tool_error
-from gemelo.tools.cli.motion.move_request import goal_of, request_of
+from gemelo.tools.cli.motion.move_request import request_from
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 
 
+def goal_of(line: str) -> Goal:
+    return request_from(parse(line.split()), ARM).goal
+
+
 def test_the_command_line_becomes_a_pose_goal():
-    options = parse(["move", "--to", "0.25", "-0.15", "-1e-3"])
-    assert goal_of(ARM, options.to, (), None) == PoseGoal(position=(0.25, -0.15, -0.001))
+    assert goal_of("move --to 0.25 -0.15 -1e-3") == PoseGoal(position=(0.25, -0.15, -0.001))
 
 
 def test_the_command_line_becomes_a_joint_goal():
-    options = parse(["move", "--joints", "brazo_joint=30deg", "q3=-40mm"])
-    goal = goal_of(ARM, options.to, options.joints, options.named)
-    assert goal == JointGoal(name=("brazo_joint", "efector_joint"), position=(pytest.approx(math.pi / 6), -0.04))
+    assert goal_of("move --joints brazo_joint=30deg q3=-40mm") == JointGoal(
+        name=("brazo_joint", "efector_joint"), position=(pytest.approx(math.pi / 6), -0.04)
+    )
 
 
 def test_the_command_line_becomes_a_named_goal():
-    assert goal_of(ARM, None, (), "ready") == NamedGoal(name="ready")
+    assert goal_of("move --named ready") == NamedGoal(name="ready")
     with pytest.raises(CommandError, match='did you mean "ready"'):
-        goal_of(ARM, None, (), "redy")
+        goal_of("move --named redy")
 
 
 @pytest.mark.parametrize(
@@ -57,10 +60,13 @@ def test_what_cannot_be_understood_ends_with_two(words):
     assert ended.value.code == ExitCode.USAGE
 
 
-@pytest.mark.parametrize("speed", [0.0, -0.1, 1.01])
-def test_a_speed_outside_its_range_is_refused(speed):
-    with pytest.raises(CommandError, match="not above 0% and at most 100%"):
-        request_of(NamedGoal(name="ready"), speed)
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [("0%", "0% is not above 0"), ("-10%", "-10% is not above 0"), ("101%", "101% is more than 100%")],
+)
+def test_a_speed_outside_its_range_is_refused(share, said):
+    with pytest.raises(CommandError, match=f"--speed {said}"):
+        goal_of(f"move --named ready --speed {share}")
 
 
 def test_a_refusal_says_why_and_what_would_do():

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.api.arguments import Target
+from gemelo.api.targets import not_connected, request_of, usual_time
 from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.planning import (
@@ -22,7 +24,7 @@ from gemelo.tools.cli.common.errors import CommandError
 from gemelo.tools.cli.main import parse
 from gemelo.tools.cli.motion.move import EXAMPLES
 from gemelo.tools.cli.motion.move_report import MoveReport, summary
-from gemelo.tools.cli.motion.move_request import request_from
+from gemelo.tools.cli.motion.move_request import ARGUMENTS, OF_MOVE, request_from
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 
@@ -32,7 +34,7 @@ def request(words: str) -> PlanRequest:
 
 
 def test_without_a_way_any_will_do():
-    assert request("--named ready") == PlanRequest(goal=NamedGoal(name="ready"))
+    assert request("--named ready") == PlanRequest(goal=NamedGoal(name="ready"), allowed_time=usual_time(0))
 
 
 def test_a_line_has_the_tools_speed_in_metres():
@@ -87,18 +89,29 @@ def test_a_clearance_is_a_length_within_its_range():
         ("--named left --clearance 0.4mm", "--clearance 0.4mm is not from 0.5mm to 50mm"),
         ("--named left --clearance 4", "--clearance 4000mm is not from 0.5mm to 50mm"),
         ("--named left --attempts 0", "--attempts 0 is not from 1 to 1000"),
-        ("--to 0.2 0.1 0.1 --line --attempts 3", "--attempts goes with a free motion"),
-        ("--named left --rpy 0 0 0", "--rpy goes with --to"),
-        ("--to 0.2 0.1 0.1 --blend 10mm", "--blend goes with --via"),
-        ("--to 0.2 0.1 0.1 --tool-speed 10", "--tool-speed goes with --line"),
-        ("--to 0.2 0.1 0.1 --fraction 50%", "--fraction goes with --line, --arc or --center"),
-        ("--named ready --ptp --max-step 2", "--max-step goes with --line, --arc or --center"),
-        ("--to 0.2 0.1 0.1 --line --max-step 0", "--max-step 0 is not above 0"),
-        ("--to 0.2 0.1 0.1 --line --planner PRM", "--planner goes with a free motion"),
-        ("--to 0.2 0.1 0.1 --line --tool-speed 0", "--tool-speed 0 is not above 0"),
-        ("--via 0.1 0 0.1 --to 0.2 0.1 0.1 --blend -3", "--blend -3 is not above 0"),
-        ("--via 0.1 0 0.1 --to 0.2 0.1 0.1 --arc 0.2 0 0.1", "--via does not go with --arc"),
-        ("--named left --time 0", "--time 0 is not in"),
+        ("--to 0.2 0.1 0.1 --line --attempts 3", "--attempts does not go with --line"),
+        ("--named left --rpy 0 0 0", "--rpy does not go with --named"),
+        ("--to 0.2 0.1 0.1 --blend 10mm", "--blend does not go with a goal without --via"),
+        ("--to 0.2 0.1 0.1 --tool-speed 10", "--tool-speed does not go with a free motion"),
+        (
+            "--to 0.2 0.1 0.1 --fraction 50%",
+            r"--fraction .* a free motion \(only --line, --arc and --center\)",
+        ),
+        ("--named ready --ptp --max-step 2mm", "--max-step does not go with a ptp motion"),
+        ("--to 0.2 0.1 0.1 --line --max-step 0", "--max-step 0mm is not above 0"),
+        ("--to 0.2 0.1 0.1 --line --planner PRM", "--planner does not go with --line"),
+        ("--to 0.2 0.1 0.1 --line --tool-speed 0", "--tool-speed 0mm/s is not above 0"),
+        ("--via 0.1 0 0.1 --to 0.2 0.1 0.1 --blend -3", "--blend -3000mm is not above 0"),
+        ("--via 0.1 0 0.1 --to 0.2 0.1 0.1 --arc 0.2 0 0.1", "--arc does not go with --via"),
+        ("--named left --time 0", "--time 0s is not above 0"),
+        ("--named left --time 4000", "--time 4000s is more than 3600s"),
+        ("--named redy", 'no named state "redy"; did you mean "ready"'),
+        ("--to 0.2 0.1 0.1 --frame brazo", 'no link "brazo"; did you mean "brazo_link"'),
+        ("--to 0.2 0.1 0.1 --axis 0 0 1", "--axis is an axis of the tool: say with --along in which direction"),
+        ("--to 0.2 0.1 0.1 --rpy 0 0 0 --along 0 0 1", "say how the tool is turned once, not by --rpy and --along"),
+        ("--to 0.2 0.1 0.1 --quaternion 1 1 0 0", "--quaternion is a quaternion of length 1.4142, not 1"),
+        ("--to 0.2 0.1 12000mm", "--to has 12 m: if it is in millimetres, write 12mm"),
+        ("--joints brazo_joint=30rad", "if it is in degrees, write 30deg"),
     ],
 )
 def test_what_does_not_go_together_is_refused_by_name(words: str, said: str):
@@ -144,3 +157,21 @@ def test_what_is_no_length_or_turn_is_refused(words, capsys):
     with pytest.raises(SystemExit):
         request(words)
     assert "argument --" in capsys.readouterr().err
+
+
+def test_the_options_and_the_arguments_are_one_request():
+    options = "--via 0.1 0 0.1 --to 0.2 0.1 0.1 --along 0 0 -1 --line --tool-speed 50mm/s --speed 50% --clearance 2mm"
+    arguments = Target(
+        via=[(0.1, 0.0, 0.1)], position=(0.2, 0.1, 0.1), along=(0.0, 0.0, -1.0), line=True, tool_speed=0.05, speed=0.5,
+        clearance=0.002,
+    )  # fmt: skip
+    assert request(options) == request_of(ARM, arguments, not_connected)
+
+
+def test_every_argument_has_an_option_but_those_of_a_program():
+    """`pose`, `offset` and `from_joints` are for what a program knows; tolerances are of `gemelo ik` alone."""
+    options = vars(parse(["move", "--named", "ready"]))
+    missing = {name for name in ARGUMENTS if OF_MOVE.get(name, name) not in options}
+    assert missing == {
+        "pose", "offset", "from_joints", "acceleration", "position_tolerance", "orientation_tolerance",
+    }  # fmt: skip

@@ -28,9 +28,8 @@ from gemelo.tools.cli.device.device import reference_request
 from gemelo.tools.cli.device.device_press import request_of
 from gemelo.tools.cli.main import parse
 from gemelo.tools.cli.motion.jog import command_of
-from gemelo.tools.cli.motion.move_request import request_from
+from gemelo.tools.cli.motion.move_request import ik_request_from, request_from
 from gemelo.tools.cli.parser import Options, Parser, complete
-from gemelo.tools.cli.robot.kinematics import ik_request
 from gemelo.tools.cli.robot.scene_object import object_of
 from tests.table import table
 
@@ -125,7 +124,7 @@ def turned(rotation: tuple[float, ...], axis: int) -> float:
 
 REQUESTS = {
     "move": lambda options: request_from(options, ARM),
-    "ik": lambda options: ik_request(options, ARM),
+    "ik": lambda options: ik_request_from(options, ARM),
     "fk": lambda options: parse_joints(options.joints, ARM.joints),
     "reference": lambda options: reference_request(ARM, options.joints),
     "jog": lambda options: command_of(ARM, options.joint, options.twist, options.turn, False),

@@ -58,7 +58,7 @@ BAD = [
     ({"position": (0.2, 0.1, 0.1), "frame": "hand"}, 'rm1 has no link "hand"'),
     ({"position": (0.2, 0.1, 0.1), "orientation": (0, 0, 0, 2)}, "a quaternion of length 2.0000, not 1"),
     ({"position": (0.2, 0.1, 0.1), "rpy": (180, 0, 0)}, "if it is in degrees, write gemelo.deg(180)"),
-    ({"position": (0.2, 0.1, 0.1), "rpy": (0, 0, 0), "along": (0, 0, 1)}, "not by rpy and along"),
+    ({"position": (0.2, 0.1, 0.1), "rpy": (0, 0, 0), "along": (0, 0, 1)}, "not by rpy= and along="),
     ({"position": (0.2, 0.1, 0.1), "axis": (0, 0, 1)}, "say with along="),
     ({"named": "ready", "frame": "base_link"}, "frame= does not go with named"),
     ({"named": "ready", "speed": 50}, "not in (0, 1], a share of the joints' limits: 50 per cent is 0.5"),

@@ -151,7 +151,7 @@ NOT_ON_THE_PAGE = {  # of files, logs and clients that a page does not have, and
     "gemelo/api/simulation.py": ("motors: ", "press(", "start", 'there is no "{}" to press', "wire="),
     "gemelo/api/targets.py": (
         "{}= names no joint", "say where to by one of",
-        "{}= is a quaternion", "{}= has {} rad", "axis= is an axis", "offset= leaves",
+        "{}= is a quaternion", "{}= has {} rad", "axis= is an axis", "offset= leaves", "offset= begins",
         "one path at a time", "{}= does not go with",
     ),
 }  # fmt: skip

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from gemelo.api.targets import usual_time
 from gemelo.schemas.planning import (
     CircularMotion,
     FreeMotion,
@@ -33,7 +34,8 @@ def request_text(request: PlanRequest, arm: ArmDescription) -> str:
     """A request as one line: `brazo_joint 30 deg; in a straight line of the joints; at 50 % speed`."""
     speed = f"at {100.0 * request.velocity_scaling:g} % speed" if request.velocity_scaling != 1.0 else ""
     timing = "without a jerk limit" if request.timing is Timing.TIME_OPTIMAL else ""
-    time = f"planned within {request.allowed_time:g} s" if request.allowed_time != 1.0 else ""
+    points = len(request.goal.points) - 1 if isinstance(request.goal, WaypointGoal) else 0
+    time = f"planned within {request.allowed_time:g} s" if request.allowed_time != usual_time(points) else ""
     clearance = "" if request.clearance is None else f"{1000.0 * request.clearance:g} mm from everything"
     return _joined([goal_text(request.goal, arm), motion_text(request.motion), speed, timing, clearance, time])
 

@@ -95,6 +95,7 @@ COMMAND_OF = (  # methods of `gemelo` that its sentences name, and the commands 
     (r"arm\.stop\(\)", "`gemelo stop`"),
     (r'arm\.reference\(\{"(\w+)": \.\.\.\}\)', r"`gemelo reference --joints \1=...`"),
     (r"arm\.reference\(\)", "`gemelo reference`"),
+    (r"gemelo\.(mm|deg)\(([-+.\de]+)\)", r"\2\1"),
     (r'gemelo\.connect\("([\w-]+)"\)', r"`gemelo --robot \1 ...`"),
 )
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from msgspec.structs import replace
 
 import gemelo
+from gemelo.api.targets import usual_time
 from gemelo.schemas.planning import PlanProgress, PlanRequest
 from gemelo.tools.cli.bus.request_text import refusal_error, request_text
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
@@ -45,7 +46,12 @@ def add_options(parser: Parser) -> None:
     _goal_options(parser.add_argument_group("where to"))
     _motion_options(parser.add_argument_group("on which path (any that is free, if nothing is said)"))
     parser.add_argument("--speed", type=share, metavar="SHARE", help="of the velocity limits, as 50%%")
-    parser.add_argument("--time", type=seconds, metavar="TIME", help="that planning may take, as 3 or 3s")
+    parser.add_argument(
+        "--time",
+        type=seconds,
+        metavar="TIME",
+        help=f"that planning may take, as 3 or 3s; {usual_time(0):g} s, if nothing is said",
+    )
     parser.add_argument(
         "--clearance", type=length, metavar="DISTANCE", help="that stays free, from 0.5mm to 50mm; else the robot's own"
     )

@@ -9,14 +9,13 @@ import msgspec
 
 import gemelo
 from gemelo.schemas.frames import Transform
-from gemelo.schemas.joints import JointState
-from gemelo.schemas.planning import FkResponse, IkRequest, IkResponse, PlanCode, PoseGoal
+from gemelo.schemas.planning import FkResponse, IkRequest, IkResponse, PlanCode
 from gemelo.tools.cli.bus.request_text import goal_text, joints_text, refusal_error
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.common.units import SHOWN, angle, length, parse_joints, rotation
-from gemelo.tools.cli.motion.move_request import oriented
+from gemelo.tools.cli.motion.move_request import ik_request_from
 from gemelo.tools.cli.parser import Choices, Options, Parser, finite_number, json_option, positive_integer
 
 if TYPE_CHECKING:
@@ -45,10 +44,8 @@ def ik_options(parser: Parser) -> None:
     _vector(parser, "--along", "direction in which --axis is to point; it is z")
     _vector(parser, "--free-axis", "of the tool: turning about it does not matter")
     parser.add_argument("--frame", default="", metavar="LINK", help="in which all this is given; the base, if none")
-    parser.add_argument("--tolerance", type=length, default=0.0, metavar="DISTANCE", help="of the position, as 2mm")
-    parser.add_argument(
-        "--turn-tolerance", type=angle, default=0.0, metavar="ANGLE", help="of the orientation, as 5deg"
-    )
+    parser.add_argument("--tolerance", type=length, metavar="DISTANCE", help="of the position, as 2mm")
+    parser.add_argument("--turn-tolerance", type=angle, metavar="ANGLE", help="of the orientation, as 5deg")
     parser.add_argument(
         "--near",
         nargs="+",
@@ -68,7 +65,7 @@ def _vector(parser: Parser, name: str, about: str) -> None:
 def run_ik(options: Options) -> ExitCode:
     """Asks the planner for configurations and prints them."""
     robot = load_robot()
-    request = ik_request(options, robot.description)
+    request = ik_request_from(options, robot.description)
     if not options.json:
         near = (
             f"; near {joints_text(request.near.name, request.near.position, robot.description)}" if request.near else ""
@@ -86,22 +83,6 @@ def ik_choices(robot: Robot | None) -> Choices:
         "--near": [f"{joint.name}=" for joint in robot.description.joints],
         "--frame": robot.description.model.link_names,
     }
-
-
-def ik_request(options: Options, arm: ArmDescription) -> IkRequest:
-    """The request in SI units."""
-    near = parse_joints(options.near, arm.joints)
-    goal = PoseGoal(
-        position=tuple(options.to),
-        position_tolerance=options.tolerance,
-        orientation_tolerance=options.turn_tolerance,
-    )
-    return IkRequest(
-        goal=oriented(goal, options),
-        near=JointState(name=tuple(near), position=tuple(near.values())) if near else None,
-        solutions=options.solutions,
-        avoid_collisions=not options.touching,
-    )
 
 
 def fk_options(parser: Parser) -> None:
