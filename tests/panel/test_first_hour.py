@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser
 
 import gemelo
-from gemelo.services.panel.words.words import TABLES
+from gemelo.services.panel.words.words import LANGUAGES
 from gemelo.tools.stack.stack import Stack
 from tests.panel.person import Person, until
 from tests.panel.test_page import is_moving, rests
@@ -27,7 +27,7 @@ SENTENCES = ("The red button and the space bar stop the arm", "El botón rojo y 
 @pytest.mark.parametrize("language", PAGES)
 def test_every_word_that_it_names_is_on_the_page(language: str) -> None:
     named = [each for each in NAMED.findall(PAGES[language].read_text().replace("\n", " ")) if each not in SENTENCES]
-    words = TABLES[language].values()
+    words = LANGUAGES[language].table.values()
     assert len(named) > 25
     assert [each for each in named if not any(text.startswith(each) for text in words)] == []
 
@@ -38,7 +38,7 @@ class Newcomer(Person):
     def __init__(self, browser: Browser, port: str, language: str) -> None:
         super().__init__(browser, port, LOCALES[language], SIZE)
         self.post, self.points = POSTS[language], POINTS[language]
-        self._table = TABLES[language]
+        self._table = LANGUAGES[language].table
 
     def words(self, key: str) -> str:
         """The text of the page in that language, up to a figure that closes it."""

@@ -30,10 +30,10 @@ from gemelo.services.panel.view.browser import CHANNEL, Browser, read_browser, s
 from gemelo.services.panel.view.obstacles import nearest_hit
 from gemelo.services.panel.words.en import ENGLISH
 from gemelo.services.panel.words.en_refusals import REFUSALS as ENGLISH_REFUSALS
-from gemelo.services.panel.words.es import SPANISH
 from gemelo.services.panel.words.es_refusals import REFUSALS
 from gemelo.services.panel.words.refusals import key_of
-from gemelo.services.panel.words.words import Words, language_of
+from gemelo.services.panel.words.sentences import Language
+from gemelo.services.panel.words.words import LANGUAGES, Words, language_of
 from tests.arm.bare_arm import ROBOT
 from tests.runtime.support import until
 
@@ -45,11 +45,12 @@ def fields(text: str) -> set[str]:
     return {name for _, name, _, _ in string.Formatter().parse(text) if name}
 
 
-def test_both_languages_have_every_word_with_the_same_values_to_put_in():
-    assert ENGLISH.keys() == SPANISH.keys()
+@pytest.mark.parametrize("language", LANGUAGES.values(), ids=LANGUAGES)
+def test_every_language_has_every_word_with_the_same_values_to_put_in(language: Language):
+    assert ENGLISH.keys() == language.table.keys()
     for key, text in ENGLISH.items():
-        assert fields(text) == fields(SPANISH[key]), key
-        assert SPANISH[key].strip()
+        assert fields(text) == fields(language.table[key]), key
+        assert language.table[key].strip()
 
 
 def test_every_word_that_the_page_asks_for_is_in_the_tables():
@@ -206,9 +207,10 @@ def test_refusals_are_said_in_english_in_degrees_and_millimetres(check, subject,
     assert Words("en", JOINTS).problem(problem_of(refused))[1] == said
 
 
-def test_a_refusal_that_both_languages_tell_takes_the_same_values():
+@pytest.mark.parametrize("language", LANGUAGES.values(), ids=LANGUAGES)
+def test_a_refusal_takes_the_same_values_in_every_language(language: Language):
     for key, text in ENGLISH_REFUSALS.items():
-        assert fields(text) == fields(REFUSALS[key]), key
+        assert fields(text) == fields(language.refusals[key]), key
 
 
 def test_every_refusal_in_spanish_is_one_that_is_given():

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
-from gemelo.services.panel.words.words import NAMES, TABLES
+from gemelo.services.panel.words.words import LANGUAGES
 from tests.panel.memory_page import MemoryPage, memory_page
 from tests.panel.person import PATIENCE, Person, until
 
@@ -37,7 +37,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MemoryPage]:
 def test_nothing_is_cut_in_either_language_and_colours_and_language_change_by_their_switches(
     served: MemoryPage, chromium: Browser, width: int, height: int, language: str
 ) -> None:
-    words = TABLES[language]
+    words = LANGUAGES[language].table
     with Person(chromium, str(served.port), language, {"width": width, "height": height}) as person:
         expect(person.page.get_by_role("tab", name=words["tab_move"], exact=True)).to_be_visible(timeout=PATIENCE)
         for is_dark in (False, True):
@@ -50,13 +50,13 @@ def test_nothing_is_cut_in_either_language_and_colours_and_language_change_by_th
             if not is_dark:
                 person.ticks(words["dark"])
                 until(lambda: brightness(person.page), lambda now: now < 100)
-        other = next(name for name in TABLES if name != language)
+        other = next(name for name in LANGUAGES if name != language)
         person.tab(words["tab_state"])
-        person.chooses("Language / Idioma", NAMES[other])
+        person.chooses("Language / Idioma", LANGUAGES[other].name)
         for name in TABS:
-            expect(person.page.get_by_role("tab", name=TABLES[other][f"tab_{name}"], exact=True)).to_be_visible(
-                timeout=PATIENCE
-            )
+            expect(
+                person.page.get_by_role("tab", name=LANGUAGES[other].table[f"tab_{name}"], exact=True)
+            ).to_be_visible(timeout=PATIENCE)
         assert brightness(person.page) < 100
         person.require_no_errors()
 

@@ -31,7 +31,7 @@ from gemelo.schemas.device_faults import fault_text
 from gemelo.schemas.motion import FollowErrorCode
 from gemelo.services.panel.model.problems import problem_of
 from gemelo.services.panel.words.step_text import step_text
-from gemelo.services.panel.words.words import SENTENCES, Words
+from gemelo.services.panel.words.words import LANGUAGES, Words
 from gemelo.services.stepper_gateway.device.command_handler import NOT_NOW, REMEDIES, complaint
 from gemelo.services.stepper_gateway.device.session import DEAF, ONE_NAME
 from gemelo.services.stepper_gateway.links.foreign.ra_device import LOST, SILENT
@@ -294,8 +294,8 @@ def test_sentences_that_are_put_together_keep_their_values(english: str, spanish
 
 
 def test_a_sentence_around_one_that_is_not_known_is_left_as_it_came():
-    assert SENTENCES["es"].of("refused by stepper_gateway: never heard of before") is None
-    assert SENTENCES["es"].of("FAULTY: nobody: knows; this") is None
+    assert LANGUAGES["es"].sentences.of("refused by stepper_gateway: never heard of before") is None
+    assert LANGUAGES["es"].sentences.of("FAULTY: nobody: knows; this") is None
     assert SPANISH.said("never heard of before") == "never heard of before"
 
 

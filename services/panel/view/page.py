@@ -28,7 +28,7 @@ from gemelo.services.panel.view.tabs.scene import SceneTab, require_small
 from gemelo.services.panel.view.tabs.state import StateTab
 from gemelo.services.panel.view.tabs.teach import TeachTab
 from gemelo.services.panel.view.world import DrawnWorld
-from gemelo.services.panel.words.words import NAMES, Words, language_of
+from gemelo.services.panel.words.words import LANGUAGES, Words, language_of
 
 MARK = 1.0  # [s] between two marks by which a browser's lag is measured
 LATE, LATE_AGAIN = 0.2, 5.0  # [s] chosen: a longer lag is measured again after so long
@@ -146,15 +146,16 @@ class Page:
 
     def _settings(self, appearance: Appearance) -> None:
         words, gui = self._words, self.client.gui
-        language = gui.add_dropdown("Language / Idioma", tuple(NAMES.values()), initial_value=NAMES[words.language])
+        names = {each.name: key for key, each in LANGUAGES.items()}
+        now = LANGUAGES[words.language].name
+        language = gui.add_dropdown("Language / Idioma", tuple(names), initial_value=now)
         dark = gui.add_checkbox(words("dark"), appearance.is_dark)
 
         @language.on_update
         def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
             if event.client_id is not None:
-                [chosen] = [key for key, name in NAMES.items() if name == event.target.value]
                 self.was_chosen = True
-                self.wanted = replace(self.wanted, language=chosen)
+                self.wanted = replace(self.wanted, language=names[event.target.value])
 
         @dark.on_update
         def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:

@@ -1,4 +1,4 @@
-"""A sentence of another part in another language: known by its fixed words, its values taken over.
+"""A language of the page, and a sentence of another part in it: known by its fixed words, its values taken over.
 
 A table has sentences with places for values, as `'joint "{joint}" is missing'`, and each in the other language. A value
 is what stands at its place; one that is called as in `INSIDE` has words of its own, which must be known too, and one
@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import string
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 INSIDE = ("reason", "remedy", "more", "what")  # values that are sentences, or in the table of their place
@@ -51,6 +52,17 @@ class Sentences:
                 return None
             values[name] = told
         return values
+
+
+@dataclass(frozen=True)
+class Language:
+    """A language of the page; a sentence of another part that it does not know stays English."""
+
+    name: str  # as its speakers call it
+    table: Mapping[str, str]  # the page's own words, by the keys of the English ones
+    refusals: Mapping[str, str]  # by the check that refuses
+    sentences: Sentences = field(default_factory=lambda: Sentences({}, {}))
+    codes: Mapping[int, str] = field(default_factory=dict)  # of goals that the gateway rejects or aborts
 
 
 def _parts(template: str) -> list[tuple[str, str | None]]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.services.panel.model.availability import Reason
 from gemelo.services.panel.model.problems import Problem
@@ -17,27 +15,28 @@ from gemelo.services.panel.words.es_programs import PROGRAMS
 from gemelo.services.panel.words.es_refusals import REFUSALS
 from gemelo.services.panel.words.es_work import WORK
 from gemelo.services.panel.words.refusals import Joints, key_of, place_of, sentence_of
-from gemelo.services.panel.words.sentences import Sentences
+from gemelo.services.panel.words.sentences import Language, Sentences
 
-TABLES = {"en": ENGLISH, "es": SPANISH}
-REFUSED: dict[str, Mapping[str, str]] = {"en": ENGLISH_REFUSALS, "es": REFUSALS}
-SENTENCES = {"en": Sentences({}, {}), "es": Sentences(GATEWAY | GOALS | FAULTS | PROGRAMS | WORK, VALUES)}
-CODES: dict[str, Mapping[int, str]] = {"en": {}, "es": GOAL_CODES}
+SPANISH_SENTENCES = Sentences(GATEWAY | GOALS | FAULTS | PROGRAMS | WORK, VALUES)
+LANGUAGES = {  # by the first part of a browser's language; the first one is that of all other browsers
+    "en": Language("English", ENGLISH, ENGLISH_REFUSALS),
+    "es": Language("Español", SPANISH, REFUSALS, SPANISH_SENTENCES, GOAL_CODES),
+}
 BUTTONS = {  # of the command line: what a person at the page presses instead
     "gemelo home": "home", "gemelo reference": "reference", "gemelo reset": "reset", "gemelo device arm": "arm",
     "gemelo stop": "stop", "gemelo resume": "resume", "gemelo control take --force": "force_control",
     "gemelo control take": "take_control",
 }  # fmt: skip
-NAMES = {"en": "English", "es": "Español"}
 
 
 class Words:
     """`words("key", name=value)` is the text of the key with its values put in."""
 
     def __init__(self, language: str, joints: Joints | None = None) -> None:
-        self.language = language if language in TABLES else "en"
+        self.language = language if language in LANGUAGES else next(iter(LANGUAGES))
         self._joints = joints or {}
-        self._table = TABLES[self.language]
+        self._of = LANGUAGES[self.language]
+        self._table = self._of.table
 
     def __call__(self, key: str, **values: object) -> str:
         text = self._table[key]
@@ -59,19 +58,18 @@ class Words:
         """A heading for the check, and a sentence; where this language has none, that of the part that refused."""
         heading = self.check(problem.check) or self("check_other" if problem.is_refusal else "check_ended")
         known = self._table.get(f"text_{problem.text.replace(' ', '_')}")
-        if known is None and (template := sentence_of(problem, self._joints, REFUSED[self.language])) is not None:
+        if known is None and (template := sentence_of(problem, self._joints, self._of.refusals)) is not None:
             place = place_of(problem)
             known = template if place is None else f"{self(place[0], **place[1])} {template}"
         return heading, known or self._told(problem)
 
     def said(self, text: str) -> str:
         """What another part says, line by line; a line that this language does not have is left as it is."""
-        sentences = SENTENCES[self.language]
-        return "\n".join(sentences.of(line) or self._with_buttons(line) for line in text.split("\n"))
+        return "\n".join(self._of.sentences.of(line) or self._with_buttons(line) for line in text.split("\n"))
 
     def value(self, name: str, value: str) -> str:
         """A single word of another part, as `name` calls it: a mode, a phase of homing, ..."""
-        return SENTENCES[self.language].value(name, value)
+        return self._of.sentences.value(name, value)
 
     def _with_buttons(self, text: str) -> str:
         """The page's buttons in the place of commands to type."""
@@ -82,9 +80,9 @@ class Words:
 
     def _told(self, problem: Problem) -> str:
         """By the sentence; where that is not known, by the code, with the sentence as it came."""
-        of = SENTENCES[self.language].of
+        of = self._of.sentences.of
         known = of(problem.text) or of(problem.reason)
-        about = CODES[self.language].get(problem.code)
+        about = self._of.codes.get(problem.code)
         return known or (f"{about} («{problem.text}»)" if about else self.said(_without_heading(problem)))
 
 
@@ -99,4 +97,4 @@ def _without_heading(problem: Problem) -> str:
 def language_of(browser: str) -> str:
     """The nearest of our languages to a browser's, as "es-MX"."""
     short = browser.partition("-")[0].lower()
-    return short if short in TABLES else "en"
+    return short if short in LANGUAGES else next(iter(LANGUAGES))

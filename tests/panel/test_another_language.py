@@ -1,0 +1,70 @@
+"""A language of the page: one file with its words, and one row of the table of languages."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.additions import ROOT, added, row_added, run_in
+
+PORTUGUESE = '''"""The page in Portuguese."""
+
+from gemelo.services.panel.words.en import ENGLISH
+from gemelo.services.panel.words.en_refusals import REFUSALS
+from gemelo.services.panel.words.sentences import Language, Sentences
+
+PORTUGUESE = Language(
+    "Português",
+    {**ENGLISH, "plan": "Planejar", "execute": "Executar", "mode_idle": "Em repouso"},
+    {**REFUSALS, "reach": "Esse ponto fica {value} fora do alcance da ferramenta."},
+    Sentences({"a newer goal took over": "uma meta mais nova assumiu"}, {"mode": {"IDLE": "em repouso"}}),
+)
+'''
+SCRIPT = """
+import json, sys
+from pathlib import Path
+from gemelo.services.panel.model.problems import Problem
+from gemelo.services.panel.words.words import Words, language_of
+from tests.panel.memory_page import memory_page
+from tests.runtime.support import until
+
+words = Words(language_of("pt-BR"))
+problem = Problem("refused (reach): too far", check="reach", subject="tool", value=0.2, limit=0.5)
+written = [words("plan"), words.problem(problem)[1], words.said("a newer goal took over"), words.said("not known")]
+with memory_page("rm1", Path(sys.argv[1])) as page:
+    page.draw(3)
+    page.browser.choose("Language / Idioma", "Português")
+
+    def is_portuguese():
+        page.draw()
+        is_at_rest = any("Em repouso" in text for text in page.browser.texts)
+        return is_at_rest and {"Planejar", "Executar"} <= page.browser.labels
+
+    written.append(until(is_portuguese, 60.0))
+print(json.dumps(written))
+"""
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """This one, with Portuguese."""
+    words = "services/panel/words/words.py"
+    spanish = next(line for line in (ROOT / words).read_text().splitlines() if line.startswith('    "es": '))
+    table = row_added(words, after=spanish, row='    "pt": PORTUGUESE,')[words]
+    first = "from gemelo.services.panel.words.refusals import"
+    table = table.replace(first, f"from gemelo.services.panel.words.pt import PORTUGUESE\n{first}")
+    return added(tmp_path_factory.mktemp("project"), {"services/panel/words/pt.py": PORTUGUESE, words: table})
+
+
+def test_a_new_language_is_chosen_by_a_browser_and_by_a_person_and_says_what_it_knows(
+    project: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "script.py").write_text(SCRIPT)
+    done = run_in(project, str(tmp_path / "script.py"), str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    *written, is_on_the_page = json.loads(done.stdout.splitlines()[-1])
+    refused = "Esse ponto fica 200.0 mm fora do alcance da ferramenta."
+    assert written == ["Planejar", refused, "uma meta mais nova assumiu", "not known"]
+    assert is_on_the_page
