@@ -1,4 +1,4 @@
-"""A certificate authority of a few files, made by the openssl command: P-256 keys that never leave their folder.
+"""A certificate authority of a few files: P-256 keys that never leave their folder.
 
 A new authority takes the place of a former one without an outage: what it signs carries a certificate by which the
 former one vouches for it (the "new with old" of RFC 4210, 4.4). Who trusts only the former believes it, and who trusts
@@ -9,36 +9,25 @@ from __future__ import annotations
 
 import ipaddress
 import math
-import os
 import secrets
 import shutil
-import subprocess
-import tempfile
 from collections.abc import Iterable
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+
+from cryptography import x509
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.hashes import SHA256
+from cryptography.hazmat.primitives.serialization import Encoding, load_pem_private_key
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from gemelo.libraries.credentials.common_name import common_name
 from gemelo.libraries.credentials.expiry import CERTIFICATE, days_left, expiry
-from gemelo.libraries.credentials.private_files import AccessError
+from gemelo.libraries.credentials.keys import new_key, private_pem
+from gemelo.libraries.credentials.private_files import AccessError, write
 
 DAYS = 3650  # of the authority and of what it signs
-KEY = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes")  # small enough for a board
-EXTENSIONS = """\
-basicConstraints = critical, CA:FALSE
-keyUsage = critical, digitalSignature
-extendedKeyUsage = {use}
-subjectKeyIdentifier = hash
-authorityKeyIdentifier = keyid
-{names}
-"""
-
-
-AUTHORITY_EXTENSIONS = """\
-basicConstraints = critical, CA:TRUE
-keyUsage = critical, keyCertSign, cRLSign
-subjectKeyIdentifier = hash
-authorityKeyIdentifier = keyid
-"""
 FORMER, VOUCHER = "former.pem", "voucher.pem"  # beside the authority's certificate
 
 
@@ -53,7 +42,9 @@ class Authority:
             anew = f"delete {has} to begin with another authority, whose files everybody must then get at once"
             raise AccessError(f"{lacks} is missing beside {has.name}: bring it back; or {anew}")
         if not certificate.exists():
-            _make(certificate, key)
+            own = new_key()
+            write(key, private_pem(own))
+            write(certificate, _pem(_self_signed(own)))
 
     @property
     def has_former(self) -> bool:
@@ -72,17 +63,14 @@ class Authority:
         """
         if self.has_former:
             raise AccessError("an authority before this one is still trusted: retire that one before this is renewed")
-        with tempfile.TemporaryDirectory(dir=self._certificate.parent) as scratch:
-            certificate, key, request, wanted, voucher = (Path(scratch, name) for name in ("c", "k", "r", "e", "v"))
-            subject = _make(certificate, key)
-            openssl("req", "-new", "-key", str(key), "-subj", subject, "-out", str(request))
-            wanted.write_text(AUTHORITY_EXTENSIONS)
-            left = max(1, math.ceil(days_left(expiry(self._certificate))))
-            self._sign(request, wanted, voucher, left)
-            os.replace(voucher, self._voucher)
-            shutil.copyfile(self._certificate, self._former)
-            os.replace(key, self._key)
-            os.replace(certificate, self._certificate)
+        own = new_key()
+        certificate = _self_signed(own)
+        left = max(1, math.ceil(days_left(expiry(self._certificate))))
+        voucher = self._sign(_authority(certificate.subject, own.public_key(), left))
+        write(self._voucher, _pem(voucher))
+        shutil.copyfile(self._certificate, self._former)
+        write(self._key, private_pem(own))
+        write(self._certificate, _pem(certificate))
 
     def retire(self) -> None:
         """The former authority is trusted no more; raises `AccessError` if there is none."""
@@ -93,14 +81,12 @@ class Authority:
 
     def sign(self, hosts: Iterable[str], certificate: Path, key: Path, days: int = DAYS) -> None:
         """Makes a key and a certificate for a broker at `hosts`: names and IP addresses; raises `AccessError`."""
-        names = tuple(dict.fromkeys(hosts))
-        alternatives = ", ".join(map(_alternative_name, names))
-        extensions = EXTENSIONS.format(use="serverAuth", names=f"subjectAltName = {alternatives}")
-        self._issue("gemelo broker", extensions, certificate, key, days)
+        names = x509.SubjectAlternativeName(map(_alternative_name, dict.fromkeys(hosts)))
+        self._issue("gemelo broker", ExtendedKeyUsageOID.SERVER_AUTH, names, certificate, key, days)
 
     def sign_client(self, name: str, certificate: Path, key: Path, days: int = DAYS, unit: str = "") -> None:
         """Makes a key and a certificate by which a client shows who it is; `unit` is the host that it is for."""
-        self._issue(name, EXTENSIONS.format(use="clientAuth", names=""), certificate, key, days, unit)
+        self._issue(name, ExtendedKeyUsageOID.CLIENT_AUTH, None, certificate, key, days, unit)
 
     def has_signed(self, certificate: Path, key: Path, hosts: Iterable[str] = (), name: str = "") -> bool:
         """True if both files are there, signed by this authority, as it stands now, for all `hosts` and for `name`."""
@@ -111,76 +97,131 @@ class Authority:
         if name and common_name(certificate) != name:
             return False
         try:
-            openssl("verify", "-no_check_time", "-CAfile", str(self._certificate), str(certificate))
-            named = openssl("x509", "-in", str(certificate), "-noout", "-ext", "subjectAltName") if hosts else ""
-        except AccessError:
+            signed = x509.load_pem_x509_certificate(certificate.read_bytes())
+            signed.verify_directly_issued_by(self._own)
+        except (ValueError, TypeError, InvalidSignature):
             return False
-        return {_alternative_name(host) for host in hosts} <= set(_named_in(named))
+        return {_alternative_name(host) for host in hosts} <= _names_of(signed)
+
+    @property
+    def _own(self) -> x509.Certificate:
+        try:
+            return x509.load_pem_x509_certificate(self._certificate.read_bytes())
+        except ValueError:
+            raise AccessError(f"{self._certificate} holds no certificate in PEM: bring it back") from None
+
+    @property
+    def _own_key(self) -> ec.EllipticCurvePrivateKey:
+        try:
+            key = load_pem_private_key(self._key.read_bytes(), None)
+        except (ValueError, TypeError):
+            key = None
+        if not isinstance(key, ec.EllipticCurvePrivateKey):
+            raise AccessError(f"{self._key} holds no private key of P-256 in PEM: bring it back")
+        return key
 
     @property
     def _vouched(self) -> str:
         return self._voucher.read_text() if self.has_former else ""
 
-    def _issue(self, name: str, extensions: str, certificate: Path, key: Path, days: int, unit: str = "") -> None:
-        subject = f"/OU={unit}/CN={name}" if unit else f"/CN={name}"
-        with tempfile.TemporaryDirectory(dir=certificate.parent) as scratch:
-            request, wanted, own, signed = (Path(scratch, name) for name in ("r", "e", "k", "c"))
-            wanted.write_text(extensions)
-            openssl("req", "-new", *KEY, "-subj", subject, "-keyout", str(own), "-out", str(request))
-            self._sign(request, wanted, signed, days)
-            with signed.open("a") as file:
-                file.write(self._vouched)
-            os.replace(own, key)
-            os.replace(signed, certificate)
-
-    def _sign(self, request: Path, extensions: Path, certificate: Path, days: int) -> None:
-        by = ("-CA", str(self._certificate), "-CAkey", str(self._key), "-set_serial", _serial())
-        files = ("-in", str(request), "-out", str(certificate), "-extfile", str(extensions))
-        openssl("x509", "-req", *by, "-days", str(days), *files)
-
-
-def openssl(*arguments: str) -> str:
-    """What the openssl command prints; it writes files for their owner alone. Raises `AccessError` if it cannot."""
-    try:
-        done = subprocess.run(
-            ["openssl", *arguments], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, umask=0o077
+    def _issue(
+        self,
+        name: str,
+        use: x509.ObjectIdentifier,
+        names: x509.SubjectAlternativeName | None,
+        certificate: Path,
+        key: Path,
+        days: int,
+        unit: str = "",
+    ) -> None:
+        own = new_key()
+        builder = (
+            _certificate(_subject(name, unit), own.public_key(), days)
+            .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+            .add_extension(_usage(digital_signature=True), critical=True)
+            .add_extension(x509.ExtendedKeyUsage([use]), critical=False)
         )
-    except FileNotFoundError:
-        raise AccessError(
-            "the command openssl makes the certificates, and is missing: sudo apt-get install openssl"
-        ) from None
-    if done.returncode:
-        raise AccessError(f"openssl {arguments[0]} failed: {' '.join(done.stderr.strip().splitlines()[-1:])}")
-    return done.stdout
+        signed = self._sign(builder if names is None else builder.add_extension(names, critical=False))
+        write(key, private_pem(own))
+        write(certificate, _pem(signed) + self._vouched)
+
+    def _sign(self, builder: x509.CertificateBuilder) -> x509.Certificate:
+        return _signed(builder, self._own.subject, self._own_key)
 
 
-def _make(certificate: Path, key: Path) -> str:
-    """An authority's certificate and key; returns its name, which no other has, as openssl writes it."""
-    name = f"/CN=gemelo authority {secrets.token_hex(4)}"
-    usage = ("-addext", "keyUsage = critical, keyCertSign, cRLSign")
-    files = ("-keyout", str(key), "-out", str(certificate))
-    openssl("req", "-x509", *KEY, "-subj", name, "-days", str(DAYS), *usage, *files)
-    return name
+def _self_signed(own: ec.EllipticCurvePrivateKey) -> x509.Certificate:
+    """An authority's certificate with a name that no other has."""
+    subject = _subject(f"gemelo authority {secrets.token_hex(4)}")
+    return _signed(_authority(subject, own.public_key(), DAYS), subject, own)
 
 
-def _named_in(extension: str) -> list[str]:
-    """The names of a printed subjectAltName, as `_alternative_name` writes them."""
-    names = extension.partition("\n")[2].strip().split(", ") if extension else []
-    return [
-        f"IP:{ipaddress.ip_address(each.removeprefix('IP Address:'))}" if each.startswith("IP Address:") else each
-        for each in names
-    ]
+def _authority(subject: x509.Name, public: ec.EllipticCurvePublicKey, days: int) -> x509.CertificateBuilder:
+    return (
+        _certificate(subject, public, days)
+        .add_extension(x509.BasicConstraints(ca=True, path_length=None), critical=True)
+        .add_extension(_usage(key_cert_sign=True, crl_sign=True), critical=True)
+    )
 
 
-def _serial() -> str:
-    return f"0x{int.from_bytes(os.urandom(16), 'big') >> 1:032x}"  # RFC 5280: positive, at most 20 bytes
+def _certificate(subject: x509.Name, public: ec.EllipticCurvePublicKey, days: int) -> x509.CertificateBuilder:
+    """From now on, for so many days; of less than none, one that has expired."""
+    now = datetime.now(UTC)
+    end = now + timedelta(days=days)
+    return (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .public_key(public)
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(min(now, end - timedelta(days=1)))
+        .not_valid_after(end)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(public), critical=False)
+    )
 
 
-def _alternative_name(host: str) -> str:
+def _signed(builder: x509.CertificateBuilder, issuer: x509.Name, own: ec.EllipticCurvePrivateKey) -> x509.Certificate:
+    by = x509.AuthorityKeyIdentifier.from_issuer_public_key(own.public_key())
+    return builder.issuer_name(issuer).add_extension(by, critical=False).sign(own, SHA256())
+
+
+def _usage(*, digital_signature: bool = False, key_cert_sign: bool = False, crl_sign: bool = False) -> x509.KeyUsage:
+    return x509.KeyUsage(
+        digital_signature=digital_signature,
+        key_cert_sign=key_cert_sign,
+        crl_sign=crl_sign,
+        content_commitment=False,
+        key_encipherment=False,
+        data_encipherment=False,
+        key_agreement=False,
+        encipher_only=False,
+        decipher_only=False,
+    )
+
+
+def _subject(name: str, unit: str = "") -> x509.Name:
+    """Raises `AccessError` for a name of no or of more than 64 characters (RFC 5280, A.1)."""
     try:
-        return f"IP:{ipaddress.ip_address(host)}"
+        parts = [(NameOID.ORGANIZATIONAL_UNIT_NAME, unit)] if unit else []
+        return x509.Name([x509.NameAttribute(*part) for part in (*parts, (NameOID.COMMON_NAME, name))])
+    except ValueError as error:
+        raise AccessError(f'"{name}" cannot be the name in a certificate: {error}') from None
+
+
+def _pem(certificate: x509.Certificate) -> str:
+    return certificate.public_bytes(Encoding.PEM).decode()
+
+
+def _names_of(certificate: x509.Certificate) -> set[x509.GeneralName]:
+    try:
+        return set(certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value)
+    except x509.ExtensionNotFound:
+        return set()
+
+
+def _alternative_name(host: str) -> x509.GeneralName:
+    try:
+        return x509.IPAddress(ipaddress.ip_address(host))
     except ValueError:
         pass
     if not host or not all(part.replace("-", "").isalnum() and part.isascii() for part in host.split(".")):
         raise AccessError(f'"{host}" is neither a host name nor an IP address: give what clients connect to')
-    return f"DNS:{host}"
+    return x509.DNSName(host)

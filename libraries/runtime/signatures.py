@@ -1,12 +1,25 @@
-"""Signatures of files: ECDSA with the curve P-256 and SHA-256, by the openssl command."""
+"""Signatures of files: ECDSA with the curve P-256 and SHA-256."""
 
 from __future__ import annotations
 
-import subprocess
-import tempfile
 from pathlib import Path
 
+from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
+from cryptography.hazmat.primitives.asymmetric.ec import ECDSA, EllipticCurvePrivateKey, EllipticCurvePublicKey
+from cryptography.hazmat.primitives.asymmetric.utils import Prehashed
+from cryptography.hazmat.primitives.hashes import SHA256
+from cryptography.hazmat.primitives.serialization import (
+    Encoding,
+    PublicFormat,
+    load_pem_private_key,
+    load_pem_public_key,
+)
+
+from gemelo.libraries.credentials.keys import new_key, private_pem
+from gemelo.libraries.credentials.private_files import write
 from gemelo.schemas.errors import ConfigurationError
+
+NEW = "`gemelo device update --make-key` makes one"
 
 
 class SignatureError(ConfigurationError):
@@ -20,50 +33,36 @@ def make_key(private: Path, public: Path) -> None:
             f"{private} is there already: devices that know its public key would take nothing signed by another one"
         )
     private.parent.mkdir(parents=True, exist_ok=True)
-    _openssl("genpkey", "-algorithm", "EC", "-pkeyopt", "ec_paramgen_curve:P-256", "-out", str(private))
-    private.chmod(0o600)
-    public.write_bytes(_openssl("pkey", "-in", str(private), "-pubout"))
+    key = new_key()
+    write(private, private_pem(key))
+    public.write_bytes(key.public_key().public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo))
 
 
 def sign(private: Path, data: bytes) -> bytes:
     """The signature of `data`, DER; raises SignatureError."""
-    with tempfile.NamedTemporaryFile() as file:
-        file.write(data)
-        file.flush()
-        return _openssl("dgst", "-sha256", "-sign", str(private), file.name)
+    try:
+        key = load_pem_private_key(private.read_bytes(), None)
+    except OSError as error:
+        raise SignatureError(f"cannot read {private}: {error.strerror}") from None
+    except (ValueError, TypeError, UnsupportedAlgorithm):
+        raise SignatureError(
+            f"{private} is no private key without a password: `gemelo device update` makes one"
+        ) from None
+    if not isinstance(key, EllipticCurvePrivateKey):
+        raise SignatureError(f"{private} is no key of the curve P-256; {NEW}")
+    return key.sign(data, ECDSA(SHA256()))
 
 
 def is_signed(public: str, digest: bytes, signature: bytes) -> bool:
     """True if the owner of the public key (PEM text) has signed data with this SHA-256; raises SignatureError."""
-    with tempfile.TemporaryDirectory() as folder:
-        files = {name: Path(folder, name) for name in ("key", "digest", "signature")}
-        for name, content in (("key", public.encode()), ("digest", digest), ("signature", signature)):
-            files[name].write_bytes(content)
-        try:
-            _openssl(
-                "pkeyutl", "-verify", "-pubin", "-inkey", str(files["key"]), "-in", str(files["digest"]),
-                "-sigfile", str(files["signature"]), "-pkeyopt", "digest:sha256",
-            )  # fmt: skip
-        except _Failed:
-            return False
-        return True
-
-
-class _Failed(SignatureError):
-    """openssl has said no."""
-
-
-def _openssl(*arguments: str) -> bytes:
-    """What the command writes; raises SignatureError."""
     try:
-        done = subprocess.run(
-            ["openssl", *arguments], capture_output=True, check=False, stdin=subprocess.DEVNULL, umask=0o077
-        )
-    except FileNotFoundError:
-        raise SignatureError(
-            "the command openssl makes and checks signatures, and is missing: sudo apt-get install openssl"
-        ) from None
-    if done.returncode:
-        said = done.stderr.decode(errors="replace").strip().splitlines()
-        raise _Failed(f"openssl {arguments[0]} failed: {said[0] if said else 'without a word'}")
-    return done.stdout
+        key = load_pem_public_key(public.encode())
+    except (ValueError, UnsupportedAlgorithm):
+        raise SignatureError("its key for updates is no public key: provision --update-key over its cable") from None
+    if not isinstance(key, EllipticCurvePublicKey):
+        return False
+    try:
+        key.verify(signature, digest, ECDSA(Prehashed(SHA256())))
+    except (InvalidSignature, ValueError):
+        return False
+    return True

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from gemelo.libraries.credentials.authority import Authority, openssl
+from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.credentials.expiry import CERTIFICATE, expiries
 from gemelo.libraries.mqtt.access import tls_context
 from gemelo.libraries.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus
@@ -22,6 +22,7 @@ from gemelo.tools.cli.hosts.credentials import LONGEST_PEM
 from gemelo.tools.cli.main import run
 from gemelo.tools.hosts.keys import authority_in, make_keys
 from tests.hosts.site_router import SiteRouter
+from tests.openssl import openssl
 from tests.runtime.support import free_port, until
 from tests.stepper_gateway.locked import Mosquitto
 

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from gemelo.libraries.credentials.authority import Authority, openssl
+from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.credentials.common_name import common_name
 from gemelo.libraries.credentials.expiry import expiry
 from gemelo.libraries.runtime.deployment import project_root
@@ -14,6 +14,7 @@ from gemelo.schemas.roles import ROLE_OF_NODE, ROLES
 from gemelo.tools.hosts.checks import load_site
 from gemelo.tools.hosts.keys import authority_in, make_keys
 from tests.hosts.sites import EXAMPLE, site
+from tests.openssl import openssl
 
 DAY = 86_400.0
 

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from gemelo.libraries.credentials.authority import Authority, openssl
+from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.mqtt.access import device_access, gateway_access, read_secret
 from gemelo.schemas.deployment import Broker, MqttSection
+from tests.openssl import openssl
 
 STRANGE = MqttSection(broker=Broker.EXTERNAL, host="broker.lan", port=8883)
 

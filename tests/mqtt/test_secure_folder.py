@@ -90,9 +90,3 @@ def test_no_option_takes_a_password():
 def test_a_folder_that_was_never_made_is_named_with_the_command(tmp_path):
     with pytest.raises(AccessError, match=r"has no ca\.pem: `gemelo broker secure` makes it"):
         secure_folder.listener(tmp_path)
-
-
-def test_a_missing_openssl_is_said_with_the_remedy(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert made(tmp_path / "lock", "--device", "rm1") is ExitCode.FAILED
-    assert "sudo apt-get install openssl" in capsys.readouterr().err

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from gemelo.libraries.credentials.authority import Authority, openssl
+from gemelo.libraries.credentials.authority import Authority
 from gemelo.libraries.credentials.expiry import CERTIFICATE, DAY, expiries, expiry, not_after
 from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt import secure_folder
@@ -24,6 +24,7 @@ from gemelo.libraries.runtime.certificate_watch import CertificateWatch
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.topics import LOG
+from tests.openssl import openssl
 from tests.optional import need
 from tests.runtime.locks import Lock, LockedRouter
 from tests.runtime.support import ROOT, free_port, hear, spinning, until

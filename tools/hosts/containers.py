@@ -28,7 +28,7 @@ RUN cd /opt/gemelo \\
 
 FROM docker.io/library/debian:12-slim
 RUN apt-get update \\
-    && apt-get install -y --no-install-recommends ca-certificates libgomp1 mosquitto openssl python3 \\
+    && apt-get install -y --no-install-recommends ca-certificates libgomp1 mosquitto python3 \\
     && rm -rf /var/lib/apt/lists/*
 COPY --from=build /opt/gemelo /opt/gemelo
 # Keys and state are this user's alone, and without capabilities root cannot read them either.
