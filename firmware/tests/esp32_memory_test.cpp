@@ -6,6 +6,7 @@
 
 #include "back_off.h"
 #include "factory_button.h"
+#include "feeding.h"
 #include "pose_memory.h"
 #include "topics.h"
 
@@ -145,4 +146,20 @@ TEST(Topics, OnlyTheStatusIsRetained) {
         EXPECT_EQ(topic.is_retained, std::string(topic.name) == "status");
     }
     EXPECT_EQ(said(Output::Text).name, nullptr);
+}
+
+TEST(Feeding, GoesByTheTimeAndNotByTheTurns) {
+    // Turns of 60 ms, as where each writes a sector of a slow flash: by a count of 100 turns it came after 6 s.
+    Feeding feeding;
+    uint64_t fed_us = 0;
+    ASSERT_TRUE(feeding.is_due(0));
+    for (uint64_t now_us = 60000; now_us < 20000000; now_us += 60000) {
+        if (feeding.is_due(now_us)) fed_us = now_us;
+        EXPECT_LT(now_us - fed_us, 200000u);
+    }
+    // And of a millisecond: not with each.
+    uint32_t fed = 0;
+    for (uint64_t now_us = 20000000; now_us < 21000000; now_us += 1000) fed += feeding.is_due(now_us) ? 1 : 0;
+    EXPECT_LE(fed, 11u);
+    EXPECT_GE(fed, 9u);
 }

@@ -111,36 +111,91 @@ TEST(Ring, LosesAndTearsNothingBetweenTwoThreads) {
     EXPECT_EQ(torn, 0u);
 }
 
-TEST(Assembly, PutsPiecesTogether) {
-    Assembly<100> message;
+TEST(Ring, ShowsNothingOfAReservedRecordBeforeItIsCommitted) {
+    Ring<256> ring;
+    Record record;
+    uint8_t* room = ring.reserve(40);
+    ASSERT_NE(room, nullptr);
+    std::memset(room, 7, 40);
+    EXPECT_FALSE(ring.front(&record));
+    ring.commit(3, 1, 99, 40);
+    ASSERT_TRUE(ring.front(&record));
+    EXPECT_EQ(record.size, 40u);
+    EXPECT_EQ(record.kind, 3);
+    EXPECT_EQ(record.time_us, 99u);
+    EXPECT_EQ(std::vector<uint8_t>(record.bytes, record.bytes + 40), std::vector<uint8_t>(40, 7));
+}
+
+TEST(Ring, GivesAReservedPlaceToWhateverIsPushedMeanwhile) {
+    Ring<256> ring;
+    Record record;
+    ASSERT_NE(ring.reserve(100), nullptr);
+    ASSERT_TRUE(ring.push(5, 0, 1, "ab", 2));
+    ASSERT_TRUE(ring.front(&record));
+    EXPECT_EQ(std::memcmp(record.bytes, "ab", 2), 0);
+    ring.pop();
+    EXPECT_FALSE(ring.front(&record));
+}
+
+TEST(Ring, HasNoRoomToReserveForWhatIsTooLong) {
+    Ring<256> ring;
+    EXPECT_EQ(ring.reserve(256 / 2 - 15), nullptr);
+    EXPECT_NE(ring.reserve(256 / 2 - 16), nullptr);
+}
+
+TEST(Assembly, PutsPiecesTogetherInTheRing) {
+    Ring<512> ring;
+    Assembly message;
+    Record record;
     const std::vector<uint8_t> bytes = pattern(9, 100);
-    EXPECT_FALSE(message.add(bytes.data(), 40, 0, 100));
-    EXPECT_FALSE(message.add(bytes.data() + 40, 59, 40, 100));
-    EXPECT_TRUE(message.add(bytes.data() + 99, 1, 99, 100));
-    ASSERT_EQ(message.size(), 100u);
-    EXPECT_EQ(std::memcmp(message.bytes(), bytes.data(), 100), 0);
+    for (int round = 0; round < 40; ++round) {  // over the seam too
+        message.begin(ring.reserve(100), 100);
+        EXPECT_FALSE(message.add(bytes.data(), 40, 0));
+        EXPECT_FALSE(message.add(bytes.data() + 40, 59, 40));
+        EXPECT_TRUE(message.add(bytes.data() + 99, 1, 99));
+        ASSERT_TRUE(message.is_whole());
+        ring.commit(1, 0, 0, message.size());
+        ASSERT_TRUE(ring.front(&record));
+        ASSERT_EQ(std::vector<uint8_t>(record.bytes, record.bytes + record.size), bytes);
+        ring.pop();
+    }
 }
 
-TEST(Assembly, IsNothingWhenAPieceIsMissingTooLongOrOutOfPlace) {
-    Assembly<100> message;
+TEST(Assembly, IsNothingWhenAPieceIsMissingTooLongOrOutOfPlaceOrThereIsNoRoom) {
+    uint8_t room[100];
+    Assembly message;
     const std::vector<uint8_t> bytes = pattern(9, 200);
-    message.add(bytes.data(), 40, 0, 100);
-    EXPECT_TRUE(message.add(bytes.data(), 50, 50, 100));
+    message.begin(room, 100);
+    message.add(bytes.data(), 40, 0);
+    EXPECT_TRUE(message.add(bytes.data(), 50, 50));
+    EXPECT_FALSE(message.is_whole());
+    message.begin(room, 50);
+    EXPECT_TRUE(message.add(bytes.data(), 60, 0));
+    EXPECT_FALSE(message.is_whole());
+    message.begin(room, 100);
+    EXPECT_TRUE(message.add(bytes.data(), 10, 90));
     EXPECT_EQ(message.size(), 0u);
-    EXPECT_TRUE(message.add(bytes.data(), 101, 0, 101));
-    EXPECT_EQ(message.size(), 0u);
-    EXPECT_TRUE(message.add(bytes.data(), 60, 0, 50));
-    EXPECT_EQ(message.size(), 0u);
-    EXPECT_TRUE(message.add(bytes.data(), 10, 90, 100));
+    message.begin(nullptr, 101);
+    EXPECT_TRUE(message.add(bytes.data(), 101, 0));
     EXPECT_EQ(message.size(), 0u);
 }
 
-TEST(Assembly, BeginsAnewAfterAMessageThatWasNothing) {
-    Assembly<100> message;
+TEST(Assembly, BeginsAnewAfterAMessageThatWasNothingOrCutOff) {
+    uint8_t room[100];
+    Assembly message;
     const std::vector<uint8_t> bytes = pattern(4, 100);
-    message.add(bytes.data(), 60, 0, 500);
-    EXPECT_TRUE(message.add(bytes.data(), 100, 0, 100));
+    message.begin(nullptr, 500);
+    message.add(bytes.data(), 60, 0);
+    message.begin(room, 100);
+    message.add(bytes.data(), 60, 0);
+    message.forget();  // the connection was lost
+    EXPECT_TRUE(message.add(bytes.data(), 40, 60));
+    EXPECT_FALSE(message.is_whole());
+    message.begin(room, 100);
+    EXPECT_TRUE(message.add(bytes.data(), 100, 0));
     EXPECT_EQ(message.size(), 100u);
-    EXPECT_TRUE(message.add(bytes.data(), 0, 0, 0));
+    EXPECT_EQ(std::memcmp(message.bytes(), bytes.data(), 100), 0);
+    message.begin(room, 0);
+    EXPECT_TRUE(message.add(bytes.data(), 0, 0));
     EXPECT_EQ(message.size(), 0u);
 }

@@ -14,6 +14,7 @@ from machine_code import Function, functions, reached
 
 from gemelo.firmware.platform.esp32.check_linked import INSIDE, IRAM
 from gemelo.firmware.platform.esp32.check_linked import functions as functions_in
+from gemelo.firmware.platform.esp32.ram import MOST_VARIABLES, measured
 from tests.optional import need
 
 ROOT = Path(__file__).parents[2]
@@ -226,6 +227,22 @@ def test_a_wire_over_the_chips_usb_has_that_socket_for_itself(objects: Path, chi
     driver = (objects / f"{chip}-usb/usb_port.o").read_bytes()
     assert b"usb_serial_jtag_driver_install" in driver
     assert b"uart_driver_install" not in (objects / f"{chip}-usb/uart_port.o").read_bytes()
+
+
+def test_the_ram_of_every_build_is_what_the_readme_says_and_below_its_bound(objects: Path) -> None:
+    need("riscv")
+    found = measured(objects)
+    rows = re.findall(r"^\| (esp32\w*) \| ([\d, |]+) \|$", (FIRMWARE / "README.md").read_text(), re.MULTILINE)
+    said = {chip: [int(value.replace(",", "")) for value in values.split("|")] for chip, values in rows}
+    assert said.keys() == set(CHIPS)
+    for chip, ram in found.items():
+        assert said[chip] == [*ram, ram.together], f"{chip}: run `python -m gemelo.firmware.platform.esp32.ram`"
+        assert ram.variables < MOST_VARIABLES, chip
+
+
+def test_a_wire_and_tls_are_configured_for_little_ram_and_a_flash_that_is_written() -> None:
+    settings = (LAYER / "sdkconfig.defaults").read_text()
+    assert {"CONFIG_UART_ISR_IN_IRAM=y", "CONFIG_MBEDTLS_DYNAMIC_BUFFER=y"} <= set(settings.splitlines())
 
 
 def test_the_partitions_do_not_overlap_and_fit_the_flash() -> None:

@@ -5,15 +5,19 @@ The rv32imc figures are those of firmware/tests/rv32/run, which compiles and run
 
 from __future__ import annotations
 
+import shutil
 import struct
 import subprocess
+import tempfile
 import time
 import zlib
 from functools import cache
+from pathlib import Path
 
 import msgspec
 
 from gemelo.firmware.bindings.device import CoreDevice
+from gemelo.firmware.platform.esp32 import ram
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.serial_frames import packet
 from gemelo.schemas.device_config import DeviceConfig, JointConfig
@@ -87,6 +91,24 @@ def core_text_bytes() -> Figure:
 def core_ram_bytes() -> Figure:
     """Memory of the firmware core [bytes]."""
     return size("core_ram_bytes", 7250.0, "rv32imc, 6 joints, 128 knots; without the stack")
+
+
+def device_static_ram() -> Figure:
+    """Variables of the board's firmware [bytes], the largest of all builds; those of each chip are references."""
+    if shutil.which(ram.SIZE) is None:
+        raise NotMeasured(ram.MISSING)
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([ram.LAYER / "check", folder], capture_output=True, check=True)
+        found = ram.measured(Path(folder))
+    worst = max(found.values())
+    return Figure(
+        median=worst.variables,
+        p99=worst.variables,
+        goal=f"< {ram.MOST_VARIABLES}",
+        met=worst.variables < ram.MOST_VARIABLES,
+        reference={chip: float(one.variables) for chip, one in found.items()},
+        note=f"compiled for rv32imc; {worst.together - worst.variables} more of the heap: stacks, UART and MQTT",
+    )
 
 
 JOINTS, KNOTS = 6, 20

@@ -99,6 +99,7 @@ FIGURES = {
     "slot_instructions": FigureRow("firmware_cost:slot_instructions", "instr"),
     "core_text_bytes": FigureRow("firmware_cost:core_text_bytes", "bytes"),
     "core_ram_bytes": FigureRow("firmware_cost:core_ram_bytes", "bytes"),
+    "device_static_ram": FigureRow("firmware_cost:device_static_ram", "bytes"),
     "stack_idle_cpu_percent": FigureRow("stack:stack_idle_cpu_percent", "% of one core", True),
     "stack_rss_mb": FigureRow("stack:stack_rss_mb", "MB per process", True),
     "state_to_frame_ms": FigureRow("frames:state_to_frame_ms", "ms", True),

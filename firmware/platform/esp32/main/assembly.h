@@ -1,4 +1,4 @@
-// A message that arrives in pieces, put together; one that is too long or has a hole is nothing.
+// A message that arrives in pieces, put together where it is to lie; one without room, or with a hole, is nothing.
 #pragma once
 
 #include <stddef.h>
@@ -7,24 +7,31 @@
 
 namespace gemelo {
 
-template <size_t kCapacity>
 class Assembly {
   public:
-    // True with the last piece. `offset` is this piece's place in a message of `total` bytes.
-    bool add(const void* bytes, size_t size, size_t offset, size_t total) {
-        if (offset == 0) received_ = 0, is_whole_ = total <= kCapacity;
-        is_whole_ = is_whole_ && offset == received_ && size <= total - offset && total <= kCapacity;
-        if (is_whole_ && size != 0) memcpy(bytes_ + offset, bytes, size);
-        received_ = offset + size;
-        return received_ >= total;
+    // A message of `total` bytes begins, for which there is room at `place`; nullptr: there is none.
+    void begin(uint8_t* place, size_t total) {
+        place_ = place;
+        total_ = total;
+        received_ = 0;
     }
-    const uint8_t* bytes() const { return bytes_; }
-    size_t size() const { return is_whole_ ? received_ : 0; }
+    // What has arrived is no part of any message.
+    void forget() { place_ = nullptr; }
+    // True with the last piece, which lies at `offset` in the message.
+    bool add(const void* bytes, size_t size, size_t offset) {
+        if (offset != received_ || offset > total_ || size > total_ - offset) forget();
+        if (place_ != nullptr && size != 0) memcpy(place_ + offset, bytes, size);
+        received_ = offset + size;
+        return received_ >= total_;
+    }
+    bool is_whole() const { return place_ != nullptr && received_ == total_; }
+    const uint8_t* bytes() const { return place_; }
+    size_t size() const { return is_whole() ? total_ : 0; }
 
   private:
-    uint8_t bytes_[kCapacity];
+    uint8_t* place_ = nullptr;
+    size_t total_ = 0;
     size_t received_ = 0;
-    bool is_whole_ = false;
 };
 
 }  // namespace gemelo

@@ -21,7 +21,8 @@ constexpr uint8_t kRetained = 1;
 
 // Records to the network and to the wire have their Output as kind; the wire's bytes are ready to be sent.
 struct Board {
-    Ring<20480> from_mqtt;  // written in esp-mqtt's task
+    // Written in esp-mqtt's task. Twice the longest message: a chunk has up to 8,228 bytes, a configuration 8,220.
+    Ring<16640> from_mqtt;
     Ring<8192> from_wire;
     Ring<1024> from_sensors;
     Ring<8192> to_mqtt;

@@ -20,7 +20,6 @@ namespace {
 
 constexpr uint32_t kLongestWaitMs = 2;    // where no tick runs, for want of a configuration
 constexpr uint64_t kInboxBudgetUs = 400;  // of a slot, so that a flood of frames cannot starve the steps
-constexpr uint32_t kSlotsPerFeeding = 100;
 
 RTC_NOINIT_ATTR PoseMemory pose_memory;
 
@@ -38,8 +37,8 @@ void Device::begin(const Credentials& credentials, uint32_t boot_id) {
 // What is in the flash was taken once; with another firmware or on another board it may not be good any more.
 void Device::load_config() {
     Refusal refusal;
-    const size_t size = gemelo::load_config(text_, sizeof text_);
-    const bool is_good = size != 0 && parse_config(text_, size, &config_, &refusal) &&
+    const size_t size = gemelo::load_config(scratch_.text, sizeof scratch_.text);
+    const bool is_good = size != 0 && parse_config(scratch_.text, size, &config_, &refusal) &&
                          find_board_fault(config_, kThisChip).sentence == nullptr;
     if (!is_good) config_ = DeviceConfig{};
 }
@@ -57,7 +56,8 @@ void Device::run() {
         if (machine_.subscribes_anew(clock_us())) __atomic_add_fetch(&board.silences, 1, __ATOMIC_RELAXED);
         provisioning_.restart_if_due(machine_, clock_us());
         ota_.turn(machine_, clock_us());
-        if (slots_++ % kSlotsPerFeeding == 0) esp_task_wdt_reset();
+        is_awake_ = true;
+        if (feeding_.is_due(clock_us())) esp_task_wdt_reset();
     }
 }
 
@@ -145,7 +145,7 @@ void Device::remember() {
     pose.is_referenced = machine_.is_referenced();
     pose.is_moving = machine_.is_moving();
     for (uint8_t j = 0; !pose.is_moving && j < config_.joints; ++j) pose.steps[j] = machine_.stepper().executed(j);
-    if (pose == kept_ && slots_ != 0) return;
+    if (pose == kept_ && is_awake_) return;
     kept_ = pose;
     pose_memory.keep(pose);
 }
@@ -153,7 +153,7 @@ void Device::remember() {
 // The flash stalls both cores for as long as it is written, so only this task, which alone can begin a motion, writes.
 void Device::keep_config() {
     if (text_size_ == 0 || !machine_.keeps_still()) return;
-    save_config(text_, text_size_);  // where it fails the gateway sends it again after the next start
+    save_config(scratch_.text, text_size_);  // where it fails the gateway sends it again after the next start
     text_size_ = 0;
 }
 

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "config_text.h"
+#include "feeding.h"
 #include "freertos/FreeRTOS.h"
 #include "freertos/task.h"
 #include "machine.h"
@@ -58,9 +59,15 @@ class Device {
     uint32_t boot_id_ = 0;
     char reset_cause_[40] = "";
     Pose kept_{};
-    uint32_t slots_ = 0;
+    bool is_awake_ = false;  // the first slot is over
+    Feeding feeding_;
     size_t text_size_ = 0;  // of a configuration that is to be written
-    char text_[kMaxConfigText];
+    // One room for what is to be written into the flash: it is never both.
+    union Scratch {
+        constexpr Scratch() : text{} {}
+        char text[kMaxConfigText];
+        Credentials proposed;
+    } scratch_;
 };
 
 }  // namespace gemelo

@@ -28,8 +28,8 @@ void Device::put(void* self, Output output, const uint8_t* bytes, size_t size) {
 
 void Device::keep(void* self, const uint8_t* text, size_t size) {
     Device& device = *static_cast<Device*>(self);
-    if (size > sizeof device.text_) return;
-    memcpy(device.text_, text, size);
+    if (size > sizeof device.scratch_.text) return;
+    memcpy(device.scratch_.text, text, size);
     device.text_size_ = size;
 }
 
@@ -37,8 +37,9 @@ ConfigFault Device::check(void*, const DeviceConfig& config) { return find_board
 
 void Device::other(void* self, FrameType type, const uint8_t* text, size_t size) {
     Device& device = *static_cast<Device*>(self);
-    if (type == FrameType::Provision)
-        device.provisioning_.receive(text, size, device.machine_, static_cast<uint64_t>(esp_timer_get_time()));
+    if (type != FrameType::Provision) return;
+    Credentials* room = device.text_size_ == 0 ? &device.scratch_.proposed : nullptr;
+    device.provisioning_.receive(text, size, device.machine_, room, static_cast<uint64_t>(esp_timer_get_time()));
 }
 
 void Device::warn() {

@@ -99,6 +99,7 @@ void Mqtt::connected() {
     send_at_once(transport_);
     __atomic_store_n(&is_connected_, true, __ATOMIC_RELEASE);
     subscribe_by(heard_);
+    message_.forget();  // the rest of it was lost with the connection, and its place is taken now
     board.from_mqtt.push(static_cast<uint8_t>(Inbound::Connected), 0, 0, nullptr, 0);
 }
 
@@ -116,10 +117,11 @@ void Mqtt::receive(const esp_mqtt_event_t& event) {
         topic_ = heard_.find(event.topic, static_cast<size_t>(event.topic_len));
         is_retained_ = event.retain;
         received_us_ = static_cast<uint64_t>(esp_timer_get_time());
+        const size_t total = static_cast<size_t>(event.total_data_len);
+        message_.begin(board.from_mqtt.reserve(total), total);
     }
     const bool is_last =
-        message_.add(event.data, static_cast<size_t>(event.data_len), static_cast<size_t>(event.current_data_offset),
-                     static_cast<size_t>(event.total_data_len));
+        message_.add(event.data, static_cast<size_t>(event.data_len), static_cast<size_t>(event.current_data_offset));
     if (is_last && topic_ != nullptr) deliver();
 }
 
@@ -128,8 +130,12 @@ void Mqtt::deliver() {
     const bool is_config = topic_->type == FrameType::Config;
     const bool fits = is_config || (message_.size() > 2 && message_.bytes()[2] == static_cast<uint8_t>(topic_->type));
     const Inbound kind = is_config ? Inbound::Config : Inbound::Frame;
-    board.from_mqtt.push(static_cast<uint8_t>(kind), is_retained_ ? kRetained : 0, received_us_, message_.bytes(),
-                         fits ? message_.size() : 0);
+    const uint8_t flags = is_retained_ ? kRetained : 0;
+    if (fits && message_.is_whole())
+        board.from_mqtt.commit(static_cast<uint8_t>(kind), flags, received_us_, message_.size());
+    else
+        board.from_mqtt.push(static_cast<uint8_t>(kind), flags, received_us_, nullptr, 0);
+    message_.forget();
 }
 
 }  // namespace gemelo

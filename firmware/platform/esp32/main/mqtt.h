@@ -35,9 +35,6 @@ class Mqtt {
     void deliver();
 
     char client_id_[sizeof kClientIdPrefix + sizeof Credentials::device + 1 + kRandomDigits] = {};
-    // The largest chunk has 8,228 bytes, the longest configuration 8,220.
-    static constexpr size_t kLargest = 8240;
-
     esp_mqtt_client_handle_t client_ = nullptr;
     esp_transport_handle_t transport_ = nullptr;
     bool is_connected_ = false;
@@ -46,7 +43,7 @@ class Mqtt {
     const Heard* topic_ = nullptr;
     bool is_retained_ = false;
     uint64_t received_us_ = 0;
-    Assembly<kLargest> message_;
+    Assembly message_;  // in the board's ring
 };
 
 }  // namespace gemelo

@@ -42,7 +42,10 @@ void Ota::begin(const Credentials& credentials, uint64_t now_us) {
 
 void Ota::turn(const Machine& machine, uint64_t now_us) {
     // Whom nobody has heard, nobody has moved.
-    if (is_on_trial_ && !is_said_ && now_us >= begun_us_ + kTrialUs) esp_ota_mark_app_invalid_rollback_and_reboot();
+    if (is_on_trial_ && !is_said_ && now_us >= begun_us_ + kTrialUs) {
+        is_on_trial_ = false;
+        esp_ota_mark_app_invalid_rollback_and_reboot();  // returns where there is no other: then this one goes on
+    }
     if (!machine.keeps_still()) return;
     if (is_on_trial_ && is_said_) {
         esp_ota_mark_app_valid_cancel_rollback();  // where it fails, the next start is of the firmware before

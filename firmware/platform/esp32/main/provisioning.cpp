@@ -12,13 +12,15 @@ constexpr uint64_t kUntilSaidUs = 300000;  // for the answer to leave the wire
 
 }  // namespace
 
-void Provisioning::receive(const uint8_t* text, size_t size, const Machine& machine, uint64_t now_us) {
+void Provisioning::receive(const uint8_t* text, size_t size, const Machine& machine, Credentials* proposed,
+                           uint64_t now_us) {
     if (!machine.keeps_still()) return answer(false, "the arm is moving: stop it first");
+    if (proposed == nullptr) return answer(false, "a configuration is being written: send it again");
     Refusal refusal;
-    proposed_ = *credentials_;
-    if (!parse_provision(reinterpret_cast<const char*>(text), size, &proposed_, &refusal))
+    *proposed = *credentials_;
+    if (!parse_provision(reinterpret_cast<const char*>(text), size, proposed, &refusal))
         return answer(false, refusal.reason);
-    const bool is_kept = proposed_.is_factory_reset ? forget_all() : save_credentials(proposed_);
+    const bool is_kept = proposed->is_factory_reset ? forget_all() : save_credentials(*proposed);
     if (is_kept) restart_us_ = now_us + kUntilSaidUs;
     answer(is_kept, is_kept ? "" : "the flash memory cannot be written");
 }

@@ -24,18 +24,34 @@ class Ring {
   public:
     // False if it does not fit now; nothing is kept then.
     bool push(uint8_t kind, uint8_t flags, uint64_t time_us, const void* bytes, size_t size) {
-        if (size > kCapacity / 2 - kGrain) return false;
+        uint8_t* room = reserve(size);
+        if (room == nullptr) return false;
+        if (bytes != nullptr && size != 0) memcpy(room, bytes, size);
+        commit(kind, flags, time_us, size);
+        return true;
+    }
+
+    // Where the writer may put `size` bytes piece by piece until commit(); nullptr if they do not fit now. The reader
+    // sees nothing of them before that, and whatever is pushed or reserved meanwhile takes the same place.
+    uint8_t* reserve(size_t size) {
+        if (size > kCapacity / 2 - kGrain) return nullptr;
         const uint32_t need = space_for(size);
         const uint32_t tail = __atomic_load_n(&tail_, __ATOMIC_ACQUIRE);
         uint32_t at = head_;
         if (!has_room(at, tail, need)) {
-            if (at < tail || at >= kGrains || need >= tail) return false;
-            write(at, Header{0, kSeam, 0, 0, 0}, nullptr);
+            if (at < tail || at >= kGrains || need >= tail) return nullptr;
+            write(at, Header{0, kSeam, 0, 0, 0});
             at = 0;
         }
-        write(at, Header{time_us, static_cast<uint32_t>(size), kind, flags, 0}, bytes);
-        __atomic_store_n(&head_, at + need == kGrains ? 0 : at + need, __ATOMIC_RELEASE);
-        return true;
+        reserved_ = at;
+        return place(at) + kGrain;
+    }
+
+    // Gives the reader what was reserved last: its first `size` bytes, no more than were reserved.
+    void commit(uint8_t kind, uint8_t flags, uint64_t time_us, size_t size) {
+        const uint32_t next = reserved_ + space_for(size);
+        write(reserved_, Header{time_us, static_cast<uint32_t>(size), kind, flags, 0});
+        __atomic_store_n(&head_, next == kGrains ? 0 : next, __ATOMIC_RELEASE);
     }
 
     // The oldest record; false for none.
@@ -77,10 +93,7 @@ class Ring {
         if (at < tail) return need < tail - at;
         return need < kGrains - at || (need == kGrains - at && tail != 0);
     }
-    void write(uint32_t at, const Header& header, const void* bytes) {
-        memcpy(place(at), &header, sizeof header);
-        if (bytes != nullptr && header.size != 0) memcpy(place(at) + kGrain, bytes, header.size);
-    }
+    void write(uint32_t at, const Header& header) { memcpy(place(at), &header, sizeof header); }
     Header read(uint32_t at) const {
         Header header;
         memcpy(&header, bytes_ + at * kGrain, sizeof header);
@@ -89,8 +102,9 @@ class Ring {
     uint8_t* place(uint32_t at) { return bytes_ + at * kGrain; }
 
     alignas(8) uint8_t bytes_[kCapacity];
-    uint32_t head_ = 0;  // stored by the writer only
-    uint32_t tail_ = 0;  // stored by the reader only
+    uint32_t head_ = 0;      // stored by the writer only
+    uint32_t reserved_ = 0;  // the writer's own
+    uint32_t tail_ = 0;      // stored by the reader only
 };
 
 }  // namespace gemelo
