@@ -74,6 +74,7 @@ format: setup ## let ruff, clang-format and gofmt write
 	@! command -v gofmt >/dev/null || gofmt -w services
 
 docs: setup ## these pages as a site with a search, in English and Spanish: out/site/index.html
+	@$(bin)/python docs/make_planners.py
 	@deploy/docs
 
 picture: setup ## docs/move.gif anew: one move on the page, as Chromium draws it

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from gemelo.api.units import Pose, deg, mm
     from gemelo.api.verification import Verification
     from gemelo.libraries.runtime.node import Node
-    from gemelo.schemas import topics
+    from gemelo.schemas import planners, topics
     from gemelo.schemas.actions import GoalStatusCode
     from gemelo.schemas.device import DeviceMode, StopKind
 
@@ -84,6 +84,7 @@ __all__ = [
     "load_mesh",
     "load_robot",
     "mm",
+    "planners",
     "robots",
     "simulate",
     "topics",
@@ -114,6 +115,7 @@ MODULES = {
     "gemelo.schemas.device": ("DeviceMode", "StopKind"),
     "gemelo.libraries.runtime.node": ("Node",),
 }
+TABLES = ("planners", "topics")  # modules of the schemas, whole
 _MODULE_OF = {name: module for module, names in MODULES.items() for name in names}
 
 
@@ -121,8 +123,8 @@ def __getattr__(name: str) -> object:
     """The public name, from its module (PEP 562)."""
     if name in _MODULE_OF:
         value: object = getattr(import_module(_MODULE_OF[name]), name)
-    elif name == "topics":
-        value = import_module("gemelo.schemas.topics")
+    elif name in TABLES:
+        value = import_module(f"gemelo.schemas.{name}")
     else:
         raise AttributeError(f"module 'gemelo' has no attribute {name!r}")
     globals()[name] = value

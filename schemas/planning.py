@@ -53,7 +53,7 @@ MOST_ATTEMPTS = 1000
 class FreeMotion(Message, frozen=True, kw_only=True, tag="free"):
     """Any way that touches nothing."""
 
-    planner_id: str = ""  # "": the default; "RRTConnect", "RRTstar", "BITstar", "PRM", "native"
+    planner_id: str = ""  # a name of `planners.PLANNERS`; "": the default
     seed: int = 0  # the same seed, the same plan
     attempts: int = 1  # to 1000: as many times as usual is looked for a shorter way, by the native planner
 

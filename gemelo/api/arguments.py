@@ -47,7 +47,7 @@ class Target(ToolGoal, total=False):
     least_fraction: float  # of a line or an arc that will do, in (0, 1]
     max_step: float  # [m] between two checked points of a line or an arc
     jump: float  # [rad] or [m] that a joint may move between them
-    planner: str  # "native", "RRTConnect", "RRTstar", "BITstar" or "PRM"
+    planner: str  # one of `gemelo.planners.NAMES`; docs/planners.md says what each can do
     seed: int  # the same seed, the same plan
     attempts: int  # 1 to 1000: as many times as usual is looked for a shorter way, within `allowed_time`
     time_optimal: bool  # as fast as can be, without a limit of the jerk

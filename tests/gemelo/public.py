@@ -8,7 +8,8 @@ from types import ModuleType
 
 import gemelo
 
-SCHEMAS = {"DeviceMode", "GoalStatusCode", "Node", "StopKind", "topics"}  # not of this package: told of elsewhere
+# Not of this package: told of elsewhere.
+SCHEMAS = {"DeviceMode", "GoalStatusCode", "Node", "StopKind", "planners", "topics"}
 TABLES = {"Target", "ToolGoal"}  # arguments: their fields are told of by comments, and used by every example
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 from pathlib import Path
 
 import pytest
@@ -19,3 +20,8 @@ def test_the_script_of_the_page_runs(
     printed = capsys.readouterr().out
     assert "refused (reach)" in printed
     assert "nearest that can: position=(0.4" in printed
+
+
+def test_the_pages_of_the_planners_are_those_of_their_table(root: Path) -> None:
+    for file, text in runpy.run_path(str(root / "docs/make_planners.py"))["pages"]().items():
+        assert file.read_text(encoding="utf-8") == text, "run `make docs`"

@@ -7,6 +7,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from gemelo.schemas.frames import Transform
+from gemelo.schemas.planners import NAMES
 from gemelo.schemas.planning import (
     CircularMotion,
     FreeMotion,
@@ -24,7 +25,6 @@ from gemelo.schemas.planning import (
 from gemelo.schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, Shape, SphereShape
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.kinematics.task_space import task_space
-from gemelo.services.planner.path.search import KNOWN
 from tests.planner.independent import Judge
 from tests.planner.judging import asked, configuration_at, joints, quaternion_of
 
@@ -43,7 +43,7 @@ WAYS = even(3, -1.0, 1.0).filter(lambda way: np.linalg.norm(way) > 0.1)
 QUATERNIONS = even(4, -1.0, 1.0).filter(lambda q: np.linalg.norm(q) > 0.1)
 SCALINGS = st.one_of(st.just(1.0), st.floats(0.05, 1.0))
 SIZES = even(3, 0.01, 0.12)  # [m]
-FREE = st.builds(FreeMotion, planner_id=st.sampled_from(("", *KNOWN)), seed=st.integers(0, 2**31))
+FREE = st.builds(FreeMotion, planner_id=st.sampled_from(("", *NAMES)), seed=st.integers(0, 2**31))
 SHAPES = st.one_of(
     SIZES.map(lambda sizes: BoxShape(size=sizes)),
     SIZES.map(lambda sizes: SphereShape(radius=0.5 * sizes[0])),

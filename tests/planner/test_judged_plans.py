@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.schemas.planners import NAMES
 from gemelo.schemas.planning import (
     CircularMotion,
     FkRequest,
@@ -31,7 +32,6 @@ from gemelo.schemas.scene import PlanningScene
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.kinematics.kinematic_requests import KinematicRequests
-from gemelo.services.planner.path.search import KNOWN
 from tests.planner.drawn_requests import INNER, cases, pose_goals, tool_cases
 from tests.planner.independent import Array, Judge, Motion
 from tests.planner.judging import (
@@ -87,7 +87,7 @@ def test_no_plan_of_the_joints_touches_anything_or_breaks_a_limit(name: str):
 
     check()
     assert outcomes["straight"] >= count(quick=3, full=10), outcomes
-    assert sum(outcomes[searched] for searched in KNOWN) >= count(quick=1, full=3), outcomes
+    assert sum(outcomes[searched] for searched in NAMES) >= count(quick=1, full=3), outcomes
 
 
 @pytest.mark.scaled

@@ -16,6 +16,7 @@ import pytest
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
+from gemelo.schemas.planners import NAMES
 from gemelo.schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, Timing
 from gemelo.schemas.scene import MeshShape, PlanningScene, SceneObject
 from gemelo.services.planner.collision.clearance import CLEARANCE
@@ -25,7 +26,7 @@ from gemelo.services.planner.core import Planner
 from gemelo.services.planner.path.curve import spline_rows
 from gemelo.services.planner.path.path import Path as JointPath
 from gemelo.services.planner.path.path import PathNotFound
-from gemelo.services.planner.path.search import KNOWN, Search
+from gemelo.services.planner.path.search import Search
 from gemelo.services.planner.request.deadline import Deadline, Stopwatch
 from gemelo.services.planner.timing.profile import joint_limits
 from gemelo.services.planner.timing.toppra_speeds import load_toppra
@@ -98,7 +99,7 @@ def require_sound(planner: Planner, request: PlanRequest, response: PlanResponse
     assert min(truth.distance(row) for row in rows) > 0.0
 
 
-@pytest.mark.parametrize("planner_id", ["", *KNOWN])
+@pytest.mark.parametrize("planner_id", ["", *NAMES])
 def test_a_box_between_start_and_goal_is_gone_around_the_same_way_every_time(planner: Planner, planner_id: str):
     request = between(planner)
     straight = planner.plan(asked(planner, request.start.position, request.goal.position, motion=PointToPoint()), None)
@@ -115,7 +116,7 @@ def test_a_box_between_start_and_goal_is_gone_around_the_same_way_every_time(pla
     assert len(first.margins) == len(planner.arm.joints)
 
 
-@pytest.mark.parametrize("planner_id", ["", *KNOWN])
+@pytest.mark.parametrize("planner_id", ["", *NAMES])
 def test_joints_that_turn_beyond_half_a_turn_are_searched_there_too(planner_id: str):
     """joint_3 of parol6 goes up to 288 degrees, and joint_6 from 0 to 360."""
     planner = planner_of("parol6")
@@ -128,7 +129,7 @@ def test_joints_that_turn_beyond_half_a_turn_are_searched_there_too(planner_id: 
     assert response.planner_id != "straight"
 
 
-@pytest.mark.parametrize("planner_id", ["", *KNOWN])
+@pytest.mark.parametrize("planner_id", ["", *NAMES])
 @pytest.mark.parametrize("seed", [-1, -(2**63), 2**63 - 1, 2**64 - 1])
 def test_any_seed_will_do(planner_id: str, seed: int):
     planner = planner_of("rm1")

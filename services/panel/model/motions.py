@@ -13,7 +13,6 @@ from gemelo.services.panel.model.problems import Problem, problem_of
 AFTER_STOP = 0.7  # [s] chosen: a press that the same finger makes with Stop starts nothing
 ALLOWED_TIME = 5.0  # [s] for planning
 PATIENCE = 2.0 * ALLOWED_TIME  # [s] for a plan that is being made
-PLANNERS = ("", "native", "RRTConnect", "RRTstar", "BITstar", "PRM")
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,7 @@ class MotionChoice:
 
     line: bool = False  # the tool on a straight line; else any way that is free
     speed: float = 1.0  # share of the limits, in (0, 1]
-    planner: str = ""  # of PLANNERS; empty: the default
+    planner: str = ""  # a name of gemelo.schemas.planners; empty: the default
 
     def target(self, joints: dict[str, float]) -> gemelo.Target:
         """To these joint values, [rad] or [m]."""

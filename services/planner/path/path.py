@@ -1,4 +1,4 @@
-"""The result of a search: a collision-free joint path, or the reason why none was found."""
+"""The question of a search and its result: a collision-free joint path, or the reason why none was found."""
 
 from __future__ import annotations
 
@@ -7,12 +7,27 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.services.planner.path.validity import ValidityChecker
+from gemelo.services.planner.request.deadline import Stopwatch
 from gemelo.services.planner.request.refusals import SearchFailure
 
 Array = NDArray[np.float64]
 Start = tuple[float, ...]
 
 STRAIGHT = "straight"  # the planner_id of joint lines, which no search is needed for
+
+
+class Sought(NamedTuple):
+    """What all searches are asked: a path from `start` (n,) to one of `goals` (m, n), [rad] or [m]."""
+
+    arm: ArmDescription
+    start: Array
+    goals: Array
+    validity: ValidityChecker
+    seed: int
+    attempts: int
+    watch: Stopwatch
 
 
 class PathNotFound(Exception):

@@ -19,11 +19,11 @@ from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.collision.checker import CollisionChecker
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.native.paths import NoPath
-from gemelo.services.planner.path.ompl_search import ompl_corners
-from gemelo.services.planner.path.path import PathNotFound
+from gemelo.services.planner.path.path import PathNotFound, Sought
+from gemelo.services.planner.path.search import sampled_corners
 from gemelo.services.planner.path.smoothing import shorten
 from gemelo.services.planner.path.validity import ValidityChecker
-from gemelo.services.planner.request.deadline import Deadline
+from gemelo.services.planner.request.deadline import Deadline, Stopwatch, endless
 from gemelo.tools.bench.problems.problem_sets import path_length
 
 if TYPE_CHECKING:
@@ -109,7 +109,8 @@ def _by_ompl(
     for name, seed in runs:
         deadline = Deadline(time.perf_counter, PATIENCE, time.perf_counter())
         try:
-            rows = ompl_corners(arm, name, start, goals, validity, seed, deadline)
+            sought = Sought(arm, start, goals, validity, seed, 1, Stopwatch(endless))
+            rows = sampled_corners(sought, name, deadline)
         except PathNotFound:
             continue
         found.append((shorten(rows, validity, seed, deadline), name))

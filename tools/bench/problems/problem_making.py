@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.planners import NATIVE
 from gemelo.services.planner.collision.checker import CollisionChecker
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.kinematics.goals import Goals
-from gemelo.services.planner.path.native_search import NATIVE
 from gemelo.services.planner.path.path import PathNotFound
 from gemelo.services.planner.path.search import Search
 from gemelo.services.planner.path.validity import ValidityChecker

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 import gemelo
 from gemelo.api.targets import usual_time
+from gemelo.schemas.planners import NAMES
 from gemelo.schemas.planning import PlanProgress, PlanRequest
 from gemelo.tools.cli.bus.request_text import refusal_error, request_text
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
@@ -102,7 +103,7 @@ def _motion_options(group: Group) -> None:
     jump = "that a joint may turn between them, as 30deg; a sliding one as many metres as radians"
     group.add_argument("--jump", type=angle, metavar="ANGLE", help=jump)
     group.add_argument("--time-optimal", action="store_true", help="as fast as can be, without a limit of the jerk")
-    group.add_argument("--planner", metavar="ID", help="native, RRTConnect, RRTstar, BITstar or PRM")
+    group.add_argument("--planner", metavar="ID", help=f"{', '.join(NAMES)} (docs/planners.md says what each can do)")
     group.add_argument("--seed", type=int, help="the same seed, the same plan")
     attempts = "as many times as usual is looked for a shorter way, up to 1000, within --time"
     group.add_argument("--attempts", type=int, metavar="N", help=attempts)
@@ -130,6 +131,7 @@ def choices(robot: Robot | None) -> Choices:
     return {
         "--named": robot.description.state_names,
         "--joints": [f"{joint.name}=" for joint in robot.description.joints],
+        "--planner": NAMES,
     }
 
 

@@ -8,7 +8,8 @@ import viser
 
 import gemelo
 from gemelo.libraries.arm.model.description import Joint
-from gemelo.services.panel.model.motions import PLANNERS, MotionChoice
+from gemelo.schemas.planners import NAMES, PLANNERS
+from gemelo.services.panel.model.motions import MotionChoice
 from gemelo.services.panel.model.readings import Readings
 from gemelo.services.panel.model.units import SHOWN, STEP, meant, slider_range, slider_value, text_of
 from gemelo.services.panel.view.kit import OWN_CHANGE, Kit, Mirror, box, esc, note, set_if_new, table
@@ -104,11 +105,12 @@ class MoveTab:
         kinds = (words("free_motion"), words("line_motion"))
         kind = gui.add_dropdown(words("path_kind"), kinds)
         speed = gui.add_slider(words("speed_share"), 1, 100, 1, round(100 * self._operator.choice.speed))
-        planner = gui.add_dropdown(words("planner"), (words("default"), *PLANNERS[1:]))
+        hint = "; ".join(f"{row.name}: {row.text_in(words.language)}" for row in PLANNERS)
+        self.planner = planner = gui.add_dropdown(words("planner"), (words("default"), *NAMES), hint=hint)
 
         def choose(event: viser.GuiEvent[viser.GuiInputHandle[object]]) -> None:
             if event.client_id is not None:
-                chosen = planner.value if planner.value in PLANNERS else ""
+                chosen = planner.value if planner.value in NAMES else ""
                 self._operator.choice = MotionChoice(kind.value == kinds[1], speed.value / 100.0, chosen)
 
         for handle in (kind, speed, planner):

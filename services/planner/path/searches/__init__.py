@@ -1,0 +1,1 @@
+"""The searches of `gemelo.schemas.planners`, each a module with `corners` as `services.planner.path.search` asks it."""
