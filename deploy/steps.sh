@@ -17,7 +17,7 @@ say() { if [ -n "$current" ]; then tell say "$*"; else printf '%s\n' "$*"; fi; }
 # fail WHAT REMEDY...: keeps what is wrong and every remedy, and ends this lane; outside of one says them and ends all.
 fail() {
     local text
-    text=$(printf '%sbootstrap: %s%s\n' "$red" "$1" "$plain" && shift && printf '  remedy: %s\n' "$@")
+    text=$(printf '%s%s: %s%s\n' "$red" "${program:-bootstrap}" "$1" "$plain" && shift && printf '  remedy: %s\n' "$@")
     if [ -n "$current" ]; then printf '%s\n' "$text" >"$failures/$current"; else printf '%s\n' "$text" >&2; fi
     exit 1
 }
