@@ -27,6 +27,7 @@ from gemelo.schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
 from gemelo.services.planner.cartesian.tool_motions import ToolMotions
 from gemelo.services.planner.collision.checker import CollisionChecker
 from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.kinematics.descent import tool_position
 from gemelo.services.planner.kinematics.goals import Goals
 from gemelo.services.planner.path.path import STRAIGHT, PathNotFound, Start
 from gemelo.services.planner.path.search import Search, require_known
@@ -71,6 +72,7 @@ class Planner:
         self.kinematics = kinematics or Kinematics(arm)
         self.checker = CollisionChecker(World(arm, self.kinematics))
         self._goals = Goals(arm, self.kinematics, self.checker)
+        self._tool_position = tool_position(arm, self.kinematics)
         self._collision_refusals = CollisionRefusals(arm, self._goals, self.checker)
         self._tool_motions = ToolMotions(arm, self.kinematics, self._goals, self.checker)
         self._search = Search(arm, self.checker)
@@ -125,7 +127,7 @@ class Planner:
         return PlannedPath(
             stamp=stamp,
             frame=self.arm.base_frame,
-            points=tuple(self._goals.tool_position(row.positions) for row in shown),
+            points=tuple(self._tool_position(row.positions) for row in shown),
             name=trajectory.joint_names,
             positions=tuple(row.positions for row in shown),
             times=tuple(row.time_from_start for row in shown),
@@ -158,7 +160,7 @@ class Planner:
             code=PlanCode.SUCCESS,
             trajectory=finished.trajectory,
             duration=finished.trajectory.points[-1].time_from_start,
-            tool_goal=self._goals.tool_position(finished.trajectory.points[-1].positions),
+            tool_goal=self._tool_position(finished.trajectory.points[-1].positions),
             margins=finished.margins,
             slowed=finished.slowed,
             planner_id=planner_id,

@@ -8,13 +8,13 @@ somewhere, and everything where they are not built.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.kinematics.kinematics import Kinematics, Positions
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, ToolTarget
 from gemelo.services.planner.native import compiled
@@ -23,6 +23,7 @@ from gemelo.services.planner.native.compiled import where_built
 Array = NDArray[np.float64]
 Residual = Callable[[Array], tuple[Array, Array]]  # what is missing at a configuration, and how the joints change that
 Test = Callable[[Array], bool]
+ToolPosition = Callable[[Positions], tuple[float, float, float]]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 ITERATIONS = 40  # chosen: a start that has not come down by then mostly never does
@@ -44,6 +45,22 @@ def _native_descent(arm: ArmDescription) -> compiled.NativeDescent | None:
     return compiled.NativeDescent(arm)
 
 
+def tool_position_in_python(_arm: ArmDescription, kinematics: Kinematics) -> ToolPosition:
+    """By pinocchio: [m] in the base frame, from joint values (n,) [rad] or [m]."""
+
+    def position_of(positions: Positions) -> tuple[float, float, float]:
+        x, y, z = kinematics.tool(positions).position.tolist()
+        return x, y, z
+
+    return position_of
+
+
+@where_built(tool_position_in_python)
+def tool_position(arm: ArmDescription, kinematics: Kinematics) -> ToolPosition:
+    """Where the tool is, of one arm: [m] in the base frame, from joint values (n,) [rad] or [m]."""
+    return compiled.NativeDescent(arm).tool_position
+
+
 class Descent:
     """Descends for one arm; in Python alone where `is_plain`, as where the core is not built."""
 
@@ -53,13 +70,6 @@ class Descent:
         self._upper = np.array([joint.upper for joint in arm.joints])
         self._identity = np.eye(len(arm.joints))
         self._native = None if is_plain else _native_descent(arm)
-
-    def tool_position(self, positions: Sequence[float] | Array) -> tuple[float, float, float]:
-        """[m] where the tool is in the base at joint values (n,) [rad] or [m]."""
-        if self._native is not None:
-            return self._native.tool_position(positions)
-        x, y, z = self._kinematics.tool(positions).position.tolist()
-        return x, y, z
 
     def clip(self, positions: Array) -> Array:
         """The nearest joint values (n,) [rad] or [m] within the limits."""

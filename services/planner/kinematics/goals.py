@@ -48,10 +48,6 @@ class Goals:
         """[s] that the slowest joint takes between two configurations at full speed."""
         return self._ik.travel(np.array(first), np.array(second))
 
-    def tool_position(self, positions: Start) -> tuple[float, float, float]:
-        """[m] where the tool is in the base at joint values (n,) [rad] or [m]."""
-        return self._ik.tool_position(positions)
-
     def candidates(
         self, goal: Goal, start: Start, deadline: Deadline, standing: Start | None = None
     ) -> Iterator[Start]:

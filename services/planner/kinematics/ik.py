@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import chain, islice, pairwise
 
 import numpy as np
@@ -56,10 +56,6 @@ class InverseKinematics:
         self._period = np.array([math.tau if math.isinf(joint.upper) else 0.0 for joint in arm.joints])
         self._is_limited = not self._period.any() and not self._idle.any()  # and each joint moves the tool
         self._starts = np.array(spread(arm, self._start_count(arm)))
-
-    def tool_position(self, positions: Sequence[float] | Array) -> tuple[float, float, float]:
-        """[m] where the tool is in the base at joint values (n,) [rad] or [m]."""
-        return self._descent.tool_position(positions)
 
     @property
     def is_closed_form(self) -> bool:

@@ -12,7 +12,7 @@ from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.services.planner.kinematics.centring import Centring
-from gemelo.services.planner.kinematics.descent import Descent
+from gemelo.services.planner.kinematics.descent import Descent, tool_position, tool_position_in_python
 from gemelo.services.planner.kinematics.targets import ToolTarget
 
 ARMS = Path(__file__).parents[1] / "arms"
@@ -40,11 +40,13 @@ def both(request: pytest.FixtureRequest) -> Both:
 
 
 def test_the_tool_is_where_pinocchio_has_it(both: Both):
+    arm = both.kinematics.arm
+    compiled, plain = tool_position(arm, both.kinematics), tool_position_in_python(arm, both.kinematics)
     for row in both.rows:
         expected = pytest.approx(both.kinematics.tool(row).position, abs=1e-12)
-        assert both.compiled.tool_position(row) == expected
-        assert both.compiled.tool_position(tuple(row.tolist())) == both.compiled.tool_position(row)
-        assert both.plain.tool_position(row) == expected
+        assert compiled(row) == expected
+        assert compiled(tuple(row.tolist())) == compiled(row)
+        assert plain(row) == expected
 
 
 @pytest.mark.parametrize("with_turn", [False, True])

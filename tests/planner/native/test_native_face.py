@@ -29,12 +29,12 @@ except ImportError as error:
 CHOSEN = """
 import sys
 sys.modules["gemelo.services.planner.native.binding"] = None
-from gemelo.services.planner.collision.sphere_check import cancel_flag, counted_time, sphere_check
+from gemelo.services.planner.collision.sphere_check import cancel_flag, counted_time, native_planner
 from gemelo.services.planner.timing.profile import stop_and_go
 from gemelo.services.planner.timing.timing import timed_path
 from gemelo.services.planner.verification.feasibility import peak_rates
 from gemelo.services.planner.verification.verify import evaluated
-print(type(cancel_flag()).__name__, type(counted_time(0.5)).__name__, type(sphere_check(None)).__name__)
+print(type(cancel_flag()).__name__, type(counted_time(0.5)).__name__, native_planner(None))
 print(stop_and_go.__name__, timed_path.__name__, peak_rates.__name__, evaluated.__name__)
 """
 PLANNER = Path(motion.__file__).parents[1]
@@ -57,7 +57,7 @@ def test_without_the_compiled_module_the_remedy_is_said():
 def test_without_the_compiled_module_python_takes_its_place_everywhere():
     said = subprocess.run([sys.executable, "-c", CHOSEN], capture_output=True, text=True, timeout=60, check=True)
     kinds, functions = said.stdout.splitlines()
-    assert kinds.split() == ["Event", "CountedInPython", "ExactShapesOnly"]
+    assert kinds.split() == ["Event", "CountedInPython", "None"]
     assert all(name.endswith("_in_python") for name in functions.split())
 
 

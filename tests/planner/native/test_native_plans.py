@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.services.planner.collision.checker import CollisionChecker
 from gemelo.services.planner.collision.clearance import CLEARANCE
-from gemelo.services.planner.collision.sphere_check import NativeCheck
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 from gemelo.services.planner.native.binding import CancelFlag
@@ -139,14 +139,15 @@ def test_the_first_path_is_looked_for_where_short_ones_are(core, configurations)
 
 def test_what_the_spheres_say_of_a_configuration_for_certain_is_so_on_the_exact_shapes(arm, configurations):
     world = World(arm, Kinematics(arm), SCENES["shelf"])
-    check = NativeCheck(arm)
+    checker = CollisionChecker(world)
+    spheres = checker.native(CLEARANCE)
     touching = 0
     for row in configurations(150, 6):
         distance = world.distance(row)
-        assert check.least_distance(world, row) <= max(distance, 0.0) + UNSURE
-        if check.keeps(world, row, CLEARANCE):
+        assert checker.least_distance(row) <= max(distance, 0.0) + UNSURE
+        if spheres.is_free(row):
             assert distance >= CLEARANCE
-        elif check.resolve(world, np.array((row, row)), CLEARANCE).touching is not None:
+        elif spheres.touching(np.array((row, row))) is not None:
             touching += 1
             assert distance < CLEARANCE
     assert touching > 10
