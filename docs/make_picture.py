@@ -61,9 +61,18 @@ class Film:
         moments = [moment for moment, _ in self.taken]
         stays = [min(round(1000.0 * (after - before) / FASTER), LONGEST) for before, after in pairwise(moments)]
         stays = [FIRST, *stays[1:], LAST]
-        richest = self.taken[len(self.taken) // 2][1].quantize(COLOURS, Image.Quantize.MEDIANCUT)
-        pictures = [each.quantize(palette=richest, dither=Image.Dither.NONE) for _, each in self.taken]
+        palette = self._palette()
+        pictures = [each.quantize(palette=palette, dither=Image.Dither.NONE) for _, each in self.taken]
         pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=stays, loop=0, optimize=True)
+
+    def _palette(self) -> Image.Image:
+        """With the colours of the first picture, the one in the middle and the last."""
+        chosen = [self.taken[place][1] for place in (0, len(self.taken) // 2, -1)]
+        width, height = chosen[0].size
+        all_of_them = Image.new("RGB", (width, height * len(chosen)))
+        for row, picture in enumerate(chosen):
+            all_of_them.paste(picture, (0, row * height))
+        return all_of_them.quantize(COLOURS, Image.Quantize.MEDIANCUT)
 
 
 def play(page: Page, arm: gemelo.Arm, film: Film) -> None:
