@@ -10,7 +10,7 @@ from gemelo.api.errors import Error, Lost
 from gemelo.api.robot_files import Robot, find_robot, require_router
 from gemelo.api.session import Session, open_node
 from gemelo.libraries.runtime.deployment import is_loopback, load_deployment
-from gemelo.libraries.runtime.robots import robots_on
+from gemelo.libraries.runtime.running import robots_on
 from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.deployment import Deployment
 

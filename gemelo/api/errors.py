@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from gemelo.api.arguments import Target
-from gemelo.api.homing_report import HomingReport
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowJointTrajectoryResult
 from gemelo.schemas.planning import Refusal
 from gemelo.schemas.scene import Contact
+
+if TYPE_CHECKING:
+    from gemelo.api.homing_report import HomingReport
 
 
 class Error(Exception):

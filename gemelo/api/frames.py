@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from gemelo.api.errors import BadArgument, Lost
 from gemelo.api.session import PATIENCE, Session
-from gemelo.api.units import Pose
+from gemelo.api.units import Pose, pose_from
 from gemelo.libraries.arm.errors import suggestion
 from gemelo.libraries.arm.frames.frame_buffer import FrameBuffer, FrameError
-from gemelo.libraries.arm.frames.transforms import from_message
-from gemelo.schemas.frames import Transform
 from gemelo.schemas.topics import FRAMES, STATIC_FRAMES
 
 
@@ -41,8 +39,3 @@ class Frames:
         except FrameError:
             return target not in self._session.description.model.link_names and bool(self._buffer.frames)
         return True
-
-
-def pose_from(transform: Transform) -> Pose:
-    """The transform of a message."""
-    return Pose(*from_message(transform))

@@ -12,7 +12,8 @@ from gemelo.api.scene import Scene
 from gemelo.api.session import Session
 from gemelo.api.targets import number
 from gemelo.libraries.runtime import errors as runtime
-from gemelo.libraries.runtime.actions import ActionClient, GoalHandle
+from gemelo.libraries.runtime.actions.client import ActionClient
+from gemelo.libraries.runtime.actions.goal_handle import GoalHandle
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import InjectKind, InjectRequest
 from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState

@@ -10,7 +10,8 @@ from gemelo.api.errors import Aborted, Canceled, Error, Interrupted, Lost, Refus
 from gemelo.api.planning import Plan, words_of
 from gemelo.api.session import Session
 from gemelo.libraries.runtime import errors as runtime
-from gemelo.libraries.runtime.actions import ActionClient, ActionOutcome, GoalHandle
+from gemelo.libraries.runtime.actions.client import ActionClient
+from gemelo.libraries.runtime.actions.goal_handle import ActionOutcome, GoalHandle
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import (
     FollowErrorCode,

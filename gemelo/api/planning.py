@@ -16,10 +16,9 @@ from msgspec.structs import replace
 
 from gemelo.api.arguments import Joints, Target, ToolGoal
 from gemelo.api.errors import Error, Interrupted, Lost, Refused
-from gemelo.api.frames import pose_from
 from gemelo.api.session import Session, answer_of
 from gemelo.api.targets import as_target, named_joints
-from gemelo.api.units import Pose
+from gemelo.api.units import Pose, pose_from
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.runtime.clock import token
 from gemelo.libraries.runtime.requests.client import PendingCall

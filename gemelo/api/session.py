@@ -9,18 +9,20 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import count
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from gemelo.api.errors import Error, Lost, Refused
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.runtime import errors as runtime
 from gemelo.libraries.runtime.node import Node
-from gemelo.libraries.runtime.node_clock import NodeClock
 from gemelo.libraries.runtime.requests.client import PendingCall
 from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import Request, Topic
+
+if TYPE_CHECKING:
+    from gemelo.libraries.runtime.node_clock import NodeClock
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)
@@ -111,6 +113,8 @@ class Session:
 
     def _clock_of(self, writer: str) -> NodeClock:
         """The clock of the node that stamps a topic."""
+        from gemelo.libraries.runtime.node_clock import NodeClock  # for what is read after a change alone
+
         node = self.node
         with self.news:
             if writer not in self._clocks:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from gemelo.libraries.arm.frames.transforms import from_rpy, rotate
+from gemelo.libraries.arm.frames.transforms import from_message, from_rpy, rotate
+from gemelo.schemas.frames import Transform
 
 Point = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -64,3 +65,8 @@ class Pose(NamedTuple):
         (0.0, 0.0, -1.0)
         """
         return rotate(self.orientation, along)
+
+
+def pose_from(transform: Transform) -> Pose:
+    """The transform of a message."""
+    return Pose(*from_message(transform))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from gemelo.libraries.runtime.actions.server import ActionServer
 from gemelo.libraries.runtime.bus.branches import branch_of
 from gemelo.libraries.runtime.bus.identity import Identity
 from gemelo.libraries.runtime.clock import SYSTEM, Clock
@@ -27,6 +26,9 @@ from gemelo.schemas.system import (
     TopicStatistics,
 )
 from gemelo.schemas.topics import Request, Topic
+
+if TYPE_CHECKING:
+    from gemelo.libraries.runtime.actions.server import ActionServer
 
 
 def info_request(node: str) -> Request[Empty, NodeInfo]:

@@ -7,20 +7,17 @@ from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import TYPE_CHECKING, Self, TypeVar
 
 import msgspec
 
 from gemelo.libraries.runtime.actions.client import ActionClient
-from gemelo.libraries.runtime.actions.server import ActionServer, OnCancel, OnGoal, ReadGoal
 from gemelo.libraries.runtime.bus import identity
 from gemelo.libraries.runtime.bus.branches import principal_of
 from gemelo.libraries.runtime.bus.connection import await_router, connect
 from gemelo.libraries.runtime.bus.interface import Bus, Declaration
 from gemelo.libraries.runtime.bus.name_holder import NameHolder, StopWatch
 from gemelo.libraries.runtime.bus.wire import Encoded, encoded
-from gemelo.libraries.runtime.certificate_watch import CertificateWatch
-from gemelo.libraries.runtime.client_watch import Absences, ClientWatch
 from gemelo.libraries.runtime.clock import SYSTEM, Clock
 from gemelo.libraries.runtime.deployment import load_deployment, project_root, robot_name
 from gemelo.libraries.runtime.endpoints import (
@@ -60,6 +57,11 @@ from gemelo.schemas.system import (
     TopicStatistics,
 )
 from gemelo.schemas.topics import LOG, PARAMETER_CHANGES, STATISTICS, Action, Request, Topic
+
+if TYPE_CHECKING:
+    from gemelo.libraries.runtime.actions.server import ActionServer, OnCancel, OnGoal, ReadGoal
+    from gemelo.libraries.runtime.certificate_watch import CertificateWatch
+    from gemelo.libraries.runtime.client_watch import Absences
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)
@@ -113,8 +115,7 @@ class Node:
         self._parameters = ParameterRegistry(name, from_file, overrides or {}, saved, self.log)
         self._is_closed = False
         self._ignored_tokens: set[str] = set()
-        self._certificate = CertificateWatch(self.deployment.router.certificate, self.log.warning)
-        self._certificate.beat()
+        self._certificate = self._watched(self.deployment.router.certificate)
         with stop_on_signals(self._stop) if self._signals else nullcontext():
             self._bus = bus or connect(self.deployment.router, self.robot, self.log, self._stop)
         try:
@@ -259,6 +260,9 @@ class Node:
 
         `read` decodes goals in pieces, between which the loop goes on.
         """
+        from gemelo.libraries.runtime.actions.server import ActionServer  # most nodes serve none, and start sooner
+        from gemelo.libraries.runtime.client_watch import ClientWatch
+
         clients = ClientWatch(self._watch_alive, lambda: self._bus.is_connected)
         server = ActionServer(
             action, on_goal, on_cancel, self._serve, self.publisher, clients, self.log.warning, self.post, self.clock,
@@ -276,6 +280,8 @@ class Node:
 
     def absences(self) -> Absences:
         """Tells for how long the liveliness tokens of other nodes have been missing."""
+        from gemelo.libraries.runtime.client_watch import Absences  # for servers of goals alone
+
         return Absences(self._watch_alive, lambda: self._bus.is_connected)
 
     def watch_service(self, name: str, on_change: Callable[[str, bool], None]) -> None:
@@ -316,7 +322,7 @@ class Node:
             clock=self.now(),
             ready=self.is_ready,
             problem=self._problem,
-            certificate_ends=self._certificate.ends,
+            certificate_ends=self._certificate.ends if self._certificate is not None else None,
             unwritten=self.unwritten.sentence,
             files=NodeFiles() if self.clock.is_virtual else self._files(),
         )
@@ -507,13 +513,24 @@ class Node:
         """
         return self._stop_watch.is_certain(self.clock.monotonic(), lambda: self.is_connected, self._name.newer)
 
+    def _watched(self, certificate: str) -> CertificateWatch | None:
+        """Its watch, which has looked at it once; None where this host shows none."""
+        if not certificate:
+            return None
+        from gemelo.libraries.runtime.certificate_watch import CertificateWatch  # where there are certificates alone
+
+        watch = CertificateWatch(certificate, self.log.warning)
+        watch.beat()
+        return watch
+
     def _beat(self) -> None:
         if objection := self._name.objection(self.monotonic()):
             raise NodeNameTaken(objection)
         if self._readiness is not None:
             self._readiness.beat()
         self._bus.require_reconnection()
-        self._certificate.beat()
+        if self._certificate is not None:
+            self._certificate.beat()
         self._endpoints.report_losses()
         report = self._statistics.report(self._loop.take_figures(), self._endpoints.statistics())
         if report is not None:

@@ -1,4 +1,4 @@
-"""Asks a router what runs on it: the robot that a client is for, and the files that its twin was started with."""
+"""Asks a router what runs on it: the robots, the one that a client is for, and the files that its twin began with."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from gemelo.libraries.runtime.bus.identity import ALIVE, addresses
 from gemelo.libraries.runtime.deployment import CONFIG, PREFIX, load_deployment, project_root, robot_name
-from gemelo.libraries.runtime.robots import nodes_on
 from gemelo.libraries.runtime.started import chosen_name, deployment_of_arm, load_started
 from gemelo.schemas.deployment import Deployment, RouterSection
 from gemelo.schemas.errors import ConfigurationError
@@ -18,6 +18,7 @@ from gemelo.schemas.system import Empty, NodeInfo
 
 GATEWAY = "stepper_gateway"
 TELLERS = (GATEWAY, "planner", "state_publisher", "camera")  # a robot without any of them is a recording that is played
+TO_ANSWER = 1.0  # [s] for the router to list the liveliness tokens
 TO_TELL = 0.5  # [s] for a node to say its files; chosen: one that is frozen is not waited for
 LOOK = 1.0  # [s] of one look for the router
 ROBOT_FILE = "robot.toml"
@@ -164,3 +165,29 @@ def with_files(base: Deployment, info: NodeInfo, environ: Mapping[str, str]) -> 
     told = {"run": files.run, "out": files.out, "programs": files.programs}
     paths = replace(base.paths, **{key: path for key, path in told.items() if not environ.get(f"{PATHS}{key}".upper())})
     return replace(base, robot=files.robot, cell=files.cell, paths=paths)
+
+
+def robots_on(router: RouterSection, node: str = "*") -> tuple[str, ...]:
+    """The names of the robots of which `node` (or any node) is alive on `router`, sorted; none without an answer."""
+    return tuple(sorted(robot for robot, nodes in nodes_on(router).items() if node == "*" or node in nodes))
+
+
+def nodes_on(router: RouterSection) -> dict[str, frozenset[str]]:
+    """The addresses of the living nodes on `router`, by robot; none if it cannot be asked.
+
+    A session for one robot has its name as Zenoh's namespace and cannot see another's tokens, so this one has none.
+    """
+    import zenoh  # slow to load
+
+    from gemelo.libraries.runtime.bus.zenoh_config import client_config
+
+    try:
+        with zenoh.open(client_config(router)) as session:
+            replies = session.liveliness().get(f"*/{ALIVE}/*/*", timeout=TO_ANSWER)
+            keys = [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+    except zenoh.ZError:
+        return {}
+    found: dict[str, set[str]] = {}
+    for robot, _, token in (key.partition("/") for key in keys):
+        found.setdefault(robot, set()).update(addresses([token]))
+    return {robot: frozenset(nodes) for robot, nodes in found.items() if nodes}

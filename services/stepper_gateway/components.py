@@ -11,7 +11,7 @@ from gemelo.services.stepper_gateway.device.injection_handler import InjectionHa
 from gemelo.services.stepper_gateway.device.sensors import SensorRelay
 from gemelo.services.stepper_gateway.goals.goal_executor import GoalExecutor
 from gemelo.services.stepper_gateway.gripper.gripper_executor import GripperExecutor
-from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.stepper_gateway.ledger.confidence import LedgerRecord
 from gemelo.services.stepper_gateway.ledger.step_ledger import LedgerKeeper
 from gemelo.services.stepper_gateway.ledger.stopping_watch import StoppingWatch
 from gemelo.services.stepper_gateway.moment import Moment

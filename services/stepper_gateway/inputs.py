@@ -17,7 +17,7 @@ from gemelo.schemas.gripper import GripperCommandGoal
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
-from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.stepper_gateway.ledger.confidence import LedgerRecord
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.outputs import Output, Publish

@@ -14,7 +14,7 @@ from gemelo.schemas.message import Message
 from gemelo.schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryResult
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import Topic
-from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.stepper_gateway.ledger.confidence import LedgerRecord
 from gemelo.services.stepper_gateway.links.link import Kind
 
 Response = DeviceCommandResponse | ConfigureResponse | InjectResponse | EchoResponse | ControlAnswer

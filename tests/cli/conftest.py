@@ -10,7 +10,7 @@ import pytest
 import gemelo
 from gemelo.api.session import Session as ArmSession
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
-from gemelo.libraries.runtime.actions import accept, refuse
+from gemelo.libraries.runtime.actions.server import accept, refuse
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.actions import GoalStatusCode

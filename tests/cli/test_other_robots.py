@@ -6,7 +6,7 @@ import pytest
 
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
-from gemelo.libraries.runtime.robots import robots_on
+from gemelo.libraries.runtime.running import robots_on
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from gemelo.tools.cli.watch import state

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from gemelo.libraries.arm.model.description import load_arm
-from gemelo.libraries.runtime.actions import ActionServer, GoalDecision, accept
+from gemelo.libraries.runtime.actions.server import ActionServer, GoalDecision, accept
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform

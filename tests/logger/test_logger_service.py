@@ -22,7 +22,7 @@ from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
 from gemelo.libraries.arm.model.description import load_arm
-from gemelo.libraries.runtime.actions import accept
+from gemelo.libraries.runtime.actions.server import accept
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.libraries.runtime.deployment import load_deployment
 from gemelo.libraries.runtime.endpoints import parameter_request

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 import msgspec
 import pytest
 
-from gemelo.libraries.runtime.actions import ActionServer, GoalDecision, accept, refuse
 from gemelo.libraries.runtime.actions import keys as keys
+from gemelo.libraries.runtime.actions.server import ActionServer, GoalDecision, accept, refuse
 from gemelo.libraries.runtime.errors import GoalRefused, NoAnswer, RequestRefused, ServerLost
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.actions import GoalStatusCode, ResultRequest

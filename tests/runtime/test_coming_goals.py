@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import msgspec
 import pytest
 
-from gemelo.libraries.runtime.actions import GoalDecision, accept, keys
+from gemelo.libraries.runtime.actions import keys
 from gemelo.libraries.runtime.actions.coming_goals import MOST_BYTES
+from gemelo.libraries.runtime.actions.server import GoalDecision, accept
 from gemelo.libraries.runtime.bus.interface import Bus, BusReply
 from gemelo.libraries.runtime.errors import RequestRefused
 from gemelo.libraries.runtime.node import Node

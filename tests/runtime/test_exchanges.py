@@ -3,7 +3,8 @@
 import msgspec
 import pytest
 
-from gemelo.libraries.runtime.actions import accept, keys
+from gemelo.libraries.runtime.actions import keys
+from gemelo.libraries.runtime.actions.server import accept
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.libraries.runtime.bus.wire import MAX_PAYLOAD, MAX_PAYLOAD_OF
 from gemelo.libraries.runtime.endpoints import info_request

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.libraries.runtime.actions import accept
+from gemelo.libraries.runtime.actions.server import accept
 from gemelo.libraries.runtime.bus.interface import BusReply
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.libraries.runtime.endpoints import info_request, parameter_request, parameters_request

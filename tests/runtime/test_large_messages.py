@@ -7,8 +7,8 @@ import pytest
 from _pytest.mark.structures import ParameterSet
 
 from gemelo.libraries.arm.stl import MAX_TRIANGLES
-from gemelo.libraries.runtime.actions import accept, refuse
 from gemelo.libraries.runtime.actions.keys import goal_request, status_topic
+from gemelo.libraries.runtime.actions.server import accept, refuse
 from gemelo.libraries.runtime.bus.wire import LARGEST, MAX_PAYLOAD, MAX_PAYLOAD_OF, TooLarge, encoded, limit_of
 from gemelo.libraries.runtime.bus.zenoh_config import MAX_MESSAGE_BYTES
 from gemelo.libraries.runtime.errors import GoalRefused, RequestRefused

@@ -24,7 +24,7 @@ from gemelo.libraries.runtime.errors import NoAnswer
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.permissions import ABOUT, SET, Permissions, permissions
 from gemelo.libraries.runtime.requests import client as requests
-from gemelo.libraries.runtime.robots import robots_on
+from gemelo.libraries.runtime.running import robots_on
 from gemelo.schemas.deployment import Deployment, PathsSection, RouterSection
 from gemelo.schemas.message import Message
 from gemelo.schemas.roles import ROLES, role

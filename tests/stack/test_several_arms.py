@@ -13,7 +13,7 @@ import pytest
 import gemelo as api
 from gemelo.libraries.recordings.foreign import METADATA
 from gemelo.libraries.recordings.reader import RecordingReader
-from gemelo.libraries.runtime.robots import robots_on
+from gemelo.libraries.runtime.running import robots_on
 from gemelo.libraries.runtime.started import deployment_of_arm
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.services.visualizer.program.rerun_program import rerun_binary

@@ -14,9 +14,8 @@ from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode
 from gemelo.schemas.ledger import StepLedger, VerifiedBy
 from gemelo.schemas.topics import STEP_LEDGER
-from gemelo.services.stepper_gateway.ledger.confidence import REBOOT
+from gemelo.services.stepper_gateway.ledger.confidence import REBOOT, LedgerRecord
 from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile, read_ledger, write_ledger
-from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
 from gemelo.services.stepper_gateway.ledger.step_ledger import KEEP_EVERY, KEEP_SOON
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.tools.bench.stopping import smooth_move

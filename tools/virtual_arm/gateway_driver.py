@@ -61,7 +61,7 @@ from gemelo.services.stepper_gateway.inputs import (
     TakeControlInput,
     TargetsInput,
 )
-from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.stepper_gateway.ledger.confidence import LedgerRecord
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.outputs import (

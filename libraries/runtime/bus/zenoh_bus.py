@@ -19,7 +19,6 @@ import zenoh
 import zenoh.ext as zx
 from zenoh.handlers import Callback
 
-from gemelo.libraries.credentials.common_name import common_name
 from gemelo.libraries.runtime.bus.branches import (
     LOCAL,
     asked_under,
@@ -89,7 +88,7 @@ class ZenohBus:
         self._watches: list[object] = []
         self._session = self._open()
         self._urgent_session: zenoh.Session | None = None
-        self._common_name = common_name(Path(router.certificate)) if router.tls else ""
+        self._common_name = _name_in(router.certificate) if router.tls else ""
         self._secret = secrets.token_hex(MAX_SECRET // 2)
         self._numbers = itertools.count(1)
         self._disconnected_since: float | None = None  # [s] monotonic
@@ -349,3 +348,10 @@ def router_answers(host: str, port: int, timeout: float = 0.5) -> bool:
     except OSError:
         return False
     return True
+
+
+def _name_in(certificate: str) -> str:
+    """The common name that this host's file has; raises `AccessError`."""
+    from gemelo.libraries.credentials.common_name import common_name  # where the router asks for certificates alone
+
+    return common_name(Path(certificate))

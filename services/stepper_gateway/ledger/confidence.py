@@ -21,6 +21,7 @@ import math
 
 from msgspec import Struct
 
+from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.ledger import VerifiedBy
 
 HALF = 0.35  # load at which half of all motors would lose steps; chosen: below the stated torque, as rotors swing
@@ -57,6 +58,19 @@ class Evidence(Struct, frozen=True, kw_only=True):
     lost: int = 0  # [steps] found by a switch that was passed, and not corrected
 
 
+class LedgerRecord(Struct, frozen=True, kw_only=True):
+    """The ledger as it is kept over restarts (`ledger_file.py`): one arm on one device. Where the device or its
+    configuration is another, none of it counts."""
+
+    device: str = ""
+    virtual: bool = False
+    config_crc32: int = 0  # steps of another configuration mean other places
+    boot_id: int = 0
+    is_moving: bool = False  # what came after this was written, nobody knows
+    steps: tuple[int, ...] = ()  # executed
+    joints: dict[str, Evidence] = {}  # by name
+
+
 def survival(load: float) -> float:
     """P(w > load): the share of motors that follow at `load`, before anything is known of them."""
     return 1.0 / (1.0 + (load / HALF) ** STEEPNESS) if load > 0.0 else 1.0
@@ -79,8 +93,8 @@ def confidence(evidence: Evidence, now: int) -> float:
     if evidence.lost:
         return 0.0
     age = max(0, now - evidence.verified_at) * 1e-9
-    doubt = evidence.turns / TURNS + age / AGE + evidence.incidents
-    return BASE[evidence.verified_by] * strong_enough(evidence) * math.exp(-doubt)
+    expected = evidence.turns / TURNS + age / AGE + evidence.incidents  # losses that the torque does not explain
+    return BASE[evidence.verified_by] * strong_enough(evidence) * math.exp(-expected)
 
 
 def after_verification(
@@ -116,3 +130,36 @@ def _learned(evidence: Evidence, is_off: bool) -> tuple[float, float, int]:
     if evidence.suspicion > 1:
         return 0.0, evidence.refuted, evidence.suspicion - 1
     return max(evidence.proven, load), 0.0 if evidence.suspicion else evidence.refuted, 0
+
+
+def open_loop_reason() -> str:
+    """Of a board with another dialect."""
+    return (
+        "this board does not say what it has executed: no joint can be verified over its wire, and a message that it "
+        "has lost without falling silent is not noticed"
+    )
+
+
+def remedy(joint: Joint) -> str:
+    """How the joint can be verified."""
+    if joint.drive.homing is not None:
+        return "`gemelo verify`"
+    return f"it has no switch: `gemelo reference --joints {joint.name}=...`"
+
+
+def doubt(joint: Joint, evidence: Evidence, is_referenced: bool, now: int) -> str:
+    """What lowers the joint's confidence most, at `now` [ns UNIX]."""
+    name = f'joint "{joint.name}"'
+    if not is_referenced or evidence.verified_by is VerifiedBy.NOTHING:
+        return f"{name}: its place was not verified: {remedy(joint)}"
+    if evidence.lost:
+        return f"{name} was {evidence.lost:+d} steps off when it passed its switch: `gemelo home {joint.name}`"
+    age = max(0, now - evidence.verified_at) * 1e-9
+    parts = {
+        f"it was asked for {evidence.load:.0%} of its pull-out torque": 1.0 - strong_enough(evidence),
+        f"its motor has made {evidence.turns:.0f} turns": evidence.turns / TURNS,
+        f"that was {age / 3600.0:.1f} hours ago": age / AGE,
+        "since then the device had faults or restarts": evidence.incidents,
+    }
+    what = max(parts, key=lambda part: parts[part])
+    return f"{name}, verified by {evidence.verified_by.value}: {what}: {remedy(joint)}"

@@ -14,7 +14,7 @@ import msgspec
 from gemelo.libraries.runtime.clock import SYSTEM, Clock
 from gemelo.libraries.runtime.process.own_files import own_file
 from gemelo.libraries.runtime.process.unwritten import RETRY, UnwrittenFiles
-from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
+from gemelo.services.stepper_gateway.ledger.confidence import LedgerRecord
 
 LAST_WRITE = 2.0  # [s] that the end of the process waits for the disk; chosen: process-compose waits longer
 UNKEPT = "the step ledger, without which no joint counts as verified after a restart,"

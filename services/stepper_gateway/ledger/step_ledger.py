@@ -18,12 +18,13 @@ from gemelo.services.stepper_gateway.ledger.confidence import (
     REBOOT,
     REST_FAULT,
     Evidence,
+    LedgerRecord,
     after_verification,
     confidence,
+    doubt,
+    open_loop_reason,
 )
 from gemelo.services.stepper_gateway.ledger.joint_watch import JointSample, JointWatch
-from gemelo.services.stepper_gateway.ledger.reasons import doubt, open_loop_reason
-from gemelo.services.stepper_gateway.ledger.record import LedgerRecord
 from gemelo.services.stepper_gateway.ledger.tool_error import bounds, known_shift, tool_shift
 from gemelo.services.stepper_gateway.links.frames import StateFrame
 from gemelo.services.stepper_gateway.links.reports import EventReport

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
 import gemelo
-from gemelo.tools.cli import simulated
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands, usage
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from gemelo.libraries.arm.model.description import ArmDescription
     from gemelo.libraries.runtime.node import Node
     from gemelo.schemas.deployment import Deployment
+    from gemelo.tools.cli.simulated import SimulatedTwin
 
 
 class CommandSession(NamedTuple):
@@ -26,12 +27,18 @@ class CommandSession(NamedTuple):
     node: Node
 
 
+def chosen_twin() -> SimulatedTwin | None:
+    """The simulated twin of this command line; None where it is for the stack that runs."""
+    module = sys.modules.get("gemelo.tools.cli.simulated")  # loaded by --simulate alone
+    return module.chosen() if module is not None else None
+
+
 def load_robot() -> Robot:
     """The arm that runs, or that of this folder; raises `CommandError` where files are wrong, or several run."""
     from gemelo.api.robot_files import find_robot  # slow to load
 
     try:
-        return find_robot(ask=simulated.chosen() is None)
+        return find_robot(ask=chosen_twin() is None)
     except gemelo.Error as error:
         raise usage(in_commands(str(error))) from error
 
@@ -42,7 +49,7 @@ def connect_arm(robot: Robot | None = None) -> Iterator[Arm]:
 
     Raises `CommandError` if there is no router, if nobody answers, or for what was refused or has failed.
     """
-    robot, twin = robot or load_robot(), simulated.chosen()
+    robot, twin = robot or load_robot(), chosen_twin()
     require_router(robot.deployment)
     with reported(robot):
         opened = (
@@ -77,7 +84,7 @@ def connect(robot: Robot | None = None) -> Iterator[CommandSession]:
 
     Raises `CommandError` if there is no router, if nobody answers, or if a server refuses.
     """
-    robot, twin = robot or load_robot(), simulated.chosen()
+    robot, twin = robot or load_robot(), chosen_twin()
     deployment, arm = robot
     require_router(deployment)
     from gemelo.libraries.runtime.errors import BusError, NoAnswer, RequestRefused, ServerLost  # slow to load: the bus
@@ -108,7 +115,7 @@ def share_control(session: CommandSession) -> None:
 
 def require_router(deployment: Deployment) -> None:
     """Raises `CommandError` where no router listens, before anything slow is loaded; a simulated twin needs none."""
-    if simulated.chosen() is not None:
+    if chosen_twin() is not None:
         return
     from gemelo.api import robot_files  # slow to load
 
@@ -120,7 +127,7 @@ def require_router(deployment: Deployment) -> None:
 
 def other_robots(deployment: Deployment, arm: ArmDescription) -> str:
     """A sentence that names the robots on the router if `arm`'s own gateway is not there; else empty."""
-    robots = gemelo.robots(deployment) if simulated.chosen() is None else ()
+    robots = gemelo.robots(deployment) if chosen_twin() is None else ()
     if not robots or arm.name in robots:
         return ""
     router = f"{deployment.router.host}:{deployment.router.port}"

@@ -17,7 +17,6 @@ from gemelo.tools.cli.common.terminal import CANCELLING, LiveBlock, motion_progr
 from gemelo.tools.cli.common.units import acceleration, angle, length, rotation, seconds, share, speed
 from gemelo.tools.cli.motion.move_report import MoveReport, PlanReport, report_of, summary
 from gemelo.tools.cli.motion.move_request import request_from, require_alone
-from gemelo.tools.cli.motion.plan_file import read_plan
 from gemelo.tools.cli.parser import Choices, Options, Parser, finite_number
 
 if TYPE_CHECKING:
@@ -113,6 +112,8 @@ def run(options: Options) -> ExitCode:
     """Plans and, without --plan-only, executes; or executes a plan of before."""
     robot = load_robot()
     if options.execute is not None:
+        from gemelo.tools.cli.motion.plan_file import read_plan  # for --execute alone
+
         require_alone(options)
         plan = read_plan(options.execute, robot.description)
         with connect_arm(robot) as arm:
