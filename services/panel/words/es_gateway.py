@@ -74,6 +74,10 @@ _DEVICE: dict[str, str] = {
     "the device has not answered the configuration in time": "El equipo no respondió a tiempo a su configuración.",
     "the device was given another configuration ({sum})": "El equipo recibió otra configuración ({sum}).",
     "the device has another configuration": "El equipo tiene otra configuración.",
+    'device "{name}" runs firmware {firmware}, and this gateway drives {least} and newer: `gemelo device update` '
+    "brings it a newer one, or flash it over its cable (firmware/README.md)": "El equipo «{name}» ejecuta el firmware "
+    "{firmware}, y este gateway solo mueve {least} y posteriores: actualícelo, o grábelo por cable "
+    "(firmware/README.md).",
     "the device has restarted": "El equipo se reinició.",
     "the sketch was silent for {time} s with a message to do: it has started anew, lost its network or stood still, "
     "and where the arm is is not known. Put it into its reference pose, then run `gemelo reference`": "El sketch calló "

@@ -12,7 +12,7 @@ from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import DEVICE_EVENTS
 from gemelo.services.stepper_gateway.device.configurator import Configuration
 from gemelo.services.stepper_gateway.device.pending_commands import PendingCommands
-from gemelo.services.stepper_gateway.device.readiness import not_ready_reason
+from gemelo.services.stepper_gateway.device.readiness import not_ready_reason, outdated_reason
 from gemelo.services.stepper_gateway.device.reporting import Reporter
 from gemelo.services.stepper_gateway.device.session import DeviceSession
 from gemelo.services.stepper_gateway.links.frames import StateFrame
@@ -54,12 +54,18 @@ class GatewayDevice:
 
     def not_ready_reason(self) -> str:
         """Why the device, though it can be reached, cannot start a motion; empty if it can."""
-        return self.configuration.mismatch_reason() or not_ready_reason(self.arm, self.state)
+        return self._unfit_reason() or not_ready_reason(self.arm, self.state)
 
     def refusal(self, moment: Moment, is_coming_to_rest: bool = False) -> str:
         """Why no motion may be started now, or `is_coming_to_rest`: as soon as the device rests; empty if one may."""
-        not_ready = self.configuration.mismatch_reason() if is_coming_to_rest else self.not_ready_reason()
+        not_ready = self._unfit_reason() if is_coming_to_rest else self.not_ready_reason()
         return self.unreachable_reason(moment) or not_ready or self.commands.not_ready_reason()
+
+    def _unfit_reason(self) -> str:
+        """Why this firmware, or its configuration, cannot be driven at all; empty if it can."""
+        status = self.session.status
+        outdated = outdated_reason(self.arm.device.name, status.firmware) if status is not None else ""
+        return outdated or self.configuration.mismatch_reason()
 
     def event(
         self,

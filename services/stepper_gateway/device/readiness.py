@@ -2,11 +2,29 @@
 
 from __future__ import annotations
 
+import re
+
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.device_config import InputRole
 from gemelo.schemas.device_faults import fault_text
 from gemelo.services.stepper_gateway.links.frames import StateFlag, StateFrame
+
+LEAST_FIRMWARE = (1, 0, 0)  # that this gateway drives; raise it with a frame or field that an older one does not have
+
+_VERSION = re.compile(r"(\d+)\.(\d+)\.(\d+)")
+
+
+def outdated_reason(name: str, firmware: str) -> str:
+    """A sentence where device `name` says a version below LEAST_FIRMWARE; empty for a board that has no version."""
+    found = _VERSION.match(firmware)
+    if found is None or tuple(map(int, found.groups())) >= LEAST_FIRMWARE:
+        return ""
+    least = ".".join(map(str, LEAST_FIRMWARE))
+    return (
+        f'device "{name}" runs firmware {firmware}, and this gateway drives {least} and newer: `gemelo device update` '
+        "brings it a newer one, or flash it over its cable (firmware/README.md)"
+    )
 
 
 def not_ready_reason(arm: ArmDescription, state: StateFrame | None) -> str:
