@@ -21,6 +21,9 @@ bool write(void* self, const uint8_t* bytes, size_t size, Refusal* refusal) {
 bool finish(void* self, const uint8_t* digest, Refusal* refusal) {
     return calls_of(self).finish(digest, refusal->reason) != 0;
 }
+bool permits_older(void* self, const uint8_t* digest, uint32_t boot_id, const uint8_t* signature, size_t size) {
+    return calls_of(self).permits_older(digest, boot_id, signature, size) != 0;
+}
 void abort(void* self) { calls_of(self).abort(); }
 
 }  // namespace
@@ -28,5 +31,5 @@ void abort(void* self) { calls_of(self).abort(); }
 // They must stay for as long as the device does.
 extern "C" void gemelo_set_firmware_slot(VirtualDevice* device, const FirmwareCalls* calls) {
     device->firmware_calls() = *calls;
-    device->firmware() = {device, gemelo::kVirtualChip, verify, begin, write, finish, abort};
+    device->firmware() = {device, gemelo::kVirtualChip, verify, begin, write, finish, abort, permits_older};
 }

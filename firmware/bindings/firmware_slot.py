@@ -33,6 +33,9 @@ class FirmwareSlot(Protocol):
     def abort(self) -> None:
         """Closes the slot; what was written is of no use."""
 
+    def permits_older(self, digest: bytes, boot_id: int, signature: bytes) -> bool:
+        """True if it lets this boot take an image with this SHA-256 though it is older than what runs."""
+
 
 def firmware_calls(slot: FirmwareSlot) -> FirmwareCalls:
     """The functions that the core calls; to be kept for as long as the device lives."""
@@ -50,6 +53,9 @@ def firmware_calls(slot: FirmwareSlot) -> FirmwareCalls:
         said = c.string_at(digest, DIGEST), c.string_at(signature, size)
         return guarded(lambda: slot.verify(*said), reason)
 
+    def permits_older(digest: Any, boot_id: int, signature: Any, size: int) -> int:
+        return int(slot.permits_older(c.string_at(digest, DIGEST), boot_id, c.string_at(signature, size)))
+
     def write(data: Any, size: int, reason: Any) -> int:
         return guarded(lambda: slot.write(c.string_at(data, size)), reason)
 
@@ -60,4 +66,5 @@ def firmware_calls(slot: FirmwareSlot) -> FirmwareCalls:
         kinds["write"](write),
         kinds["finish"](lambda digest, reason: guarded(lambda: slot.finish(c.string_at(digest, DIGEST)), reason)),
         kinds["abort"](slot.abort),
+        kinds["permits_older"](permits_older),
     )

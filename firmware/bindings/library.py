@@ -84,6 +84,7 @@ class FirmwareCalls(c.Structure):
         ("write", c.CFUNCTYPE(c.c_int, Bytes, c.c_size_t, Reason)),
         ("finish", c.CFUNCTYPE(c.c_int, Bytes, Reason)),
         ("abort", c.CFUNCTYPE(None)),
+        ("permits_older", c.CFUNCTYPE(c.c_int, Bytes, c.c_uint32, Bytes, c.c_size_t)),
     )
 
 

@@ -4,6 +4,7 @@
 
 #include "bytes.h"
 #include "phrase.h"
+#include "report.h"
 
 namespace gemelo {
 namespace {
@@ -20,6 +21,35 @@ bool are_equal(const uint8_t* digest, const uint8_t* other) {
     for (size_t i = 0; i < kDigestSize; ++i)
         if (digest[i] != other[i]) return false;
     return true;
+}
+
+struct Version {
+    uint32_t part[3] = {0, 0, 0};
+};
+
+// Up to three numbers with points between them, as 1.0.0; what follows them does not count. False for none.
+bool read_version(const char* text, Version* version) {
+    size_t at = 0;
+    bool has_any = false;
+    for (uint32_t& part : version->part) {
+        size_t digits = 0;
+        for (; digits < 6 && at < kImageVersionSize && text[at] >= '0' && text[at] <= '9'; ++at, ++digits)
+            part = 10 * part + static_cast<uint32_t>(text[at] - '0');
+        has_any = has_any || digits != 0;
+        if (digits == 0 || at >= kImageVersionSize || text[at] != '.') break;
+        ++at;
+    }
+    return has_any;
+}
+
+bool is_older(const Version& version, const Version& other) {
+    for (int i = 0; i < 3; ++i)
+        if (version.part[i] != other.part[i]) return version.part[i] < other.part[i];
+    return false;
+}
+
+void add_version(Phrase& phrase, const Version& version) {
+    phrase.add(version.part[0]).add(".").add(version.part[1]).add(".").add(version.part[2]);
 }
 
 bool has_right_size(UpdateStep step, size_t size) {
@@ -65,7 +95,7 @@ bool UpdateReceiver::carry_out(const Frame& frame, Refusal* refusal) {
     const size_t size = frame.size - kContent;
     switch (static_cast<UpdateStep>(frame.bytes[16])) {
         case UpdateStep::Begin:
-            return begin_transfer(session, content, size, refusal);
+            return begin_transfer(frame, content, size, refusal);
         case UpdateStep::Data:
             return take(session, offset, content, size, refusal);
         case UpdateStep::End:
@@ -79,15 +109,14 @@ bool UpdateReceiver::carry_out(const Frame& frame, Refusal* refusal) {
 }
 
 // A transfer that was cut off goes on where it ended, whoever sends the same image.
-bool UpdateReceiver::begin_transfer(uint32_t session, const uint8_t* content, size_t size, Refusal* refusal) {
-    const uint32_t image_size = load_u32(content);
+bool UpdateReceiver::begin_transfer(const Frame& frame, const uint8_t* content, size_t size, Refusal* refusal) {
+    const uint32_t session = load_u32(frame.bytes + 8), image_size = load_u32(content);
     const uint8_t* digest = content + sizeof image_size;
     if (session == 0) return refuse(refusal, "0 is no session: choose another number");
     if (state_ == State::Ready) return refuse(refusal, "a new firmware is there already, and starts now");
     if (image_size < kImageHeaderSize) return refuse(refusal, "this is too short for an image of a firmware");
     const uint8_t* signature = digest + kDigestSize;
-    if (!slot_->verify(slot_->context, digest, signature, size - sizeof image_size - kDigestSize, refusal))
-        return false;
+    if (!is_permitted(frame, digest, signature, size - sizeof image_size - kDigestSize, refusal)) return false;
     const bool is_same = state_ == State::Receiving && image_size == size_ && are_equal(digest, digest_);
     if (!is_same) {
         give_up();
@@ -100,6 +129,17 @@ bool UpdateReceiver::begin_transfer(uint32_t session, const uint8_t* content, si
     return true;
 }
 
+// Either signature is by the key's owner: that of the image, or that of the leave to go back to it.
+bool UpdateReceiver::is_permitted(const Frame& frame, const uint8_t* digest, const uint8_t* signature, size_t size,
+                                  Refusal* refusal) {
+    may_be_older_ = false;
+    if (slot_->verify(slot_->context, digest, signature, size, refusal)) return true;
+    may_be_older_ = slot_->permits_older != nullptr &&
+                    slot_->permits_older(slot_->context, digest, frame.boot_id(), signature, size);
+    if (may_be_older_) *refusal = Refusal{};
+    return may_be_older_;
+}
+
 bool UpdateReceiver::take(uint32_t session, uint32_t offset, const uint8_t* bytes, size_t size, Refusal* refusal) {
     if (!is_current(session, refusal)) return false;
     if (!fits(offset, size, refusal)) return false;
@@ -108,8 +148,8 @@ bool UpdateReceiver::take(uint32_t session, uint32_t offset, const uint8_t* byte
         Phrase(refusal->reason, sizeof refusal->reason).add("a piece is missing: send from byte ").add(received_);
         return false;
     }
-    const bool is_good =
-        (offset != 0 || is_for_this_chip(bytes, size, refusal)) && slot_->write(slot_->context, bytes, size, refusal);
+    const bool is_taken = offset != 0 || (is_for_this_chip(bytes, size, refusal) && is_new_enough(bytes, refusal));
+    const bool is_good = is_taken && slot_->write(slot_->context, bytes, size, refusal);
     if (is_good)
         received_ += static_cast<uint32_t>(size);
     else
@@ -127,8 +167,8 @@ bool UpdateReceiver::fits(uint32_t offset, size_t size, Refusal* refusal) const 
 }
 
 bool UpdateReceiver::is_for_this_chip(const uint8_t* bytes, size_t size, Refusal* refusal) const {
-    if (size < kImageHeaderSize || bytes[0] != kImageMagic)
-        return refuse(refusal, "this is no image of a firmware: its first byte is not 0xE9");
+    if (size < kImageVersionOffset + kImageVersionSize || bytes[0] != kImageMagic)
+        return refuse(refusal, "this is no image of a firmware: its first byte is not 0xE9, or its header is cut off");
     const uint16_t chip_id = load_u16(bytes + kImageChipOffset);
     if (chip_id == slot_->chip_id) return true;
     Phrase(refusal->reason, sizeof refusal->reason)
@@ -136,6 +176,19 @@ bool UpdateReceiver::is_for_this_chip(const uint8_t* bytes, size_t size, Refusal
         .add(chip_id)
         .add(", this one is ")
         .add(slot_->chip_id);
+    return false;
+}
+
+bool UpdateReceiver::is_new_enough(const uint8_t* bytes, Refusal* refusal) const {
+    Version version, running;
+    const bool has_version = read_version(reinterpret_cast<const char*>(bytes) + kImageVersionOffset, &version);
+    read_version(kFirmwareVersion, &running);
+    if (may_be_older_ || (has_version && !is_older(version, running))) return true;
+    if (!has_version) return refuse(refusal, "its version is no number: `gemelo device update --downgrade` sends it");
+    Phrase phrase(refusal->reason, sizeof refusal->reason);
+    add_version(phrase.add("its version "), version);
+    add_version(phrase.add(" is older than what runs, "), running);
+    phrase.add(": `gemelo device update --downgrade` sends it");
     return false;
 }
 

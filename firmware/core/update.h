@@ -10,12 +10,15 @@
 
 namespace gemelo {
 
-constexpr size_t kDigestSize = 32;         // [bytes] standard: SHA-256
-constexpr size_t kMaxSignature = 72;       // [bytes] standard: ECDSA with P-256, DER
-constexpr size_t kMaxUpdatePiece = 4096;   // [bytes] standard: one sector of the flash
-constexpr size_t kImageHeaderSize = 24;    // [bytes] standard: esp_image_header_t of ESP-IDF
-constexpr uint8_t kImageMagic = 0xE9;      // standard: its first byte
-constexpr size_t kImageChipOffset = 12;    // standard: of the chip's id, u16
+constexpr size_t kDigestSize = 32;        // [bytes] standard: SHA-256
+constexpr size_t kMaxSignature = 72;      // [bytes] standard: ECDSA with P-256, DER
+constexpr size_t kMaxUpdatePiece = 4096;  // [bytes] standard: one sector of the flash
+constexpr size_t kImageHeaderSize = 24;   // [bytes] standard: esp_image_header_t of ESP-IDF
+constexpr uint8_t kImageMagic = 0xE9;     // standard: its first byte
+constexpr size_t kImageChipOffset = 12;   // standard: of the chip's id, u16
+// Standard: of esp_app_desc_t's version, behind that header, the first segment's (8 bytes) and 16 bytes of its own.
+constexpr size_t kImageVersionOffset = 48;
+constexpr size_t kImageVersionSize = 32;
 constexpr uint16_t kVirtualChip = 0xFFFE;  // chosen: of a virtual device; ESP-IDF's invalid id is 0xFFFF
 
 enum class UpdateStep : uint8_t { Begin = 1, Data, End, Abort };
@@ -31,6 +34,9 @@ struct FirmwareSlot {
     // Compares all that was written with `digest`, and starts it a little later.
     bool (*finish)(void* context, const uint8_t* digest, Refusal* refusal) = nullptr;
     void (*abort)(void* context) = nullptr;
+    // True if the signature lets this boot take an image with this digest though its version is older than what runs.
+    bool (*permits_older)(void* context, const uint8_t* digest, uint32_t boot_id, const uint8_t* signature,
+                          size_t size) = nullptr;
 };
 
 struct UpdateAnswer {
@@ -52,10 +58,13 @@ class UpdateReceiver {
     enum class State : uint8_t { Idle, Receiving, Ready };
 
     bool carry_out(const Frame& frame, Refusal* refusal);
-    bool begin_transfer(uint32_t session, const uint8_t* content, size_t size, Refusal* refusal);
+    bool begin_transfer(const Frame& frame, const uint8_t* content, size_t size, Refusal* refusal);
+    bool is_permitted(const Frame& frame, const uint8_t* digest, const uint8_t* signature, size_t size,
+                      Refusal* refusal);
     bool take(uint32_t session, uint32_t offset, const uint8_t* bytes, size_t size, Refusal* refusal);
     bool fits(uint32_t offset, size_t size, Refusal* refusal) const;
     bool is_for_this_chip(const uint8_t* bytes, size_t size, Refusal* refusal) const;
+    bool is_new_enough(const uint8_t* bytes, Refusal* refusal) const;
     bool end_transfer(uint32_t session, Refusal* refusal);
     bool is_current(uint32_t session, Refusal* refusal) const;
     void give_up();
@@ -65,6 +74,7 @@ class UpdateReceiver {
     uint32_t session_ = 0;
     uint32_t size_ = 0;
     uint32_t received_ = 0;
+    bool may_be_older_ = false;  // than what runs
     uint8_t digest_[kDigestSize];
 };
 

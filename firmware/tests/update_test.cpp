@@ -19,11 +19,13 @@ namespace {
 constexpr uint16_t kChip = 9;
 constexpr size_t kSize = 10000;
 
-Bytes image(uint16_t chip = kChip) {
+Bytes image(uint16_t chip = kChip, const std::string& version = "1.0.0") {
     Bytes bytes(kSize);
     for (size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<uint8_t>(i * 7);
     bytes[0] = kImageMagic;
     store_u16(&bytes[kImageChipOffset], chip);
+    for (size_t i = 0; i < kImageVersionSize; ++i)
+        bytes[kImageVersionOffset + i] = i < version.size() ? static_cast<uint8_t>(version[i]) : 0;
     return bytes;
 }
 
@@ -70,13 +72,17 @@ struct Flash {
         of(self).is_open = false;
         ++of(self).aborted;
     }
+    // 0x32 is the leave of the key's owner.
+    static bool permits_older(void*, const uint8_t*, uint32_t, const uint8_t* signature, size_t) {
+        return signature[0] == 0x32;
+    }
 };
 
 class Update : public testing::Test {
   protected:
     Update() {
         device.device.firmware() = {&flash,       kChip,         Flash::verify, Flash::begin,
-                                    Flash::write, Flash::finish, Flash::abort};
+                                    Flash::write, Flash::finish, Flash::abort,  Flash::permits_older};
         device.command(Command::Disarm);
         device.run_ms(5);
     }
@@ -189,6 +195,36 @@ TEST_F(Update, AnImageForAnotherChipAndWhatIsNoneAreRefusedWithTheFirstPiece) {
     EXPECT_TRUE(flash.written.empty());
     EXPECT_TRUE(refuses(begin(5, 23), "too short"));
     EXPECT_TRUE(refuses(begin(5, 2000000), "it is larger than the slot"));
+}
+
+TEST_F(Update, AnOlderImageIsRefusedAndANewerOrTheSameIsTaken) {
+    const auto first_piece = [&](const std::string& version) {
+        begin();
+        return data(0, 1000, 5, image(kChip, version));
+    };
+    for (const char* version : {"0.9.9", "0.10.0", "0", "0.9.9-rc1"}) {
+        const std::string said = first_piece(version);
+        EXPECT_TRUE(refuses(said, "is older than what runs, 1.0.0: `gemelo device update --downgrade` sends it"))
+            << said;
+    }
+    EXPECT_TRUE(refuses(first_piece("0.9.9"), "its version 0.9.9 is older"));
+    for (const char* version : {"", "unknown", "v1.0.0", ".1"})
+        EXPECT_TRUE(refuses(first_piece(version), "its version is no number")) << version;
+    EXPECT_TRUE(flash.written.empty());
+    for (const char* version : {"1.0.0", "1", "1.0", "1.0.0-dirty", "1.0.1", "1.10.0", "2.0.0", "10.0.0"}) {
+        EXPECT_FALSE(refuses(first_piece(version), "")) << version;
+        send(build_update(UpdateStep::Abort, 5));
+    }
+}
+
+TEST_F(Update, AnOlderImageIsTakenByLeaveOfTheKeysOwner) {
+    Bytes content = build_update_begin(kSize, 1);
+    content[4 + kDigestSize] = 0x32;
+    EXPECT_EQ(send(build_update(UpdateStep::Begin, 5, 0, content)), taken(0));
+    EXPECT_EQ(data(0, 1000, 5, image(kChip, "0.1.0")), taken(1000));
+    // And not by that of another image.
+    EXPECT_EQ(send(build_update(UpdateStep::Begin, 5, 0, build_update_begin(kSize, 2))), taken(0));
+    EXPECT_TRUE(refuses(data(0, 1000, 5, image(kChip, "0.1.0")), "is older than what runs"));
 }
 
 TEST_F(Update, ADamagedImageIsNotStarted) {

@@ -90,5 +90,11 @@ def begin_content(size: int, digest: bytes, signature: bytes) -> bytes:
     return struct.pack("<I", size) + digest + signature
 
 
+def leave_for_older(digest: bytes, boot_id: int) -> bytes:
+    """What the key's owner signs, instead of the image with this SHA-256, so that this boot takes it though it is
+    older than what runs: nobody else can, and at no other time."""
+    return digest + b"older" + boot_id.to_bytes(4, "little")
+
+
 def _text(field: bytes) -> str:
     return field.split(b"\0", 1)[0].decode("ascii", "replace")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from bench_firmware import command
-from update_bed import NEWER, LossyWire, UpdateBed, an_image, silent_core
+from update_bed import NEWER, OLDER, LossyWire, UpdateBed, an_image, silent_core
 
 from gemelo.firmware.platform.host.image import source_version, virtual_image
 from gemelo.libraries.runtime.firmware_update import (
@@ -19,6 +19,7 @@ from gemelo.libraries.runtime.firmware_update import (
     NoImage,
     UpdateStep,
     build_header,
+    leave_for_older,
     read_header,
     update_frame,
 )
@@ -77,6 +78,35 @@ def test_a_board_runs_the_new_firmware_from_the_other_slot_and_keeps_it(
     bed.start()
     assert bed.update(an_image()) is ExitCode.OK  # into the first slot, this time
     assert f"from ota_0; before it was {NEWER} in ota_1" in capsys.readouterr().out
+
+
+def test_an_older_firmware_is_refused_though_it_is_signed(bed: UpdateBed, capsys: pytest.CaptureFixture[str]) -> None:
+    """Whoever has kept an image that was signed once could bring its faults back."""
+    said = reason(bed, capsys, an_image(version=OLDER))
+    assert f"its version {OLDER} is older than what runs, {source_version()}" in said
+    assert "`gemelo device update --downgrade` sends it" in said
+
+
+@pytest.mark.full
+def test_an_older_firmware_is_taken_where_the_keys_owner_says_so(
+    bed: UpdateBed, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert bed.update(an_image(version=OLDER), "--downgrade") is ExitCode.OK
+    assert f"it runs firmware {OLDER} from ota_1; before it was {source_version()}" in capsys.readouterr().out
+    bed.stop()
+    bed.start()
+    assert bed.update(an_image()) is ExitCode.OK, "and what is newer than that again without a word"
+
+
+def test_the_leave_to_go_back_is_for_one_boot(bed: UpdateBed) -> None:
+    image = an_image(version=OLDER)
+    with open_line(bed.port, BAUD) as line:
+        wire = SerialWire(line)
+        status = await_status(wire, 20.0, lambda _: True)
+        assert status is not None
+        leave = sign(bed.key, leave_for_older(hashlib.sha256(image).digest(), status.boot_id + 1))
+        with pytest.raises(CommandError, match="its signature is not by the key"):
+            Transfer(wire, image, leave, lambda _: None).run(status.boot_id)
 
 
 @pytest.mark.full

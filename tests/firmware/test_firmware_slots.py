@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from update_bed import NAME, ROOT, an_image, newer_core
+from update_bed import NAME, NEWER, ROOT, an_image, core_of
 
 from gemelo.firmware.bindings.library import LIBRARY, LibraryMissing
 from gemelo.firmware.platform.host.firmware_slots import FirmwareSlots
@@ -35,7 +35,7 @@ def updated(folder: Path, image: bytes | None = None) -> FirmwareSlots:
 
 def test_a_library_that_was_removed_cut_off_or_replaced_is_made_again_from_its_image(tmp_path: Path) -> None:
     library = updated(tmp_path).boot().library
-    assert library.read_bytes() == newer_core()
+    assert library.read_bytes() == core_of(NEWER)
     for harm in (
         library.unlink,
         lambda: library.write_bytes(b""),
@@ -43,7 +43,7 @@ def test_a_library_that_was_removed_cut_off_or_replaced_is_made_again_from_its_i
     ):
         harm()
         assert slots(tmp_path).boot().slot == "ota_1"
-        assert library.read_bytes() == newer_core()
+        assert library.read_bytes() == core_of(NEWER)
 
 
 @pytest.mark.parametrize("way", [way for way in WAYS if way != GONE])
@@ -53,7 +53,7 @@ def test_a_library_that_the_disk_refuses_is_started_from_memory(way: str, tmp_pa
         disk.refuse()
         booted = board.boot()
         assert booted.slot == "ota_1"
-        assert booted.library.read_bytes() == newer_core()
+        assert booted.library.read_bytes() == core_of(NEWER)
         assert not list(disk.folder.glob("*.so"))
 
 

@@ -37,7 +37,7 @@ from gemelo.tools.cli.device.update_transfer import SerialWire, UpdateStatus, Up
 from gemelo.tools.cli.main import run
 
 ROOT = Path(__file__).resolve().parents[2]
-NEWER = "1.0.9"  # as long as the version that it replaces in the library's bytes
+NEWER, OLDER = "1.0.9", "0.9.9"  # as long as the version that they replace in the library's bytes
 NAME = "virtual_esp32"
 SILENT = """
 #include <stddef.h>
@@ -49,12 +49,12 @@ int64_t gemelo_take_request() { return -1; }
 """  # and nothing else does or says anything
 
 
-def newer_core() -> bytes:
+def core_of(version: str) -> bytes:
     """This core, but for what it calls its version."""
     old = b"\0" + source_version().encode() + b"\0"
     code = LIBRARY.read_bytes()
     assert code.count(old) == 1
-    return code.replace(old, b"\0" + NEWER.encode() + b"\0")
+    return code.replace(old, b"\0" + version.encode() + b"\0")
 
 
 def silent_core(folder: Path) -> bytes:
@@ -73,9 +73,9 @@ def exported(library: Path) -> list[str]:
     return [line.split()[-1] for line in done.stdout.splitlines()]
 
 
-def an_image(code: bytes | None = None) -> bytes:
-    """An image of `code`, or of a core that is newer than what runs."""
-    return virtual_image(newer_core() if code is None else code, NEWER)
+def an_image(code: bytes | None = None, version: str = NEWER) -> bytes:
+    """An image of `code`, or of a core of that version: newer than what runs, if nothing is said."""
+    return virtual_image(core_of(version) if code is None else code, version)
 
 
 class UpdateBed:

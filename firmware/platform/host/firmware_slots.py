@@ -20,7 +20,7 @@ import msgspec
 
 from gemelo.firmware.bindings.firmware_slot import SlotRefused
 from gemelo.firmware.bindings.library import LIBRARY, LibraryMissing, load_library
-from gemelo.libraries.runtime.firmware_update import HEADER, NoImage, read_header
+from gemelo.libraries.runtime.firmware_update import HEADER, NoImage, leave_for_older, read_header
 from gemelo.libraries.runtime.process.unwritten import Attempts, UnwrittenFiles
 from gemelo.libraries.runtime.signatures import SignatureError, is_signed
 
@@ -123,6 +123,14 @@ class FirmwareSlots:
             raise SlotRefused(str(error)) from error
         if not is_good:
             raise SlotRefused("its signature is not by the key that this device was provisioned with")
+
+    def permits_older(self, digest: bytes, boot_id: int, signature: bytes) -> bool:
+        """True if the key's owner lets this boot go back to the image with this SHA-256."""
+        key = self._key()
+        leave = hashlib.sha256(leave_for_older(digest, boot_id)).digest()
+        with suppress(SignatureError):
+            return bool(key) and is_signed(key, leave, signature)
+        return False
 
     def begin(self, size: int) -> None:
         """Opens the slot that does not run; raises SlotRefused."""

@@ -36,6 +36,7 @@ struct FirmwareCalls {
     int (*write)(const uint8_t* bytes, size_t size, char* reason);
     int (*finish)(const uint8_t* digest, char* reason);
     void (*abort)();
+    int (*permits_older)(const uint8_t* digest, uint32_t boot_id, const uint8_t* signature, size_t size);
 };
 
 class VirtualDevice {

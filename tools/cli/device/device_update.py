@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +11,7 @@ from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.credentials.private_files import AccessError, require_private
 from gemelo.libraries.mqtt.access import gateway_access
 from gemelo.libraries.runtime.deployment import project_root
-from gemelo.libraries.runtime.firmware_update import ImageHeader, NoImage, read_header
+from gemelo.libraries.runtime.firmware_update import ImageHeader, NoImage, leave_for_older, read_header
 from gemelo.libraries.runtime.signatures import SignatureError, make_key, sign
 from gemelo.libraries.runtime.started import load_started
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
@@ -41,11 +42,13 @@ def add_options(parser: Parser) -> None:
     parser.add_argument("--baud", type=positive_integer, default=BAUD, metavar="BAUD", help="921600 if not said")
     parser.add_argument("--device", metavar="NAME", help="its name at the broker [that of the deployment's robot]")
     parser.add_argument("--key", type=Path, metavar="FILE", help=f"the private key that signs [{KEY}]")
+    parser.add_argument("--downgrade", action="store_true", help="send it though it is older than what the device runs")
     parser.add_argument("--make-key", action="store_true", help="make such a key instead, and its public one beside it")
     parser.epilog = (
         "The device checks the signature with the public key that `gemelo device provision --update-key` gave it over "
         "its cable, takes the image only while it is disarmed, and goes back to the firmware before unless the new one "
-        f"says status within {TRIAL:g} s. A transfer that was cut off goes on where it ended.\n\n{parser.epilog}"
+        f"says status within {TRIAL:g} s. A version older than what runs is refused without --downgrade. "
+        f"A transfer that was cut off goes on where it ended.\n\n{parser.epilog}"
     )
 
 
@@ -59,14 +62,15 @@ def run(options: Options) -> ExitCode:
             raise usage("which file? the image that `pio run` has built, as .pio/build/esp32/firmware.bin")
         image, header = read_image(options.file)
         require_private(str(key))
-        signature = sign(key, image)
+        signature = sign(key, image)  # also that the key is good, before anything is asked of the device
     except SignatureError as error:
         raise CommandError(str(error)) from error
     except AccessError as error:
         raise CommandError(f"{error}; `gemelo device update --make-key` makes a key") from error
     print(f"{options.file}: {header.project} {header.version} for {header.chip}, {len(image)} bytes", flush=True)
     with wire_of(options) as wire:
-        return update(wire, image, signature)
+        older = key if options.downgrade else None
+        return update(wire, image, signature, older)
 
 
 def make(key: Path) -> ExitCode:
@@ -108,8 +112,11 @@ def wire_of(options: Options) -> Iterator[UpdateWire]:
         yield wire
 
 
-def update(wire: UpdateWire, image: bytes, signature: bytes) -> ExitCode:
-    """Brings the image there and waits for what becomes of it; raises `CommandError` unless it runs in the end."""
+def update(wire: UpdateWire, image: bytes, signature: bytes, older: Path | None = None) -> ExitCode:
+    """Brings the image there and waits for what becomes of it; raises `CommandError` unless it runs in the end.
+
+    `older`: the key that signs the leave for an image that is older than what runs.
+    """
     before = await_status(wire, TO_ANSWER, lambda _: True)
     if before is None:
         raise CommandError(
@@ -117,6 +124,8 @@ def update(wire: UpdateWire, image: bytes, signature: bytes) -> ExitCode:
         )
     if before.armed:
         raise CommandError("the device is armed: `gemelo device disarm` first, the arm must be able to do without")
+    if older is not None:
+        signature = sign(older, leave_for_older(hashlib.sha256(image).digest(), before.boot_id))
     block = LiveBlock()
     transfer = Transfer(wire, image, signature, lambda sent: block.draw(f"{100 * sent // len(image)} % sent"))
     had = transfer.run(before.boot_id)

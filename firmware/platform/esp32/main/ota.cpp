@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "bytes.h"
 #include "esp_system.h"
 #include "mbedtls/pk.h"
 #include "phrase.h"
@@ -33,7 +34,7 @@ bool is_signed(const char* key, const uint8_t* digest, const uint8_t* signature,
 
 void Ota::begin(const Credentials& credentials, uint64_t now_us) {
     credentials_ = &credentials;
-    slot_ = {this, kThisChip.image_id, verify, open, write, finish, abort};
+    slot_ = {this, kThisChip.image_id, verify, open, write, finish, abort, permits_older};
     begun_us_ = now_us;
     esp_ota_img_states_t state = ESP_OTA_IMG_UNDEFINED;
     is_on_trial_ = esp_ota_get_state_partition(esp_ota_get_running_partition(), &state) == ESP_OK &&
@@ -61,6 +62,21 @@ bool Ota::verify(void* self, const uint8_t* digest, const uint8_t* signature, si
     if (key[0] == 0) return refuse(refusal, "it has no key for updates: provision --update-key over its cable");
     if (is_signed(key, digest, signature, size)) return true;
     return refuse(refusal, "its signature is not by the key that this device was provisioned with");
+}
+
+bool Ota::permits_older(void* self, const uint8_t* digest, uint32_t boot_id, const uint8_t* signature, size_t size) {
+    const char* key = static_cast<Ota*>(self)->credentials_->update_key;
+    uint8_t boot[sizeof boot_id], leave[kDigestSize];
+    store_u32(boot, boot_id);
+    mbedtls_sha256_context hash;
+    mbedtls_sha256_init(&hash);
+    mbedtls_sha256_starts(&hash, 0);
+    mbedtls_sha256_update(&hash, digest, kDigestSize);
+    mbedtls_sha256_update(&hash, reinterpret_cast<const uint8_t*>("older"), 5);  // standard: PROTOCOL.md
+    mbedtls_sha256_update(&hash, boot, sizeof boot);
+    mbedtls_sha256_finish(&hash, leave);
+    mbedtls_sha256_free(&hash);
+    return key[0] != 0 && is_signed(key, leave, signature, size);
 }
 
 bool Ota::open(void* self, uint32_t size, Refusal* refusal) {

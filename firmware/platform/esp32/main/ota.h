@@ -33,6 +33,8 @@ class Ota {
     static bool write(void* self, const uint8_t* bytes, size_t size, Refusal* refusal);
     static bool finish(void* self, const uint8_t* digest, Refusal* refusal);
     static void abort(void* self);
+    static bool permits_older(void* self, const uint8_t* digest, uint32_t boot_id, const uint8_t* signature,
+                              size_t size);
 
     const Credentials* credentials_ = nullptr;
     FirmwareSlot slot_;

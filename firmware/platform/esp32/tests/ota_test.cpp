@@ -21,11 +21,12 @@ const fake::Key& key() {
     return made;
 }
 
-std::string image(uint16_t chip_id = 0, size_t size = 9000) {
+std::string image(uint16_t chip_id = 0, size_t size = 9000, const std::string& version = "1.0.0") {
     std::string bytes(size, 'x');
     bytes[0] = static_cast<char>(kImageMagic);
     bytes[kImageChipOffset] = static_cast<char>(chip_id);
     bytes[kImageChipOffset + 1] = 0;
+    bytes.replace(kImageVersionOffset, version.size() + 1, version.c_str(), version.size() + 1);
     return bytes;
 }
 
@@ -137,6 +138,24 @@ TEST_F(Updated, ASignatureByAnotherKeyOrOfAnotherImageIsRefusedAndNothingIsWritt
     start(ESP_RST_POWERON);
     EXPECT_TRUE(has(begin(image()), "it has no key for updates"));
     EXPECT_EQ(chip.flash.slot[1], "");
+}
+
+TEST_F(Updated, AnOlderImageIsWrittenByASignedLeaveForThisBootOnly) {
+    const std::string older = image(0, 9000, "0.9.0");
+    begin(older);
+    EXPECT_TRUE(has(tell(UpdateStep::Data, 0, bytes_of(older.substr(0, kPiece))),
+                    "its version 0.9.0 is older than what runs, 1.0.0"));
+    EXPECT_EQ(chip.flash.slot[1], "");
+    const auto leave = [&](uint32_t boot_id) {
+        std::string boot(4, 0);
+        store_u32(reinterpret_cast<uint8_t*>(boot.data()), boot_id);
+        return announced(older, key().sign(fake::sha256(older) + "older" + boot));
+    };
+    EXPECT_TRUE(has(tell(UpdateStep::Begin, 0, leave(rig::kBoot + 1)), "its signature is not by the key"));
+    EXPECT_TRUE(has(tell(UpdateStep::Begin, 0, leave(rig::kBoot)), "\"accepted\": true"));
+    send(older);
+    EXPECT_TRUE(has(tell(UpdateStep::End), "\"accepted\": true"));
+    EXPECT_EQ(chip.flash.slot[1], older);
 }
 
 TEST_F(Updated, AnImageThatWasDamagedOrIsNoneOrForAnotherChipOrTooLargeIsNotStarted) {
