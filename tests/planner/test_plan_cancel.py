@@ -12,7 +12,8 @@ from msgspec.structs import replace
 
 from gemelo.schemas.planning import NamedGoal, PlanCode, PlanPhase, PlanRequest, PlanResponse
 from gemelo.schemas.scene import PlanningScene
-from gemelo.services.planner.workers.workers import LONGEST_ID, MOST, MOST_PLANS, Workers
+from gemelo.services.planner.workers.pending_plan import LONGEST_ID, MOST_PLANS
+from gemelo.services.planner.workers.workers import MOST, Workers
 from tests.planner.processes import planning_processes
 from tests.planner.walled import WALLED, past_the_wall
 

@@ -5,7 +5,6 @@ A plan is made when it is asked for, and answered when its time is over; a cance
 
 from __future__ import annotations
 
-import itertools
 from contextlib import suppress
 from functools import partial
 
@@ -18,7 +17,7 @@ from gemelo.services.planner.request.deadline import Stopwatch, endless
 from gemelo.services.planner.timing.profile import NoProfile
 from gemelo.services.planner.timing.toppra_speeds import load_toppra
 from gemelo.services.planner.workers.jobs import Job
-from gemelo.services.planner.workers.pending_plan import Answer, OnInputs, PendingPlan
+from gemelo.services.planner.workers.pending_plan import Answer, OnInputs, PendingPlan, PendingPlans
 from gemelo.services.planner.workers.process import nothing
 from gemelo.services.planner.workers.workers import (
     AGAIN,
@@ -26,13 +25,10 @@ from gemelo.services.planner.workers.workers import (
     CHANGING_REMEDY,
     Present,
     Scene,
-    cancelled,
     failed,
     for_process,
     inputs_of,
     longest,
-    objection_to,
-    progress_of,
 )
 
 # Measured: the time of a long native search between two questions whether its time is over, and how many times as long
@@ -49,37 +45,22 @@ class PlansInProcess:
     def __init__(self, clock: Clock, planner: Planner, present: Present, scene: Scene) -> None:
         self._clock, self._planner, self._present, self._scene = clock, planner, present, scene
         self._prepared: World | None = None
-        self._pending_plans: dict[str, PendingPlan] = {}
-        self._numbers = itertools.count(1)
+        self._pending_plans = PendingPlans(clock)
         self._prepare()
 
     def plan(self, request: PlanRequest, answer: Answer, on_inputs: OnInputs = nothing) -> None:
         """`answer` is called with the response when the plan's virtual time is over."""
-        request_id = request.request_id or f"planner-{next(self._numbers)}"
-        objection = objection_to(request_id, self._pending_plans)
-        if objection is not None:
-            return answer(PlanResponse(code=PlanCode.INVALID_GOAL_CONSTRAINTS, refusal=objection))
-
-        def end(response: PlanResponse) -> None:
-            del self._pending_plans[request_id]
-            answer(response)
-
-        pending_plan = PendingPlan(request_id, request, end, on_inputs, self._clock)
-        self._pending_plans[request_id] = pending_plan
-        pending_plan.begin()
-        self._make(pending_plan, AGAIN)
+        pending_plan = self._pending_plans.add(request, answer, on_inputs)
+        if pending_plan is not None:  # no process takes it up: a cancel ends it at once
+            self._make(pending_plan, AGAIN)
 
     def cancel(self, request_id: str) -> PlanCancelResult:
         """Ends a plan whose time is not over."""
-        pending_plan = self._pending_plans.get(request_id)
-        result = cancelled(request_id, pending_plan)
-        if pending_plan is not None:
-            pending_plan.end(None)
-        return result
+        return self._pending_plans.cancel(request_id)
 
     def progress(self, now: int) -> list[PlanProgress]:
         """Of every plan that is no short one; `now` [ns] UNIX."""
-        return progress_of(self._pending_plans.values(), now)
+        return self._pending_plans.progress(now)
 
     def close(self) -> None:
         """There is nothing to end."""

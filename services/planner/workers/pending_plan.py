@@ -1,12 +1,22 @@
-"""One plan from its request to its answer, and what can be said of it meanwhile."""
+"""Plans from their requests to their answers, and what can be said of them meanwhile."""
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections.abc import Callable
 
 from gemelo.libraries.runtime.clock import SYSTEM, Clock
-from gemelo.schemas.planning import PlanCode, PlanInputs, PlanPhase, PlanProgress, PlanRequest, PlanResponse, Refusal
+from gemelo.schemas.planning import (
+    PlanCancelResult,
+    PlanCode,
+    PlanInputs,
+    PlanPhase,
+    PlanProgress,
+    PlanRequest,
+    PlanResponse,
+    Refusal,
+)
 
 WORDS = {
     PlanPhase.WAITING: "waiting",
@@ -16,6 +26,11 @@ WORDS = {
     PlanPhase.TIMING: "timing",
     PlanPhase.VERIFICATION: "verifying",
 }
+
+# Tuning constants: chosen, where a line does not say measured or standard.
+SHORT = 0.1  # [s] until which nothing is said of a plan; chosen: a person does not see less
+LONGEST_ID = 100  # characters; chosen: ours have 32, and nobody's fills the memory
+MOST_PLANS = 64  # that wait or are being made; chosen: more than people ask for, little memory
 
 Answer = Callable[[PlanResponse], None]
 OnInputs = Callable[[PlanInputs], object]  # what it was planned from
@@ -100,3 +115,65 @@ class PendingPlan:
             remedy="plan again, if it is wanted after all",
         )
         return PlanResponse(code=PlanCode.PREEMPTED, refusal=refusal)
+
+
+class PendingPlans:
+    """The plans of one maker, by id; everything here may be called from any thread."""
+
+    def __init__(self, clock: Clock = SYSTEM) -> None:
+        self._clock = clock
+        self._plans: dict[str, PendingPlan] = {}
+        self._numbers = itertools.count(1)
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        return len(self._plans)
+
+    def add(self, request: PlanRequest, answer: Answer, on_inputs: OnInputs) -> PendingPlan | None:
+        """One more, whose `answer` is called once when it ends; None where it is refused, and answered."""
+        with self._lock:
+            request_id = request.request_id or f"planner-{next(self._numbers)}"
+            objection = self._objection_to(request_id)
+            if objection is None:
+
+                def end(response: PlanResponse) -> None:
+                    with self._lock:
+                        del self._plans[request_id]
+                    answer(response)
+
+                pending_plan = self._plans[request_id] = PendingPlan(request_id, request, end, on_inputs, self._clock)
+                return pending_plan
+        answer(PlanResponse(code=PlanCode.INVALID_GOAL_CONSTRAINTS, refusal=objection))
+        return None
+
+    def cancel(self, request_id: str) -> PlanCancelResult:
+        """Cancels the plan of that id, if there is one; the answer to who asked for it."""
+        if not request_id:
+            return PlanCancelResult(message="request_id is empty: give the one that the plan was asked for with")
+        with self._lock:
+            pending_plan = self._plans.get(request_id)
+        if pending_plan is None or not pending_plan.cancel():
+            return PlanCancelResult(message=f'there is no plan "{request_id}": it has ended, or never began')
+        return PlanCancelResult(found=True, message=f'the plan "{request_id}" is cancelled {pending_plan.words}')
+
+    def progress(self, now: int) -> list[PlanProgress]:
+        """Of every plan that is no short one; `now` [ns] UNIX."""
+        with self._lock:
+            plans = list(self._plans.values())
+        return [each.progress(now) for each in plans if each.elapsed > SHORT]
+
+    def _objection_to(self, request_id: str) -> Refusal | None:
+        if len(self._plans) >= MOST_PLANS:
+            return _refused(
+                "plan", f"{MOST_PLANS} plans are waiting already", "plan again when some of them have ended"
+            )
+        remedy = "choose another request_id, or leave it empty"
+        if len(request_id) > LONGEST_ID:
+            return _refused("request_id", f"request_id has {len(request_id)} characters: at most {LONGEST_ID}", remedy)
+        if request_id in self._plans:
+            return _refused("request_id", f'a plan "{request_id}" is being made already', remedy)
+        return None
+
+
+def _refused(subject: str, message: str, remedy: str) -> Refusal:
+    return Refusal(check="request", subject=subject, message=message, remedy=remedy)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -26,7 +25,7 @@ from gemelo.schemas.planning import (
 from gemelo.schemas.scene import PlanningScene
 from gemelo.services.planner.core import LONGEST
 from gemelo.services.planner.workers.jobs import Job
-from gemelo.services.planner.workers.pending_plan import Answer, Cancelled, OnInputs, PendingPlan
+from gemelo.services.planner.workers.pending_plan import Answer, Cancelled, OnInputs, PendingPlan, PendingPlans
 from gemelo.services.planner.workers.process import Late, PlannerProcess, WorkerDied, nothing
 
 MOST = 2  # processes; chosen: as many as small computers have cores for it
@@ -46,9 +45,6 @@ AGAIN = 3  # plans of one request, where the scene changes or the process dies m
 MOST_DEATHS = 1  # after which a plan is made again; chosen: one that ends two processes may end every one
 DIED_REMEDY = "plan again: new ones are started; the system's log may say what has ended them (out of memory?)"
 LOOK = 0.2  # [s] between two looks whether the scene has changed; chosen: an idle thread that costs nothing
-SHORT = 0.1  # [s] until which nothing is said of a plan; chosen: a person does not see less
-LONGEST_ID = 100  # characters; chosen: ours have 32, and nobody's fills the memory
-MOST_PLANS = 64  # that wait or are being made; chosen: more than people ask for, little memory
 
 Present = Callable[[], tuple[JointState | None, float]]
 Scene = Callable[[], PlanningScene]
@@ -63,8 +59,7 @@ class Workers:
         self._tasks: SimpleQueue[PendingPlan | None] = SimpleQueue()
         self._processes: list[PlannerProcess] = []
         self._threads: list[threading.Thread] = []
-        self._pending_plans: dict[str, PendingPlan] = {}
-        self._numbers = itertools.count(1)
+        self._pending_plans = PendingPlans()
         self._lock = threading.Lock()
         self._start_one()
 
@@ -78,32 +73,22 @@ class Workers:
 
         `on_inputs` is told before, in the same thread, what a process has planned from: the last call counts.
         """
+        pending_plan = self._pending_plans.add(request, answer, on_inputs)
+        if pending_plan is None:
+            return
         with self._lock:
-            request_id = request.request_id or f"planner-{next(self._numbers)}"
-            objection = objection_to(request_id, self._pending_plans)
-            if objection is None:
-                pending_plan = PendingPlan(
-                    request_id, request, lambda response: self._end(request_id, response, answer), on_inputs
-                )
-                self._pending_plans[request_id] = pending_plan
-                self._tasks.put(pending_plan)
-                if len(self._pending_plans) > len(self._processes) < MOST:
-                    with suppress(OSError):  # no memory, or no descriptor: the plan waits for the process that there is
-                        self._start_one()
-        if objection is not None:
-            answer(PlanResponse(code=PlanCode.INVALID_GOAL_CONSTRAINTS, refusal=objection))
+            self._tasks.put(pending_plan)
+            if len(self._pending_plans) > len(self._processes) < MOST:
+                with suppress(OSError):  # no memory, or no descriptor: the plan waits for the process that there is
+                    self._start_one()
 
     def cancel(self, request_id: str) -> PlanCancelResult:
         """Ends a plan that waits now, one that is being made soon."""
-        with self._lock:
-            pending_plan = self._pending_plans.get(request_id)
-        return cancelled(request_id, pending_plan)
+        return self._pending_plans.cancel(request_id)
 
     def progress(self, now: int) -> list[PlanProgress]:
         """Of every plan that is no short one; `now` [ns] UNIX."""
-        with self._lock:
-            pending_plans = list(self._pending_plans.values())
-        return progress_of(pending_plans, now)
+        return self._pending_plans.progress(now)
 
     def close(self) -> None:
         """Ends every process, in the midst of a plan too."""
@@ -112,11 +97,6 @@ class Workers:
             process.end()
         for thread in self._threads:
             thread.join(PATIENCE)
-
-    def _end(self, request_id: str, response: PlanResponse, answer: Answer) -> None:
-        with self._lock:
-            del self._pending_plans[request_id]
-        answer(response)
 
     def _start_one(self) -> None:
         process = PlannerProcess(self._folder, self._project)
@@ -205,32 +185,6 @@ class Workers:
         )
 
 
-def objection_to(request_id: str, pending_plans: Mapping[str, PendingPlan]) -> Refusal | None:
-    """Why another plan of that id is not begun; None if it is."""
-    if len(pending_plans) >= MOST_PLANS:
-        return _refused("plan", f"{MOST_PLANS} plans are waiting already", "plan again when some of them have ended")
-    remedy = "choose another request_id, or leave it empty"
-    if len(request_id) > LONGEST_ID:
-        return _refused("request_id", f"request_id has {len(request_id)} characters: at most {LONGEST_ID}", remedy)
-    if request_id in pending_plans:
-        return _refused("request_id", f'a plan "{request_id}" is being made already', remedy)
-    return None
-
-
-def cancelled(request_id: str, pending_plan: PendingPlan | None) -> PlanCancelResult:
-    """Cancels the plan of that id, if there is one; the answer to who asked for it."""
-    if not request_id:
-        return PlanCancelResult(message="request_id is empty: give the one that the plan was asked for with")
-    if pending_plan is None or not pending_plan.cancel():
-        return PlanCancelResult(message=f'there is no plan "{request_id}": it has ended, or never began')
-    return PlanCancelResult(found=True, message=f'the plan "{request_id}" is cancelled {pending_plan.words}')
-
-
-def progress_of(pending_plans: Iterable[PendingPlan], now: int) -> list[PlanProgress]:
-    """Of every plan that is no short one; `now` [ns] UNIX."""
-    return [pending_plan.progress(now) for pending_plan in pending_plans if pending_plan.elapsed > SHORT]
-
-
 def inputs_of(job: Job, scene: PlanningScene, elapsed: float) -> PlanInputs:
     """What `job` was planned from, in `elapsed` [s]."""
     return PlanInputs(
@@ -264,7 +218,3 @@ def _with_what_is_left(request: PlanRequest, began: float | None) -> PlanRequest
 def failed(message: str, remedy: str) -> PlanResponse:
     refusal = Refusal(check="planner", subject="worker", message=message, remedy=remedy)
     return PlanResponse(code=PlanCode.FAILURE, refusal=refusal)
-
-
-def _refused(subject: str, message: str, remedy: str) -> Refusal:
-    return Refusal(check="request", subject=subject, message=message, remedy=remedy)
