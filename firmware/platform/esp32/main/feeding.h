@@ -1,4 +1,4 @@
-// When a task feeds its watchdog: by the time that has passed, however long its turns take.
+// The moments at which a task feeds its watchdog: by the time that has passed, however long its turns take.
 #pragma once
 
 #include <stdint.h>
