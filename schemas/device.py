@@ -306,5 +306,5 @@ class CommandAck(Message, frozen=True, kw_only=True):
     next_seq: int = 0
     credits: int = 0  # [knots] that would still fit
     buffered: float = 0.0  # [s]
-    round_trip: float = 0.0  # [s] from sending to this answer
+    round_trip: float = 0.0  # [s] from sending to this answer; 0 where nothing has gone over the board's wire for it
     steps: tuple[int, ...] = ()  # executed, latest known at this answer

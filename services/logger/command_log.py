@@ -124,7 +124,8 @@ def is_well_formed(chunk: CommandChunk) -> bool:
 
 def _lines(chunk: CommandChunk, ack: CommandAck | None, code: str) -> list[CommandRow]:
     when = (str(chunk.seq), str(chunk.stamp // 1000), iso(chunk.stamp))
-    stamp, round_trip = ("", "") if ack is None else (str(ack.stamp // 1000), f"{ack.round_trip * 1e3:.3f}")
+    stamp = "" if ack is None else str(ack.stamp // 1000)
+    round_trip = "" if ack is None or not ack.round_trip else f"{ack.round_trip * 1e3:.3f}"
     is_known = ack is not None and len(ack.steps) == len(chunk.name)
     executed = tuple(map(str, ack.steps)) if ack is not None and is_known else ("",) * len(chunk.name)
     return [

@@ -65,6 +65,10 @@ def test_no_view_shows_a_round_trip_that_the_boards_wire_has_not_made(moved: Ske
     assert state_round_trip_text(newest(line, "device/state")) in ("round trip 9.0 ms", "round trip 10.0 ms")
 
 
+def test_no_answer_to_a_chunk_claims_a_round_trip(moved: SketchArm) -> None:
+    assert {ack.round_trip for ack in moved.published["command_acks"]} == {0.0}
+
+
 def test_the_viewers_panel_says_it(moved: SketchArm) -> None:
     state = newest(moved, "device/state")
     shown = panel(PanelInputs(robot="rm1", status=newest(moved, "device/status"), state=state), state.stamp)

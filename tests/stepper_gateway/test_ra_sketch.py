@@ -162,11 +162,12 @@ def test_a_sketch_that_restarts_in_a_message_is_noticed_however_soon_it_speaks_a
     assert "gemelo reference" in world.goal(move(HOME, (0.1, 0.0, 0.0), arm=arm), "next").reason
 
 
-def test_a_message_that_was_lost_with_its_connection_ends_the_move() -> None:
+@pytest.mark.parametrize("after", [0.0, 4.0], ids=["the first", "a later one"])
+def test_a_message_that_was_lost_with_its_connection_ends_the_move(after: float) -> None:
     """The broker sends back what it has passed on: what does not come back is not at the sketch."""
     arm = SketchArm().referenced()
     assert arm.goal(ra_move(HOME, (QUARTER, 0.0, 0.0))).accepted
-    arm.run(4.0)
+    arm.run(after)
     arm.drops = 1
     status, result = arm.finish()
     assert status is GoalStatusCode.ABORTED

@@ -111,11 +111,18 @@ class RaDevice:
 
     @property
     def _is_settled(self) -> bool:
-        return self._sender.is_done and self._stand_in.steps == self.sent
+        return self._sender.is_done and not self._is_unseen and self._stand_in.steps == self.sent
+
+    @property
+    def _is_unseen(self) -> bool:
+        """The broker, which sends our messages back to us, has not sent back the newest move."""
+        return self._sees_own and self._unseen is not None
 
     def _messages(self, now: float) -> list[bytes]:
         output = ra_messages.OUTPUT in self._stand_in.outputs
-        move = self._sender.take(self._stand_in.steps, not self._stand_in.is_moving, now)
+        move = None
+        if not self._is_unseen:
+            move = self._sender.take(self._stand_in.steps, not self._stand_in.is_moving, now)
         if move is not None:
             self._said_output = output
             message = ra_messages.joints_message(move, self._ramps, output)
@@ -129,8 +136,8 @@ class RaDevice:
     def _hear_joints(self, payload: bytes, now: float) -> None:
         """What the broker has passed on to the sketch: by another's move nobody knows any more where the arm is."""
         if payload in self._own:
-            if payload == self._unseen:
-                self._unseen, self._sees_own = None, True
+            self._sees_own = True
+            self._unseen = None if payload == self._unseen else self._unseen
             return
         if not ra_messages.moves(payload, self._ramps):
             return
@@ -145,11 +152,10 @@ class RaDevice:
     def _watch(self, now: float) -> None:
         """Presence: what a sketch that fell silent in a message did of it is not known, and no motion goes on."""
         silence = now - self._heard
-        if self._is_online and not self._sender.is_done:
-            if silence > self._patience(IN_A_MESSAGE):
-                return self._lose(SILENT.format(silence=silence), now)
-            if self._sees_own and self._unseen is not None and now - self._moved > UNSEEN:
-                return self._lose(LOST, now)
+        if self._is_online and not self._sender.is_done and silence > self._patience(IN_A_MESSAGE):
+            return self._lose(SILENT.format(silence=silence), now)
+        if self._is_online and self._is_unseen and now - self._moved > UNSEEN:
+            return self._lose(LOST, now)
         is_present = silence <= self._patience(AT_REST)
         if self._is_online and not is_present and (self._stand_in.is_moving or not self._is_settled):
             self._start(True, now)  # nothing of the motion was sent yet
