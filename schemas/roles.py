@@ -1,4 +1,4 @@
-"""Roles: who may say and hear what on the bus, beside what schemas/topics.py says of writers and servers.
+"""Roles: who may say and hear what on the bus, beside what schemas/topics.py says of writers, readers and servers.
 
 A role is the common name of a certificate. The nodes of a role write the topics and serve the requests and actions
 that the table of topics gives to their names; here stands what else the role may do.
@@ -12,51 +12,37 @@ from gemelo.schemas.message import Message
 from gemelo.schemas.topics import (
     ACTIONS,
     ANY,
+    CAMERA,
     CAMERA_TOPICS,
-    CONTACTS,
-    CONTROL,
     CONTROL_GIVE,
     CONTROL_JOIN,
     CONTROL_TAKE,
-    DESCRIPTION,
+    DETECTOR,
     DEVICE_COMMAND,
     DEVICE_CONFIGURE,
     DEVICE_ECHO,
-    DEVICE_EVENTS,
     DEVICE_INJECT,
-    DEVICE_SHAFT,
-    DEVICE_STATE,
-    DEVICE_STATUS,
     DEVICE_STOP,
     FK,
     GATEWAY,
-    GRIPPER_STATE,
     IK,
     JOG,
-    JOINT_COMMANDS,
-    JOINT_STATES,
     JOINT_TARGETS,
     LOG,
     PARAMETER_CHANGES,
     PLAN,
     PLAN_CANCEL,
-    PLANNED_PATH,
+    PLANNER,
     REQUESTS,
-    SCENE,
     SCENE_EDIT,
-    SENSORS,
+    STATE_PUBLISHER,
     STATE_VALIDITY,
     STATISTICS,
-    STEP_ERRORS,
-    STEP_LEDGER,
-    STOPPING_DISTANCE,
     TOPICS,
+    VISUALIZER,
     Action,
     Request,
     Topic,
-    camera_detections,
-    camera_image,
-    camera_info,
     scene_mesh,
 )
 
@@ -85,35 +71,36 @@ BY_EVERY_NODE: tuple[AnyTopic, ...] = (LOG, STATISTICS, PARAMETER_CHANGES)
 BY_HAND: tuple[AnyTopic, ...] = (JOG, JOINT_TARGETS)
 EACH_CAMERA = "*"  # in a key: the name of any camera
 OF_CAMERAS: tuple[AnyTopic, ...] = tuple(make(EACH_CAMERA) for make in CAMERA_TOPICS)
-SEEN: tuple[AnyTopic, ...] = tuple(make(EACH_CAMERA) for make in (camera_image, camera_info, camera_detections))
 MESHES: tuple[AnyTopic, ...] = (scene_mesh("*"),)  # of the scene, whatever their digests are
 EVERYTHING: tuple[AnyTopic, ...] = (*TOPICS, *MESHES, *OF_CAMERAS)
 RECORDED = (*(topic for topic in TOPICS if topic.recorded), *MESHES, *OF_CAMERAS)
+
+
+def read_by(node: str) -> tuple[AnyTopic, ...]:
+    """The topics that the table gives to a service to read; in those of cameras `EACH_CAMERA` stands for the camera."""
+    return tuple(topic for topic in EVERYTHING if node in topic.readers)
+
+
 STOPS: tuple[AnyRequest, ...] = (DEVICE_STOP,)  # whoever may connect may stop the arm
 LOOKS: tuple[AnyRequest, ...] = (IK, FK, STATE_VALIDITY)  # answers that change nothing
 CONTROLS: tuple[AnyRequest, ...] = (CONTROL_TAKE, CONTROL_JOIN, CONTROL_GIVE)
 MOVES: tuple[AnyRequest, ...] = (PLAN, PLAN_CANCEL, SCENE_EDIT, DEVICE_COMMAND, *CONTROLS)
 
 ROLES: tuple[Role, ...] = (
-    Role("gateway", "trajectories to step knots", GATEWAY, reads=(JOINT_TARGETS, SCENE)),
+    Role("gateway", "trajectories to step knots", GATEWAY, reads=read_by(GATEWAY)),
     Role(
-        "planner", "goals to verified trajectories, and jogging", "planner",
-        writes=(JOINT_TARGETS,), reads=(JOINT_STATES, GRIPPER_STATE, DEVICE_STATUS, JOG, CONTROL, SCENE), asks=STOPS,
+        "planner", "goals to verified trajectories, and jogging", PLANNER,
+        writes=(JOINT_TARGETS,), reads=read_by(PLANNER), asks=STOPS,
     ),
-    Role("state_publisher", "joint states to frames", "state_publisher", reads=(JOINT_STATES,), asks=STOPS),
+    Role(
+        "state_publisher", "joint states to frames", STATE_PUBLISHER, reads=read_by(STATE_PUBLISHER), asks=STOPS,
+    ),
     Role("logger", "everything recorded to files", "logger", reads=RECORDED, asks=STOPS, hears_requests=True),
     Role(
-        "visualizer", "everything that is seen to Rerun", "visualizer",
-        reads=(DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, DEVICE_STATE, DEVICE_STATUS, DEVICE_EVENTS,
-               SENSORS, DEVICE_SHAFT, PLANNED_PATH, SCENE, GRIPPER_STATE, CONTACTS, STEP_LEDGER, STOPPING_DISTANCE,
-               CONTROL, LOG, *MESHES, *SEEN),
-        asks=STOPS,
+        "visualizer", "everything that is seen to Rerun", VISUALIZER, reads=read_by(VISUALIZER), asks=STOPS,
     ),
-    Role(
-        "camera", "the images of all cameras", "camera", reads=(JOINT_STATES, GRIPPER_STATE, SCENE, *MESHES),
-        asks=STOPS,
-    ),
-    Role("detector", "what is in the images", "detector", reads=(JOINT_STATES, *SEEN[:2]), asks=STOPS),
+    Role("camera", "the images of all cameras", CAMERA, reads=read_by(CAMERA), asks=STOPS),
+    Role("detector", "what is in the images", DETECTOR, reads=read_by(DETECTOR), asks=STOPS),
     Role(
         "panel", "the operator's page", "panel",
         writes=BY_HAND, reads=EVERYTHING, asks=(*STOPS, *LOOKS, *MOVES, DEVICE_CONFIGURE, DEVICE_INJECT), acts=ACTIONS,

@@ -24,4 +24,6 @@ def living_topic(told: TopicInterface) -> LivingTopic:
     fields = [(name, Any, None) for name, _ in told.fields]
     kind = msgspec.defstruct(told.message, fields, bases=(Message,), frozen=True, kw_only=True)
     delivery = Delivery(told.delivery) if told.delivery in {each.value for each in Delivery} else Delivery.EVERY
-    return LivingTopic(told.key, kind, delivery, told.rate, told.recorded, told.writer, told.about, dict(told.fields))
+    return LivingTopic(
+        told.key, kind, delivery, told.rate, told.recorded, told.writer, told.about, fields=dict(told.fields)
+    )
