@@ -206,6 +206,15 @@ def scene_mesh(digest: str) -> Topic[scene.SceneMesh]:
     return Topic(key, scene.SceneMesh, LATCHED, None, False, PLANNER, about, (VISUALIZER, CAMERA))
 
 
+EXCHANGES = "@request/"  # before the key of a request: its questions, each with its answer
+
+
+def exchange_topic(request: Request[Message, Message]) -> Topic[system.Exchange]:
+    """A request travels between two nodes only, so its server publishes each question with its answer."""
+    about = f"questions of {request.key}, each with its answer"
+    return Topic(EXCHANGES + request.key, system.Exchange, EVERY, None, request.recorded, request.server, about)
+
+
 # One of each for every camera of the cell file, by the camera's name.
 
 

@@ -13,11 +13,10 @@ import msgspec
 
 from gemelo.libraries.recordings.living_topic import LivingTopic, living_topic
 from gemelo.libraries.runtime.actions import keys
-from gemelo.libraries.runtime.requests.exchanges import exchange_topic
 from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.message import Message, Vector
 from gemelo.schemas.system import NodeRecord
-from gemelo.schemas.topics import ACTIONS, LATCHED, REQUESTS, TOPICS, Action, Request, Topic
+from gemelo.schemas.topics import ACTIONS, LATCHED, REQUESTS, TOPICS, Action, Request, Topic, exchange_topic
 
 NODES = Topic("nodes", NodeRecord, LATCHED, None, True, "logger", "the nodes, their topics and their parameters")
 PLAIN: dict[str, type] = {"bool": bool, "int": int, "float": float, "str": str}

@@ -10,9 +10,8 @@ from fractions import Fraction
 
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
-from gemelo.libraries.arm.motors.speed import speed_limits
+from gemelo.libraries.arm.motors.speed import fastest_steps, speed_limits
 from gemelo.libraries.arm.motors.steps import exact_ratio
-from gemelo.libraries.arm.motors.tick import fastest_steps
 from gemelo.libraries.robot_import.parts import PINS, SWITCH_PINS, DriverPart, MotorPart, driver_named, motor_named
 from gemelo.libraries.robot_import.questions import Questions, above_zero, one_of, whole, yes_or_no
 

@@ -29,16 +29,14 @@ from gemelo.libraries.runtime.endpoints import (
     parameters_request,
 )
 from gemelo.libraries.runtime.errors import NodeNameTaken
-from gemelo.libraries.runtime.loop.failures import Failures
 from gemelo.libraries.runtime.loop.loop import Loop
 from gemelo.libraries.runtime.loop.task_queue import Worker
 from gemelo.libraries.runtime.parameters import ParameterRegistry, ParameterSet
-from gemelo.libraries.runtime.process.logs import BusHandler, line_logger
+from gemelo.libraries.runtime.process.logs import BusHandler, Failures, line_logger
 from gemelo.libraries.runtime.process.readiness import Readiness
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest, stop_on_signals
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.libraries.runtime.requests import client as requests
-from gemelo.libraries.runtime.requests.exchanges import exchange_topic
 from gemelo.libraries.runtime.requests.limits import RequestRates
 from gemelo.libraries.runtime.requests.server import Pending, RequestServer, UrgentServer
 from gemelo.libraries.runtime.running import find_deployment
@@ -56,7 +54,7 @@ from gemelo.schemas.system import (
     SetParameter,
     TopicStatistics,
 )
-from gemelo.schemas.topics import LOG, PARAMETER_CHANGES, STATISTICS, Action, Request, Topic
+from gemelo.schemas.topics import LOG, PARAMETER_CHANGES, STATISTICS, Action, Request, Topic, exchange_topic
 
 if TYPE_CHECKING:
     from gemelo.libraries.runtime.actions.server import ActionServer, OnCancel, OnGoal, ReadGoal

@@ -13,7 +13,6 @@ from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint, urdf_of
 from gemelo.libraries.recordings.channels import Entry
 from gemelo.libraries.recordings.incidents import BLACK_BOX, Happening, Incident, time_of
 from gemelo.libraries.runtime.actions import keys
-from gemelo.libraries.runtime.requests.exchanges import PREFIX
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceEvent, DeviceMode, DeviceState
 from gemelo.schemas.frames import RobotDescription
@@ -22,7 +21,7 @@ from gemelo.schemas.ledger import StepLedger, StoppingDistance
 from gemelo.schemas.message import Message
 from gemelo.schemas.planning import PlanResponse
 from gemelo.schemas.system import LogLevel, LogRecord, ParameterChange
-from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, JOINT_STATES
+from gemelo.schemas.topics import EXCHANGES, FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, JOINT_STATES
 from gemelo.services.logger.incident_watch import STOPPED, Trigger
 
 SECOND = 1_000_000_000  # [ns]
@@ -77,8 +76,8 @@ def _story(entries: Iterable[Entry]) -> Iterator[tuple[int, str]]:
 def _told(entry: Entry) -> tuple[str, str]:
     """Who says it, and what; the gateway says an event of the device in its log too, and the end of a goal."""
     key, message = entry.topic.key, entry.message
-    if key.startswith(PREFIX):
-        return "", _exchange(key.removeprefix(PREFIX), message)
+    if key.startswith(EXCHANGES):
+        return "", _exchange(key.removeprefix(EXCHANGES), message)
     if key in ENDS:
         return "", _end(message)
     match message:
@@ -145,7 +144,7 @@ def _motion(before: Sequence[Entry], stamp: int) -> str:
     begun: dict[str, int] = {}
     for entry in before:
         message: Any = entry.message
-        if entry.topic.key == PREFIX + GOALS[0] and message.answer is not None and message.answer.accepted:
+        if entry.topic.key == EXCHANGES + GOALS[0] and message.answer is not None and message.answer.accepted:
             begun[message.question.goal_id] = entry.arrival
         elif entry.topic.key == ENDS[0] and entry.arrival < stamp:  # one that ends now is what this is about
             begun.pop(message.goal_id, None)

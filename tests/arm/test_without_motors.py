@@ -10,7 +10,7 @@ from gemelo.libraries.arm.checks.check import Severity, check
 from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm, require_motors
-from gemelo.libraries.arm.motors.tick import ROOM, fastest_steps
+from gemelo.libraries.arm.motors.speed import ROOM, fastest_steps
 from gemelo.schemas.deployment import DeviceKind
 from tests.arm.bare_arm import write_bare_arm
 from tests.arm.editing import edit

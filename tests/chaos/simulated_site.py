@@ -6,10 +6,9 @@ from typing import cast
 
 import gemelo
 from gemelo.libraries.runtime.actions.keys import goal_request
-from gemelo.libraries.runtime.requests.exchanges import exchange_topic
 from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.device import DeviceState
-from gemelo.schemas.topics import DEVICE_STATE, FOLLOW_JOINT_TRAJECTORY
+from gemelo.schemas.topics import DEVICE_STATE, FOLLOW_JOINT_TRAJECTORY, exchange_topic
 from gemelo.tools.chaos.site import ChaosSite
 from gemelo.tools.chaos.slots import SlotFile
 

@@ -27,7 +27,6 @@ KEPT = {
     "gemelo.services.planner.parameters": "as the parameters of every service",
     "gemelo.services.panel.view.pick_box": "a part of the page, as all its boxes",
     "gemelo.libraries.runtime.process.freed_memory": "the C library's heap, apart from the main of services",
-    "gemelo.services.stepper_gateway.ledger.reasons": "the sentences, apart from the arithmetic",
 }
 LOOKERS = ("tests/", "tools/bench/", "tools/chaos/", "tools/demo/", "docs/", "examples/")
 CLAUSES = {"What", "Where", "How", "Whether", "Who", "When", "Which", "Why", "Whatever", "True", "From", "By", "For"}

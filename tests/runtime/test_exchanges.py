@@ -10,7 +10,6 @@ from gemelo.libraries.runtime.bus.wire import MAX_PAYLOAD, MAX_PAYLOAD_OF
 from gemelo.libraries.runtime.endpoints import info_request
 from gemelo.libraries.runtime.errors import RequestRefused
 from gemelo.libraries.runtime.node import Node
-from gemelo.libraries.runtime.requests.exchanges import exchange_topic
 from gemelo.schemas.actions import GoalEnd, GoalStatusCode
 from gemelo.schemas.device import DeviceCommandRequest, DeviceCommandResponse, DeviceStopRequest
 from gemelo.schemas.message import decode
@@ -24,6 +23,7 @@ from gemelo.schemas.topics import (
     PARAMETER_CHANGES,
     REQUESTS,
     TOPICS,
+    exchange_topic,
 )
 from tests.runtime.support import spinning, until
 

@@ -13,7 +13,6 @@ from gemelo.libraries.runtime.bus.wire import LARGEST, MAX_PAYLOAD, MAX_PAYLOAD_
 from gemelo.libraries.runtime.bus.zenoh_config import MAX_MESSAGE_BYTES
 from gemelo.libraries.runtime.errors import GoalRefused, RequestRefused
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
-from gemelo.libraries.runtime.requests.exchanges import exchange_topic
 from gemelo.libraries.runtime.requests.limits import MAX_WAITING_BYTES, MAX_WAITING_BYTES_OF_A_CLIENT, WaitingRequests
 from gemelo.libraries.runtime.requests.server import MAX_REASON
 from gemelo.schemas.actions import GoalRequest
@@ -22,7 +21,7 @@ from gemelo.schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointT
 from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, Refusal, WaypointGoal
 from gemelo.schemas.scene import MeshShape, SceneAdd, SceneObject, SceneRequest, SceneResponse
 from gemelo.schemas.system import Exchange, LogRecord
-from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, LOG, PLAN, SCENE_EDIT
+from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, LOG, PLAN, SCENE_EDIT, exchange_topic
 from tests.runtime.conftest import Buses
 from tests.runtime.support import hear, spinning
 

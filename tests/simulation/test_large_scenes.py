@@ -15,13 +15,12 @@ from hypothesis import strategies as st
 import gemelo
 from gemelo.libraries.recordings.subscriptions import Subscriptions
 from gemelo.libraries.runtime.bus.wire import MAX_PAYLOAD_OF
-from gemelo.libraries.runtime.requests.exchanges import exchange_topic
 from gemelo.libraries.runtime.scene_meshes import SceneMeshes
 from gemelo.schemas.message import encode
 from gemelo.schemas.scene import BoxShape, MeshShape, PlanningScene, SceneMove, SceneObject, SceneRequest
 from gemelo.schemas.scene_meshes import by_digest, mesh_digest, with_meshes
 from gemelo.schemas.system import Exchange
-from gemelo.schemas.topics import SCENE, SCENE_EDIT, scene_mesh
+from gemelo.schemas.topics import SCENE, SCENE_EDIT, exchange_topic, scene_mesh
 from gemelo.services.panel.model.readings import BusReadings
 from gemelo.services.planner import main as planner_main
 from gemelo.services.planner.scene.scene_keeper import SceneKeeper

@@ -10,13 +10,12 @@ from msgspec.structs import replace
 
 from gemelo.libraries.runtime.actions.keys import goal_request, result_request
 from gemelo.libraries.runtime.errors import NoAnswer, ServerLost
-from gemelo.libraries.runtime.requests.exchanges import exchange_topic
 from gemelo.schemas.actions import GoalRequest, GoalStatusCode, ResultRequest
 from gemelo.schemas.device import ReferenceCommand
 from gemelo.schemas.message import decode
 from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.system import Exchange
-from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
+from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, exchange_topic
 from tests.stack.person import jumps
 
 SPEED = 0.6  # slow enough that the kill falls into the middle

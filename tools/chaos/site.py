@@ -18,13 +18,12 @@ from gemelo.firmware.platform.host.slot_record import VARIABLE
 from gemelo.libraries.arm.cell.cell_file import deployed_cell
 from gemelo.libraries.runtime.actions.keys import goal_request
 from gemelo.libraries.runtime.deployment import deployment_file, load_deployment, project_root
-from gemelo.libraries.runtime.requests.exchanges import exchange_topic
 from gemelo.libraries.runtime.saved_parameters import SavedParameters
 from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.deployment import Deployment, Wire
 from gemelo.schemas.message import BadMessage, decode
 from gemelo.schemas.system import Exchange
-from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
+from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, exchange_topic
 from gemelo.services.broker import mosquitto
 from gemelo.services.broker.replacement import NotInstalled
 from gemelo.tools.chaos.clocks import ClockError, SteppingClocks

@@ -8,9 +8,8 @@ from gemelo.libraries.arm.checks.findings import Finding, error, warning
 from gemelo.libraries.arm.errors import DescriptionError, suggestion
 from gemelo.libraries.arm.model.description import ROBOT_FILE
 from gemelo.libraries.arm.model.urdf import JointKind, Limit, UrdfJoint, UrdfModel
-from gemelo.libraries.arm.motors.speed import speed_limits
+from gemelo.libraries.arm.motors.speed import fastest_steps, speed_limits
 from gemelo.libraries.arm.motors.steps import Q8, step_scale
-from gemelo.libraries.arm.motors.tick import fastest_steps
 from gemelo.schemas.robot import Driver, RobotFile, StepperJoint, Transmission
 
 WIRE_RANGE = 2**31 / Q8  # [steps] that fit the wire's Q24.8

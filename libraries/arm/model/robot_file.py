@@ -13,7 +13,7 @@ from typing import get_args, get_origin, get_type_hints
 import msgspec
 
 from gemelo.libraries.arm.errors import DescriptionError, suggestion
-from gemelo.libraries.arm.motors.tick import chosen_tick
+from gemelo.libraries.arm.motors.speed import chosen_tick
 from gemelo.libraries.toml_lines import Where, nearest_line, toml_lines
 from gemelo.schemas import text_file
 from gemelo.schemas.robot import RobotFile

@@ -1,18 +1,24 @@
-"""A node's log: one line on stderr, and a `LogRecord` on the bus."""
+"""A node's log: one line on stderr, and a `LogRecord` on the bus; what its handlers raise is in it too."""
 
 from __future__ import annotations
 
 import logging
 import sys
 import time
+import traceback
+from collections import Counter
 from collections.abc import Callable
 
 from gemelo.libraries.runtime.clock import SYSTEM, Clock
+from gemelo.libraries.runtime.errors import BusError
+from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.plain_text import escaped
 from gemelo.schemas.system import LogLevel, LogRecord
 
 LEVELS = ("debug", "info", "warning", "error")
 MAX_TEXT = 8_000  # characters of one record on the bus
+ENDS = (BusError, ConfigurationError, BrokenPipeError)  # what says that the process itself cannot go on
+MOST_PLACES = 64  # in the code that are counted apart; chosen: more than a broken service has
 
 
 class LineFormatter(logging.Formatter):
@@ -56,3 +62,30 @@ def line_logger(name: str, level: str = "info") -> logging.Logger:
     handler.setFormatter(LineFormatter())
     logger.addHandler(handler)
     return logger
+
+
+class Failures:
+    """Logs each place of a service that fails, with its traceback: the first time, the tenth, the hundredth ..."""
+
+    def __init__(self, log: logging.Logger) -> None:
+        self._log = log
+        self._of: Counter[str] = Counter()
+
+    def take(self, error: Exception) -> None:
+        """Raises `error` again where it is one that ends the process."""
+        if isinstance(error, ENDS):
+            raise error
+        place = _place_of(error)
+        if place not in self._of and len(self._of) >= MOST_PLACES:
+            return
+        self._of[place] += 1
+        count = self._of[place]
+        if str(count).strip("0") == "1":  # 1, 10, 100 ...
+            again = f", {count} times by now" if count > 1 else ""
+            text = "".join(traceback.format_exception(error))
+            self._log.error("a handler failed%s; what it was given is lost, and the service goes on:\n%s", again, text)
+
+
+def _place_of(error: Exception) -> str:
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"{type(error).__name__} {frames[-1].filename}:{frames[-1].lineno}" if frames else type(error).__name__
