@@ -18,7 +18,7 @@ from tests.stepper_gateway.wired import WiredGateway
 
 
 def test_a_sketch_on_a_real_broker_is_met_referenced_moved_and_missed(tmp_path: Path) -> None:
-    robot = robot_with(tmp_path, 'dialect = "ra"', "message_time = 1.0")
+    robot = robot_with(tmp_path, 'dialect = "ra"', "message_time = 1.2", "telemetry_time = 0.3")
     arm = load_arm(robot)
     with closing(Processes("mosquitto", tmp_path, robot=robot)) as processes:
         processes.start_broker()

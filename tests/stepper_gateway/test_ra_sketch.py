@@ -175,6 +175,18 @@ def test_a_message_that_was_lost_with_its_connection_ends_the_move(after: float)
     assert "position_lost" in arm.events()
 
 
+def test_a_process_that_was_stopped_does_not_take_the_sketch_for_silent() -> None:
+    arm = SketchArm().referenced()
+    assert arm.goal(ra_move(HOME, (QUARTER, 0.0, 0.0))).accepted
+    assert arm.run(20.0, lambda: abs(arm.sketch.motors[0].remaining) > 500)
+    arm.now += 0.6  # nothing was read meanwhile, and the sketch went on
+    arm.finish()
+    assert arm.run(10.0, lambda: arm.state.mode == DeviceMode.IDLE)
+    assert "position_lost" not in arm.events()
+    assert arm.sketch.discarded == 0
+    assert arm.sketch.shafts == arm.device.sent
+
+
 def test_nothing_is_sent_to_a_sketch_that_is_silent_just_now() -> None:
     arm = SketchArm().referenced()
     arm.is_cut = True

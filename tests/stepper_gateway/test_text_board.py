@@ -101,6 +101,18 @@ def test_after_a_loss_a_new_reference_does_not_hide_that_the_board_is_still_mute
     assert "no line was answered" in arm.published["device/status"][-1].reason
 
 
+def test_a_process_that_was_stopped_does_not_take_the_board_for_silent() -> None:
+    arm = TextArm().referenced()
+    assert arm.goal(text_move(arm)).accepted
+    arm.run(0.5)
+    arm.answers_lines = False
+    arm.run(0.1)
+    arm.now += 2.0  # nothing was read meanwhile
+    arm.answers_lines = True
+    arm.run(1.0)
+    assert "position_lost" not in arm.events()
+
+
 def test_what_a_line_takes_is_reported_without_the_waiting_for_it() -> None:
     """At 25 Hz every question waits for the next line: 37 ms were shown for a wire that takes 9."""
     arm = TextArm().referenced()

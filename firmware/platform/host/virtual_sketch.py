@@ -29,7 +29,8 @@ class VirtualSketch:
     def __init__(
         self, arm: ArmDescription, broker: BrokerAccess, inbox: queue.SimpleQueue[Item], readiness: Readiness
     ) -> None:
-        self.sketch = HostSketch([ramp_of(joint.drive) for joint in arm.joints])
+        ramps = [ramp_of(joint.drive) for joint in arm.joints]
+        self.sketch = HostSketch(ramps, telemetry_time=arm.device.telemetry_time)
         self._inbox, self._readiness = inbox, readiness
         self._broker = broker
         self._client = MqttClient(broker, "", speaks_5=False, reconnect_on_failure=True)

@@ -47,6 +47,7 @@ class RaDevice:
         self._stand_in = StandIn(arm, NAME, steps, new_boot, now)
         self._sender = RaSender(self._ramps, steps, self._loop)
         self._heard = -1.0e9  # [s] the sketch's latest word
+        self._stalled = 0.0  # [s] of the stand-in's, as far as it was taken into account
         self._is_online = False
         self._output = False
         self._said_output: bool | None = None  # None: not known at the sketch
@@ -93,6 +94,8 @@ class RaDevice:
     def advance(self, now: float) -> list[bytes]:
         """Let time pass until `now` [s] monotonic; what is to be published on ra/juntas then."""
         self._stand_in.advance(now)
+        stalled, self._stalled = self._stand_in.stalled - self._stalled, self._stand_in.stalled
+        self._heard = min(now, self._heard + stalled)
         self._watch(now)
         if not self._is_online:
             return []

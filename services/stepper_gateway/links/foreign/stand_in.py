@@ -45,6 +45,7 @@ class StandIn:
         self._config, self._name = config_text(device_config(arm)), name
         self._new_boot = new_boot
         self._reports: list[Report] = []
+        self.stalled = 0.0  # [s] altogether that this process was stopped: nothing was read then, nobody was silent
         self.start(steps, False, now)
 
     def start(self, steps: Sequence[int], referenced: bool, now: float) -> None:
@@ -94,6 +95,7 @@ class StandIn:
         """Let time pass until `now` [s] monotonic."""
         until = self.device_us(now)
         if now - self._advanced > STALL:
+            self.stalled += now - self._advanced
             self._device.stand_still(max(0, until - LAST_SLOTS))
         self._device.advance(until)
         self._advanced = max(self._advanced, now)

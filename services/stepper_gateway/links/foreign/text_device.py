@@ -51,6 +51,7 @@ class TextDevice:
         self._is_confirmed = True  # a line with this target was answered, or it is where the board stands
         self._due = self._told = self._probed = now  # [s] of the next line, the latest summary and the latest probe
         self._asked_at: float | None = None  # [s] since when lines are not answered
+        self._stalled = 0.0  # [s] of the stand-in's, as far as it was taken into account
         self._is_missed = False  # it has not answered since it was missed last
         self._waiting: list[Question] = []  # for the next line
         self._carried: OrderedDict[int, list[Question]] = OrderedDict()  # by the number of the line that they wait for
@@ -92,6 +93,9 @@ class TextDevice:
     def advance(self, now: float) -> list[bytes]:
         """Let time pass until `now` [s] monotonic; the lines to write then."""
         self._stand_in.advance(now)
+        stalled, self._stalled = self._stand_in.stalled - self._stalled, self._stand_in.stalled
+        if self._asked_at is not None:
+            self._asked_at = min(now, self._asked_at + stalled)
         self._watch(now)
         if not self._stand_in.is_referenced:
             return []
