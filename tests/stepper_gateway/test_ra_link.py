@@ -13,12 +13,13 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandKind
 from gemelo.services.stepper_gateway.main import open_device
 from tests.stepper_gateway.dialects import robot_with
+from tests.stepper_gateway.harness import move
 from tests.stepper_gateway.processes import DEVICE, Processes
 from tests.stepper_gateway.wired import WiredGateway
 
 
 def test_a_sketch_on_a_real_broker_is_met_referenced_moved_and_missed(tmp_path: Path) -> None:
-    robot = robot_with(tmp_path, 'dialect = "ra"', "message_time = 1.2", "telemetry_time = 0.3")
+    robot = robot_with(tmp_path, 'dialect = "ra"', "message_time = 1.5", "telemetry_time = 0.3")
     arm = load_arm(robot)
     with closing(Processes("mosquitto", tmp_path, robot=robot)) as processes:
         processes.start_broker()
@@ -32,7 +33,7 @@ def test_a_sketch_on_a_real_broker_is_met_referenced_moved_and_missed(tmp_path: 
             assert gateway.run(15.0, lambda: statuses[-1].online)
             gateway.command(DeviceCommandKind.REFERENCE)
             gateway.ready()
-            assert gateway.move_to((0.05, 0.0, 0.0)).accepted
+            assert gateway.goal(move((0.0, 0.0, 0.0), (0.05, 0.0, 0.0), slower=1.1, arm=arm)).accepted
             status, result = gateway.finish()
             assert (status, result.verified) == (GoalStatusCode.SUCCEEDED, False)
             processes.kill(DEVICE)
