@@ -10,7 +10,7 @@ import xml.etree.ElementTree as ET
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.urdf import JointKind, model_of
 from gemelo.libraries.arm.model.xml_reader import XmlReader, parse_xml
-from gemelo.libraries.robot_import import link_mending, mesh_places, motion_limits, number_mending, unit_mending
+from gemelo.libraries.robot_import import link_mending, mesh_places, motion_limits, unit_mending
 from gemelo.libraries.robot_import.joint_mending import fix_free_base, fix_locked, follow_the_motor
 from gemelo.libraries.robot_import.mended import Mended, numbers_in
 from gemelo.libraries.robot_import.mesh_units import mesh_units
@@ -40,9 +40,9 @@ def mend(source: RobotSource, questions: Questions | None = None) -> Mended:
         _foreign,
         _prefixed,
         _names,
-        number_mending.minuses,
-        number_mending.separators,
-        number_mending.capitals,
+        unit_mending.minuses,
+        unit_mending.separators,
+        unit_mending.capitals,
         link_mending.references,
         link_mending.unreadable,
         _free_base,

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from gemelo.libraries.arm.checks.findings import Finding, Severity, error
 from gemelo.libraries.arm.checks.meshes import MOST_TRIANGLES, MeshFacts
 from gemelo.libraries.arm.errors import DescriptionError, suggestion
-from gemelo.libraries.arm.model.urdf import UrdfModel
+from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose
+from gemelo.libraries.arm.kinematics.chain import origin_of
+from gemelo.libraries.arm.model.urdf import JointKind, UrdfModel
 from gemelo.libraries.arm.model.virtual_drive import MAX_NAME, device_name, driven_joints
 from gemelo.libraries.robot_import import motion_limits
 from gemelo.libraries.robot_import.drive import ask_drives
 from gemelo.libraries.robot_import.limits import ask_limits
+from gemelo.libraries.robot_import.link_boxes import pose_of
 from gemelo.libraries.robot_import.link_mending import shapeless, untouched
-from gemelo.libraries.robot_import.mended import Mended, meshes_of, subject_of
+from gemelo.libraries.robot_import.mended import Mended, links_of, meshes_of, subject_of
 from gemelo.libraries.robot_import.mending import mend, safe_name
+from gemelo.libraries.robot_import.mesh_places import set_origin
 from gemelo.libraries.robot_import.parts import MOTORS, USUAL_DRIVER, DriverPart, MotorPart, driver_named, motor_named
 from gemelo.libraries.robot_import.questions import Questions, yes_or_no
-from gemelo.libraries.robot_import.rigid_groups import merge_rigid
 from gemelo.libraries.robot_import.robot_folder import Description
 from gemelo.libraries.robot_import.semantics import semantics
 from gemelo.libraries.robot_import.source import RobotSource
@@ -27,6 +31,8 @@ from gemelo.libraries.robot_import.tool_link import other_tools, tool_link
 
 LONGEST_NAME = 60  # letters: with what others add it is a folder's name everywhere
 NOT_IN_A_NAME = r"[^A-Za-z0-9_-]+"
+# Tuning constants: chosen, where a line does not say measured or standard.
+MOST_PARTS = 40  # links with shapes: of more, pairs are sampled for minutes, and the native planner takes 64
 
 
 @dataclass(frozen=True)
@@ -144,3 +150,36 @@ def _base(model: UrdfModel) -> str:
 
 def _quoted(names: Sequence[str]) -> str:
     return ", ".join(f'"{name}"' for name in names)
+
+
+def merge_rigid(mended: Mended) -> None:
+    """Gives the shapes of links that are fixed to another to that one, where there are more than `MOST_PARTS`."""
+    links = links_of(mended)
+    if sum(bool(link.visuals or link.collisions) for _, link in links) <= MOST_PARTS:
+        return
+    above = {joint.child: joint for joint in mended.model.joints if joint.kind is JointKind.FIXED}
+    elements = {link.name: element for element, link in links}
+    moved: dict[str, int] = {}
+    for element, link in links:
+        root, pose = link.name, IDENTITY
+        while root in above:
+            pose = compose(origin_of(above[root]), pose)
+            root = above[root].parent
+        if root == link.name or not (link.visuals or link.collisions):
+            continue
+        moved[root] = moved.get(root, 0) + 1
+        shapes = (*link.visuals, *link.collisions)
+        for item, shape in zip((*element.findall("visual"), *element.findall("collision")), shapes, strict=True):
+            element.remove(item)
+            _give(elements[root], item, compose(pose, pose_of(shape)))
+            mended.xml.lines.setdefault(item, mended.xml.lines.get(element, 0))
+    for root, count in moved.items():
+        message = f"{count} links with shapes are fixed to it, of {len(links)} links in all"
+        mended.say(
+            elements[root], subject_of(elements[root]), message, "they are drawn and checked as one part with it"
+        )
+
+
+def _give(link: ET.Element, item: ET.Element, pose: Rigid) -> None:
+    set_origin(item, pose)
+    link.append(item)

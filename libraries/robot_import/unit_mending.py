@@ -1,4 +1,5 @@
-"""Repairs of a source in another unit as a whole: lengths in millimetres, turns in degrees."""
+"""Repairs of how a source writes numbers: in other units as a whole, as millimetres and degrees; with minus signs of
+print, commas between them, and joint types in capital letters."""
 
 from __future__ import annotations
 
@@ -14,6 +15,8 @@ from gemelo.libraries.arm.checks.units import (
 )
 from gemelo.libraries.arm.checks.urdf import principal_moments
 from gemelo.libraries.arm.model.urdf import JointKind
+from gemelo.libraries.arm.model.xml_reader import MINUSES
+from gemelo.libraries.robot_import.joint_mending import FREE
 from gemelo.libraries.robot_import.mended import Mended, links_of, numbers_in
 
 # Tuning constants: chosen, where a line does not say measured or standard.
@@ -22,6 +25,8 @@ LEAST_TRAVEL = 1.0  # in the file's unit: a slide's travel below it is in metres
 ANGLES = math.pi / 12.0  # [rad] 15 degrees: what is a multiple of it is in radians
 ANGLE_TOLERANCE = 2e-3  # [rad]
 SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
+TEXTS = ("name", "link", "joint", "type", "filename")  # attributes that are no numbers
+SEVERAL = ("xyz", "rpy", "scale", "size")
 
 
 def degrees(mended: Mended) -> None:
@@ -97,3 +102,44 @@ def _scaled(element: ET.Element | None, key: str, factor: float) -> None:
     numbers = numbers_in(element.get(key, "")) if element is not None else None
     if element is not None and numbers:
         element.set(key, " ".join(f"{factor * value:.9g}" for value in numbers))
+
+
+def minuses(mended: Mended) -> None:
+    """Minus signs as word processors print them, which no program reads."""
+    found: list[tuple[ET.Element, str]] = []
+    for element in mended.xml.root.iter():
+        for key, text in element.items():
+            plain = text.translate(MINUSES)
+            if key not in TEXTS and plain != text and numbers_in(plain) is not None:
+                found.append((element, text))
+                element.set(key, plain)
+    if found:
+        element, text = found[0]
+        message = f'"{text}" has a minus sign of print, as {len(found)} of its numbers have'
+        mended.say(element, f"<{element.tag}>", message, f'"{text.translate(MINUSES)}"')
+
+
+def separators(mended: Mended) -> None:
+    """Commas between three numbers, where they are no decimal signs."""
+    found: list[tuple[ET.Element, str, str]] = []
+    for element in mended.xml.root.iter():
+        for key in SEVERAL:
+            text, words = element.get(key, ""), element.get(key, "").replace(",", " ").split()
+            are_apart = len(text.split()) == 1 or ", " in text
+            if "," in text and are_apart and len(words) == 3 and numbers_in(" ".join(words)):
+                found.append((element, key, text))
+                element.set(key, " ".join(words))
+    if found:
+        element, key, text = found[0]
+        message = f'{key}="{text}" has commas between its numbers, as {len(found)} of its triples have'
+        mended.say(element, f"<{element.tag}>", message, f'{key}="{element.get(key)}"')
+
+
+def capitals(mended: Mended) -> None:
+    """Joint types in capital letters."""
+    for joint in mended.xml.root.findall("joint"):
+        kind = joint.get("type", "")
+        plain = kind.strip().lower()
+        if kind != plain and plain in (*JointKind, *FREE):
+            joint.set("type", plain)
+            mended.say(joint, f'joint "{joint.get("name")}"', f'type "{kind}" is no type', f'type="{plain}"')

@@ -14,8 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from gemelo.libraries.arm.device.device_config import HEADROOM, device_config, reference_steps
-from gemelo.libraries.arm.device.device_parts import sensor_config
+from gemelo.libraries.arm.device.device_config import HEADROOM, device_config, reference_steps, sensor_config
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.device_config import UNUSED, DeviceConfig, InputRole, Pull, SensorKind, config_crc, config_text

@@ -20,7 +20,7 @@ from gemelo.schemas.planners import NAMES
 from gemelo.schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, Timing
 from gemelo.schemas.scene import MeshShape, PlanningScene, SceneObject
 from gemelo.services.planner.collision.clearance import CLEARANCE
-from gemelo.services.planner.collision.native_scene import native_scene
+from gemelo.services.planner.collision.sphere_check import native_scene
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.path.curve import spline_rows

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.services.planner.timing.peaks import peak_shares
 from gemelo.services.planner.timing.profile import JointLimits, stop_and_go, straight_line, trajectory_of
 from gemelo.services.planner.timing.time_law import TimeLaw
+from gemelo.services.planner.timing.timing import peak_shares
 from gemelo.services.planner.verification.verify import limit_shares, sample_between
 
 UNIT = JointLimits(np.ones(3), np.ones(3), np.ones(3))

@@ -12,9 +12,8 @@ from gemelo.libraries.arm.checks.findings import Severity
 from gemelo.libraries.arm.checks.meshes import MOST_TRIANGLES
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.arm.model.srdf_edit import entries
-from gemelo.libraries.robot_import.coarser import coarser
-from gemelo.libraries.robot_import.mesh_copies import MOST_COARSER
-from gemelo.libraries.robot_import.rigid_groups import MOST_PARTS
+from gemelo.libraries.robot_import.mesh_copies import MOST_COARSER, coarser
+from gemelo.libraries.robot_import.survey import MOST_PARTS
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import PlanRequest, PoseGoal
 from gemelo.services.planner.core import Planner

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+import logging
+import math
 from pathlib import Path
 
 import msgspec
 
-from gemelo.libraries.arm.checks.cross_check import check_with_yourdfpy
 from gemelo.libraries.arm.checks.device import check_device
-from gemelo.libraries.arm.checks.findings import Finding, Severity, error, note, once
+from gemelo.libraries.arm.checks.findings import Finding, Severity, error, note, once, warning
 from gemelo.libraries.arm.checks.homing import check_homing
 from gemelo.libraries.arm.checks.meshes import check_meshes, mesh_facts
-from gemelo.libraries.arm.checks.motors import check_motors
-from gemelo.libraries.arm.checks.pull_out import check_pull_out
+from gemelo.libraries.arm.checks.motors import check_motors, check_pull_out
 from gemelo.libraries.arm.checks.srdf import check_srdf
 from gemelo.libraries.arm.checks.urdf import check_urdf, fault_finding
 from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.libraries.arm.errors import DescriptionError
-from gemelo.libraries.arm.model.description import DEFAULT_URDF, ROBOT_FILE, load_arm
+from gemelo.libraries.arm.kinematics.chain import link_transforms
+from gemelo.libraries.arm.model.description import DEFAULT_URDF, ROBOT_FILE, ArmDescription, load_arm
 from gemelo.libraries.arm.model.robot_file import (
     dotted,
     line_of,
@@ -36,6 +37,7 @@ from gemelo.schemas.robot import RobotFile
 __all__ = ["Finding", "Severity", "check"]
 
 TYPES_REMEDY = "write a value of that type and range; docs/my_own_arm.md says what each key is"
+TOLERANCE = 1e-9  # [m]
 
 
 def check(folder: Path) -> list[Finding]:
@@ -125,3 +127,33 @@ def _cross_checks(folder: Path) -> list[Finding]:
         return [error(ROBOT_FILE, "robot", str(problem))]
     # The meshes themselves only where yourdfpy has opened them all.
     return check_with_yourdfpy(arm) or check_meshes(arm.model, arm.urdf_path.name, mesh_facts(arm.urdf_path.parent))
+
+
+def check_with_yourdfpy(arm: ArmDescription) -> list[Finding]:
+    """Findings of yourdfpy on the arm's URDF; a warning where it is not installed."""
+    file = arm.urdf_path.name
+    try:
+        import yourdfpy  # slow to load: trimesh comes with it
+    except ModuleNotFoundError:
+        remedy = "install the extra `view` to have the meshes opened"
+        return [warning(file, "meshes", "not opened, because yourdfpy is not installed", remedy)]
+    logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)  # what it would warn of, the other checks say with lines
+    try:
+        other = yourdfpy.URDF.load(str(arm.urdf_path))
+    except Exception as problem:  # of any mesh format's reader
+        return [error(file, "meshes", f"yourdfpy cannot load it: {problem}", _suspects(arm.folder))]
+    middle = [(joint.lower + joint.upper) / 2 if math.isfinite(joint.lower) else 0.0 for joint in arm.joints]
+    other.update_cfg(dict(zip(arm.joint_names, middle, strict=True)))
+    theirs = other.get_transform(arm.tool_frame, arm.base_frame)[:3, 3]
+    poses = link_transforms(arm.model, dict(zip(arm.joint_names, middle, strict=True)))
+    base, tool = poses[arm.base_frame][0], poses[arm.tool_frame][0]
+    ours = [b - a for a, b in zip(base, tool, strict=True)]
+    off = max(abs(a - b) for a, b in zip(ours, theirs, strict=True))
+    if off > TOLERANCE:
+        return [error(file, f'link "{arm.tool_frame}"', f"is {off:.3g} m from where yourdfpy puts it")]
+    return []
+
+
+def _suspects(folder: Path) -> str:
+    names = sorted(path.name for path in folder.glob("meshes/*"))
+    return f"export the mesh again; in meshes/: {', '.join(names)}" if names else "correct the URDF"

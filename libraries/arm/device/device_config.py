@@ -1,21 +1,31 @@
-"""The device configuration, made from the arm's description."""
+"""The device configuration, made from the arm's description: joints, servo, switches, outputs and sensors."""
 
 from __future__ import annotations
 
 import math
+import re
 from fractions import Fraction
 
 from msgspec import UNSET, UnsetType
 
-from gemelo.libraries.arm.device.device_parts import input_config, output_config, sensor_config
-from gemelo.libraries.arm.device.device_values import device_name, int32, nearest, pin_or_unused
 from gemelo.libraries.arm.errors import DescriptionError, suggestion
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.libraries.arm.model.gripper import pulse_speed
+from gemelo.libraries.arm.model.virtual_drive import MAX_NAME
 from gemelo.libraries.arm.motors.steps import Q8, StepScale
-from gemelo.schemas.device_config import DeviceConfig, HomingConfig, JointConfig, ServoConfig
+from gemelo.schemas.device_config import (
+    UNUSED,
+    DeviceConfig,
+    HomingConfig,
+    InputConfig,
+    InputRole,
+    JointConfig,
+    OutputConfig,
+    SensorConfig,
+    ServoConfig,
+)
 from gemelo.schemas.grippers.gripper import PulseDrive
-from gemelo.schemas.robot import Homing, HomingDirection, PinLevel
+from gemelo.schemas.robot import DigitalOutput, Homing, HomingDirection, Input, PinLevel, Sensor
 
 # Knots are rounded to 1/256 step and sampled from profiles that touch their limits.
 HEADROOM = 1.02
@@ -23,6 +33,7 @@ UNLIMITED_Q8 = 1 << 30  # of a joint without limits: 4 million steps each way
 SERVO_NAME = "gripper"  # in what the device says of its configuration
 MAX_COUNTS = {"joint": 8, "input": 16, "output": 8, "sensor": 8}  # of one device, the firmware's
 DEFAULT_TRAVEL_FACTOR = 1.1  # how far a joint looks for its switch, where robot.toml does not say
+NAME = re.compile(rf"[A-Za-z0-9_-]{{1,{MAX_NAME}}}")
 
 
 def device_config(arm: ArmDescription) -> DeviceConfig:
@@ -157,3 +168,78 @@ def _text_scale(scale: StepScale) -> int:
     """[1/256 step per 1e-7 rad or m] Q32; 0 where it does not fit: the joint then has no text mode."""
     exact = scale.steps_per_turn * Q8 / Fraction(scale.travel_per_turn) / 10**7
     return nearest(exact * 2**32) if exact * 2**32 < 2**63 else 0
+
+
+def input_config(switch: Input, arm: ArmDescription) -> InputConfig:
+    """A switch; raises `DescriptionError` for a joint that is not there."""
+    where = f'input "{switch.name}"'
+    return InputConfig(
+        name=device_name(switch.name, where),
+        pin=switch.pin,
+        role=switch.role,
+        joint=_joint_index(switch, arm, where),
+        inverted=switch.active is PinLevel.LOW,
+        pull=switch.pull,
+    )
+
+
+def _joint_index(switch: Input, arm: ArmDescription, where: str) -> int:
+    if switch.role is InputRole.ESTOP:
+        if switch.joint:
+            raise DescriptionError(f'{where}: an e-stop belongs to all joints, not to "{switch.joint}": remove `joint`')
+        return UNUSED
+    if not switch.joint:
+        raise DescriptionError(f"{where}: write the `joint` that this {switch.role} switch belongs to")
+    if switch.joint not in arm.joint_names:
+        raise DescriptionError(
+            f'{where}: there is no joint "{switch.joint}"{suggestion(switch.joint, arm.joint_names)}'
+        )
+    return arm.joint_names.index(switch.joint)
+
+
+def output_config(output: DigitalOutput) -> OutputConfig:
+    """A digital output."""
+    return OutputConfig(
+        name=device_name(output.name, f'output "{output.name}"'),
+        pin=output.pin,
+        inverted=output.active is PinLevel.LOW,
+        at_boot=output.at_boot,
+        off_at_estop=output.off_at_estop,
+    )
+
+
+def sensor_config(sensor: Sensor) -> SensorConfig:
+    """A reading, its scale in 1/1000 of its unit."""
+    where = f'sensor "{sensor.name}"'
+    return SensorConfig(
+        name=device_name(sensor.name, where),
+        kind=sensor.kind,
+        pin=sensor.pin,
+        trigger_pin=pin_or_unused(sensor.trigger_pin),
+        scale_q16=int32(nearest(Fraction(sensor.scale) * 65_536_000), f"{where}: scale"),
+        offset_milli=int32(nearest(Fraction(sensor.offset) * 1000), f"{where}: offset"),
+    )
+
+
+def nearest(value: Fraction) -> int:
+    """The nearest integer (dimensionless), halves upwards."""
+    return math.floor(value + Fraction(1, 2))
+
+
+def int32(value: int, where: str) -> int:
+    """`value`, if the wire's integers hold it; raises `DescriptionError`."""
+    if not -(2**31) <= value < 2**31:
+        raise DescriptionError(f"{where} is {value} on the wire, which does not fit its 32 bits: make it smaller")
+    return value
+
+
+def device_name(text: str, where: str) -> str:
+    """`text`, if the firmware takes it as a name; raises `DescriptionError`."""
+    if not NAME.fullmatch(text):
+        raise DescriptionError(f'{where} "{text}" is not 1 to {MAX_NAME} letters, digits, "_" or "-"')
+    return text
+
+
+def pin_or_unused(pin: int | None) -> int:
+    """The GPIO, or the number that stands for none."""
+    return UNUSED if pin is None else pin

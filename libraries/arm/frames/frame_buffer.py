@@ -6,17 +6,17 @@ import time
 from threading import Condition
 
 from gemelo.libraries.arm.errors import suggestion
-from gemelo.libraries.arm.frames.frame_errors import (
+from gemelo.libraries.arm.frames.time_cache import (
     FrameError,
     FutureError,
     PastError,
     SingleSampleError,
+    TimeCache,
     UnconnectedError,
     UnknownFrameError,
     WaitTimeout,
     seconds,
 )
-from gemelo.libraries.arm.frames.time_cache import TimeCache
 from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
 from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
 

@@ -1,13 +1,46 @@
-"""The time cache of one frame: its poses in the parent frame over time, as tf2's TimeCache."""
+"""The time cache of one frame, its poses in the parent frame over time, as tf2's TimeCache; and the errors of a
+look-up, one class per reason."""
 
 from __future__ import annotations
 
 from bisect import bisect_left
 
-from gemelo.libraries.arm.frames.frame_errors import FrameError, FutureError, PastError, SingleSampleError, seconds
 from gemelo.libraries.arm.frames.transforms import Rigid, interpolate
 
 _TRIM = 64  # samples that may be too old before they are cut off together
+
+
+class FrameError(LookupError):
+    """A look-up that cannot be answered."""
+
+
+class UnknownFrameError(FrameError):
+    """No transform ever named this frame."""
+
+
+class UnconnectedError(FrameError):
+    """Both frames are known, but no chain of transforms joins them."""
+
+
+class PastError(FrameError):
+    """The time asked for is before the oldest sample that is kept."""
+
+
+class FutureError(FrameError):
+    """The time asked for is after the newest sample; nothing is extrapolated."""
+
+
+class SingleSampleError(FrameError):
+    """There is one sample, at another time: nothing to interpolate between."""
+
+
+class WaitTimeout(FrameError):
+    """The frame did not become available in time; `__cause__` is the last reason."""
+
+
+def seconds(stamp: int) -> str:
+    """[ns] UNIX as seconds with nine digits; 0 is the latest."""
+    return "the latest" if stamp == 0 else f"{stamp // 1_000_000_000}.{stamp % 1_000_000_000:09d} s"
 
 
 class TimeCache:

@@ -1,4 +1,5 @@
-"""The native planner as the sphere check of collisions, with the scene of a world; none where it is not built."""
+"""The native planner as the sphere check of collisions, and the scene of a world as it has it; none where it is not
+built."""
 
 from __future__ import annotations
 
@@ -10,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.services.planner.collision.native_scene import native_scene
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.native import compiled
 from gemelo.services.planner.native.compiled import where_built
@@ -18,6 +18,13 @@ from gemelo.services.planner.request.deadline import CancelFlag, CountedTime
 
 if TYPE_CHECKING:
     from gemelo.services.planner.native.native_planner import NativePlanner
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from gemelo.schemas.scene import PlanningScene, SceneObject
+from gemelo.services.planner.collision.scene_shapes import allows, shape_of
+from gemelo.services.planner.collision_geometry.shapes import Attachment, CollisionShape
 
 Array = NDArray[np.float64]
 
@@ -71,3 +78,38 @@ def rows_between(rows: Array, begin: float, end: float) -> Array:
     begin, end = max(begin, 0.0), min(end, len(rows) - 1.0)
     ends = [(1.0 - place % 1.0) * rows[int(place)] + place % 1.0 * rows[math.ceil(place)] for place in (begin, end)]
     return np.vstack((ends[0], rows[int(begin) + 1 : math.ceil(end)], ends[1]))
+
+
+def native_scene(
+    arm: ArmDescription, scene: PlanningScene, folders: Sequence[Path] = ()
+) -> tuple[list[CollisionShape], list[Attachment]]:
+    """Obstacles and attachments with what they may touch; raises `SceneError`. What may touch is as in `World`."""
+    links = [link.name for link in arm.model.links if link.collisions]
+    carried = [_attachment(item, scene, links, folders) for item in scene.objects if item.attached]
+    names = [*links, *(item.name for item in carried)]
+    may_touch = bool(scene.allowed or carried)
+    around = [
+        _obstacle(item, _touching(item, scene, names) if may_touch else frozenset(), folders)
+        for item in scene.objects
+        if not item.attached
+    ]
+    return around, carried
+
+
+def _obstacle(item: SceneObject, touching: frozenset[str], folders: Sequence[Path]) -> CollisionShape:
+    shape = shape_of(item, folders)
+    return replace(shape, touching=touching) if touching else shape
+
+
+def _attachment(item: SceneObject, scene: PlanningScene, links: list[str], folders: Sequence[Path]) -> Attachment:
+    others = [other.name for other in scene.objects if other.attached and other.name != item.name]
+    allowed = {name for name in (*links, *others) if allows(scene.allowed, name, item.name)}
+    return Attachment(
+        item.name, item.frame, (shape_of(item, folders),), frozenset(allowed | {item.frame, *item.touch_links})
+    )
+
+
+def _touching(item: SceneObject, scene: PlanningScene, names: list[str]) -> frozenset[str]:
+    """What is allowed to, and attached objects whose touch links name this one."""
+    holders = {held.name for held in scene.objects if held.attached and item.name in held.touch_links}
+    return frozenset(name for name in names if name in holders or allows(scene.allowed, name, item.name))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.services.planner.collision.native_scene import native_scene
+from gemelo.services.planner.collision.sphere_check import native_scene
 from gemelo.tools.bench.figures import Figure, NotMeasured, of_samples, quantile
 from gemelo.tools.bench.planner.references import CoalChecker
 from gemelo.tools.bench.scenes import CHECK_SCENE, parol6, random_configurations, rm1
