@@ -1,0 +1,55 @@
+"""Values of reasons in writing: in SI units, as commands and scripts take them, or in those of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import degrees
+
+Written = Callable[[float, int | None], str]  # a value in SI units, and to how many digits behind the point
+
+
+def _unit(name: str, digits: int, convert: Callable[[float], float] = float) -> Written:
+    """Writes a value with its unit; `digits` where the template says none. A blank stands before all but degrees."""
+    text = name if name.startswith("°") else f" {name}".rstrip()
+    return lambda value, wanted: f"{convert(value):.{digits if wanted is None else wanted}f}{text}"
+
+
+def _in_display(name: str, digits: int, convert: Callable[[float], float]) -> Written:
+    """The digits of the template are those of the SI unit, so they do not count."""
+    written = _unit(name, digits, convert)
+    return lambda value, wanted: written(value, None)
+
+
+def _thousand(value: float) -> float:
+    return 1000.0 * value
+
+
+def _hundred(value: float) -> float:
+    return 100.0 * value
+
+
+_SAME: dict[str, Written] = {
+    "s": _unit("s", 3),
+    "%": _unit("%", 0, _hundred),
+    "steps": _unit("steps", 0),
+    "steps/s": _unit("steps/s", 0),
+    "N": _unit("N", 1),
+}
+in_si_units: Mapping[str, Written] = {
+    **_SAME,
+    "rad": _unit("rad", 4),
+    "m": _unit("m", 4),
+    "rad/s": _unit("rad/s", 4),
+    "m/s": _unit("m/s", 4),
+    "rad/s2": _unit("rad/s^2", 4),
+    "m/s2": _unit("m/s^2", 4),
+}
+in_display_units: Mapping[str, Written] = {
+    **_SAME,
+    "rad": _in_display("°", 1, degrees),
+    "m": _in_display("mm", 1, _thousand),
+    "rad/s": _in_display("°/s", 1, degrees),
+    "m/s": _in_display("mm/s", 1, _thousand),
+    "rad/s2": _in_display("°/s²", 1, degrees),
+    "m/s2": _in_display("mm/s²", 1, _thousand),
+}
