@@ -7,13 +7,13 @@ from setuptools import setup
 from setuptools.command.build_py import build_py
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE / "libraries" / "reasons"))
+sys.path.insert(0, str(HERE / "schemas" / "reasons"))
 from compiled import compile_languages  # noqa: E402
 
 
 class BuildWithLanguages(build_py):
     def run(self) -> None:
-        languages = HERE / "libraries" / "reasons" / "languages"
+        languages = HERE / "schemas" / "reasons" / "languages"
         compile_languages(languages, languages)
         super().run()
 

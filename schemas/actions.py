@@ -7,6 +7,7 @@ from enum import IntEnum
 import msgspec
 
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import Reason
 
 NIL = msgspec.Raw(b"\xc0")  # msgpack nil
 
@@ -44,6 +45,7 @@ class GoalResponse(Message, frozen=True, kw_only=True):
     accepted: bool = False
     code: int = 0
     reason: str = ""
+    why: Reason | None = None  # `reason` as data
     stamp: int = 0  # [ns] UNIX time of the decision
 
 

@@ -9,6 +9,7 @@ from gemelo.api.arguments import Target
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowJointTrajectoryResult
 from gemelo.schemas.planning import Refusal
+from gemelo.schemas.reasons import Reason, plain
 from gemelo.schemas.scene import Contact
 
 if TYPE_CHECKING:
@@ -77,12 +78,13 @@ class Refused(Error):
         configuration: Mapping[str, float] | None = None,
         nearest_free: Mapping[str, float] | None = None,
         code: int = 0,
-        reason: str = "",
+        reason: Reason | str = "",
         refusal: Refusal | None = None,
         contacts: Sequence[Contact] = (),
     ) -> None:
         super().__init__(message)
-        self.reason = reason or message  # without the remedy, in the words of the planner, the gateway or the device
+        # Of the planner, the gateway or the device, as data: a code, values and remedies; `str` of it is its sentence.
+        self.reason = reason if isinstance(reason, Reason) else plain(reason or message)
         self.refusal = refusal  # the planner's own message; None where another refuses
         self.check = check  # what was checked, as "reach", "joint limit", "collision"; empty where the device refuses
         self.subject = subject  # the joint, pair of links, or axis of the pose

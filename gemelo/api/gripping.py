@@ -138,7 +138,7 @@ class Gripping:
             handle = client.send(goal, lambda feedback: self._session.notify(), attached=True)
         except runtime.GoalRefused as error:
             check = check_of(error, "gripper")
-            raise Refused(f"refused: {error}", check=check, code=error.code, reason=str(error)) from error
+            raise Refused(f"refused: {error}", check=check, code=error.code, reason=error.reason) from error
         except runtime.RequestRefused as error:
             raise Refused(str(error)) from error
         except (runtime.NoAnswer, runtime.BusError) as error:

@@ -192,7 +192,7 @@ class Motion:
         except runtime.GoalRefused as error:
             check = check_of(error, "execution")
             raise Refused(
-                f"refused by {client.action.server}: {error}", check=check, code=error.code, reason=str(error)
+                f"refused by {client.action.server}: {error}", check=check, code=error.code, reason=error.reason
             ) from error
         except runtime.RequestRefused as error:
             raise Refused(str(error)) from error

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from gemelo.schemas.reasons import Reason, plain
+
 TOO_LARGE = "too large"  # the kind of a refusal of what no receiver would take
 
 
@@ -24,10 +26,11 @@ class RequestRefused(Exception):
 class GoalRefused(RequestRefused):
     """An action's server did not accept the goal; `code` is the action's own."""
 
-    def __init__(self, code: int, reason: str) -> None:
+    def __init__(self, code: int, reason: str, why: Reason | None = None) -> None:
+        """`why` is the same as data, where the server says it so."""
         super().__init__(reason)
         self.code = code
-        self.reason = reason
+        self.reason = why or plain(reason)
 
 
 class NoAnswer(Exception):

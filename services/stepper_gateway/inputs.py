@@ -176,7 +176,8 @@ def digest_of(reply: Reply, outputs: list[Output]) -> int:
 
     0 where there is none. No CRC-32: that of a frame which ends with its own CRC-32 is the same for every content.
     """
-    said = [] if reply is None else [msgspec.msgpack.encode(reply)]
+    spoken = reply[:3] if isinstance(reply, GoalVerdict) else reply  # whose sentence is made of its reason
+    said = [] if reply is None else [msgspec.msgpack.encode(spoken)]
     for output in outputs:
         if type(output) is not Publish:
             said += (type(output).__name__.encode(), msgspec.msgpack.encode(output))

@@ -321,4 +321,4 @@ class Shell:
 def _decision(reply: Reply) -> GoalDecision:
     """A verdict as the action's server says it."""
     assert isinstance(reply, GoalVerdict)
-    return accept() if reply.accepted else refuse(reply.code, reply.reason)
+    return accept() if reply.accepted else refuse(reply.code, reply.reason, reply.why)

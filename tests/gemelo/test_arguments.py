@@ -194,7 +194,7 @@ def test_the_nearest_goal_of_a_refusal_is_arguments_again(rm1: ArmDescription) -
     start = Refusal(check="start state", message="beyond", nearest=(0.2,), remedy="jog back")
     assert refused(rm1, start, asked, target, -18).nearest == {}
     assert str(refused(rm1, start, asked, target, -18)).endswith("beyond; jog back")
-    assert (error.reason, error.refusal) == ("too far", refusal)
+    assert (str(error.reason), error.refusal) == ("too far", refusal)
 
 
 def test_a_refusal_without_a_nearest_goal_ends_with_its_remedy(rm1: ArmDescription) -> None:

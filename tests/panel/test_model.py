@@ -20,6 +20,7 @@ from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.programs import AnyStep, Program, Repeat, RunStatus, StepPath, Wait
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceMode, DeviceState
+from gemelo.schemas.reasons import because, plain, remedy
 from gemelo.services.panel.model.availability import CHECKS
 from gemelo.services.panel.model.goal import GoalSolver
 from gemelo.services.panel.model.problems import Problem, problem_of
@@ -386,5 +387,17 @@ def test_a_line_of_the_log_has_its_angles_in_degrees(text: str, told: str) -> No
 def test_a_refused_line_says_where_on_its_way_it_would_end(place: str, language: str, told: str) -> None:
     reason = f"{place}, arm with crate would be nearer than 5 mm"
     text = f"refused (collision): {reason}"
-    problem = Problem(text, "collision", subject="arm / crate", value=-0.01, limit=0.005, reason=reason)
+    problem = Problem(text, "collision", subject="arm / crate", value=-0.01, limit=0.005, reason=plain(reason))
     assert Words(language).problem(problem)[1].startswith(told)
+
+
+def test_a_reason_with_a_code_is_said_in_the_language_and_units_of_the_page() -> None:
+    reason = because(
+        "goal.start.elsewhere", remedy("plan_from_here"),
+        joint="brazo_joint", unit="rad", start=0.5, present=0.25, distance=0.25, tolerance=0.01,
+    )  # fmt: skip
+    problem = Problem("refused by stepper_gateway: ...", "execution", reason=reason)
+    assert Words("es").problem(problem)[1] == (
+        "brazo_joint: el plan empieza en 28.6° y el brazo está en 14.3°, a 14.3°; se permiten 0.6°; planifique desde "
+        "donde está el brazo."
+    )

@@ -117,7 +117,7 @@ def test_a_goal_that_names_no_epoch_is_taken_and_one_of_another_is_not(buses: Bu
         told = node.call(keys.result_request(FOLLOW), ResultRequest()).epoch
         refused = send(node, replace(request_of("g", arm), epoch=told ^ 1))
         assert (refused.accepted, arm.moved) == (False, 0)
-        assert "started anew since" in refused.reason
+        assert "started anew since" in str(refused.reason)
         assert send(node, replace(request_of("h", arm), epoch=0)).accepted
         assert send(node, replace(request_of("i", arm), epoch=told)).accepted
 

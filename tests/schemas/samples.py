@@ -44,12 +44,23 @@ def sample(kind: type[Message]) -> Message:
 
     An enumeration that has grown keeps the member that was recorded.
     """
+    _begun.append(kind)
+    try:
+        return kind(**_sampled(kind))
+    finally:
+        _begun.pop()
+
+
+_begun: list[type[Message]] = []  # of which a sample is being made
+
+
+def _sampled(kind: type[Message]) -> dict[str, Any]:
     recorded = golden().get(kind.__name__, {}).get("fields", {})
     values = {}
     for field in msgspec.structs.fields(kind):
         is_recorded_code = isinstance(field.type, type) and issubclass(field.type, Enum) and field.name in recorded
         values[field.name] = field.type(recorded[field.name]) if is_recorded_code else _value(field.type, field.name)
-    return kind(**values)
+    return values
 
 
 def golden() -> dict[str, dict[str, Any]]:
@@ -107,6 +118,10 @@ def _value_of(info: inspect.Type, annotation: Any, name: str) -> Any:
             return _last(info.cls)
         case inspect.StructType():
             return sample(info.cls)
+        case inspect.DictType():
+            return {name: 0.5 + len(name)}
+        case inspect.VarTupleType(inspect.StructType(kind)) if kind in _begun:  # a message that holds its own kind
+            return ()
         case inspect.UnionType():
             return _value_of(next(each for each in info.types if not isinstance(each, inspect.NoneType)), None, name)
         case inspect.VarTupleType():

@@ -157,6 +157,9 @@ def _tagged(kind: type[Message], fields: dict[str, object]) -> dict[str, object]
 def _with_an_unknown_field(value: Any) -> Any:
     """The same with one field more in every map; an empty one is a payload that is not ours to read."""
     match value:
+        case {"code": str(), "values": dict() as values, **others}:  # a reason's values have no fields of their own
+            grown = {name: _with_an_unknown_field(inner) for name, inner in others.items()}
+            return grown | {"code": value["code"], "values": values, "x_new": {"more": [1]}}
         case dict() if value:
             return {name: _with_an_unknown_field(inner) for name, inner in value.items()} | {"x_new": {"more": [1]}}
         case list():

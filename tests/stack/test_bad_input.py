@@ -144,7 +144,7 @@ class Neighbour(Operator):
         try:
             outcome = self.send(plan).wait(plan.duration + 5.0)
         except GoalRefused as refused:
-            self.objection = refused.reason
+            self.objection = str(refused.reason)
             return False
         self.objection = outcome.result.error_string
         return outcome.status is GoalStatusCode.SUCCEEDED
@@ -247,7 +247,7 @@ def test_trajectories_that_may_not_run_are_refused_by_name(operator):
             operator.follow.send(FollowJointTrajectoryGoal(trajectory=trajectory))
         assert refused.value.reason
         for word in words:
-            assert word in refused.value.reason
+            assert word in str(refused.value.reason)
 
 
 @pytest.mark.usefixtures("nothing_moves_and_nothing_dies")

@@ -119,7 +119,7 @@ REFUSED: list[tuple[str, JointTrajectory, FollowErrorCode, tuple[str, ...]]] = [
         "a start elsewhere on the rail",
         move((0.0, 0.0, 0.01), READY),
         GOAL,
-        ("efector_joint", "0.0100 m", "0.002 m"),
+        ("efector_joint", "0.0100 m", "0.0020 m"),
     ),
     ("a single point too soon", trajectory(point((1.0, 0.0, 0.0), 0.5)), GOAL, ("0.500 s", "the limits need")),
     (
@@ -138,19 +138,19 @@ def test_a_bad_goal_is_refused_with_what_is_wrong(
     rejected = refusal(goal)
     assert rejected.code == code
     for part in said:
-        assert part in rejected.reason, rejected.reason
+        assert part in str(rejected), rejected
 
 
 def test_too_fast_is_refused_with_the_velocity_limit() -> None:
     far, near = (-2.9, 0.0, 0.0), (2.9, 0.0, 0.0)
     rejected = refusal(trajectory(point(far, 0.0, Z), point(near, 5.0, Z)), MotionStart.at_rest(far))
     for part in ("brazo_joint", "rad/s", "velocity limit 1.57", "times as long"):
-        assert part in rejected.reason
+        assert part in str(rejected)
 
 
 def test_accelerations_without_velocities_are_refused() -> None:
     only = TrajectoryPoint(positions=Z, accelerations=Z, time_from_start=1.0)
-    assert "velocities" in refusal(trajectory(only)).reason
+    assert "velocities" in str(refusal(trajectory(only)))
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_accelerations_without_velocities_are_refused() -> None:
 )
 def test_a_bad_tolerance_is_refused(fields: dict[str, Any], said: str) -> None:
     goal = FollowJointTrajectoryGoal(trajectory=move(HOME, READY), **fields)
-    assert said in refusal(goal).reason
+    assert said in str(refusal(goal))
 
 
 def test_more_steps_a_second_than_the_tick_allows_are_refused() -> None:

@@ -85,7 +85,7 @@ class ActionClient(Generic[G, F, R]):
             raise
         if not response.accepted:
             del self._handles[goal_id]
-            raise GoalRefused(response.code, response.reason)
+            raise GoalRefused(response.code, response.reason, response.why)
         handle.accepted_at(response.stamp)
         return handle
 

@@ -29,6 +29,7 @@ from gemelo.schemas.actions import (
     GoalStatuses,
 )
 from gemelo.schemas.message import BadMessage, Message, decode, encode
+from gemelo.schemas.reasons import Reason
 from gemelo.schemas.topics import Action
 
 G = TypeVar("G", bound=Message)
@@ -47,14 +48,15 @@ class GoalDecision:
     accepted: bool
     code: int = 0
     reason: str = ""
+    why: Reason | None = None
 
 
 def accept() -> GoalDecision:
     return GoalDecision(True)
 
 
-def refuse(code: int, reason: str) -> GoalDecision:
-    return GoalDecision(False, code, reason)
+def refuse(code: int, reason: str, why: Reason | None = None) -> GoalDecision:
+    return GoalDecision(False, code, reason, why)
 
 
 OnGoal = Callable[[str, G], GoalDecision]
@@ -204,7 +206,7 @@ class ActionServer(Generic[G, F, R]):
         finally:
             if not decision.accepted:
                 reason = shortened(decision.reason)
-                refusal = GoalResponse(code=decision.code, reason=reason, stamp=self._clock.unix())
+                refusal = GoalResponse(code=decision.code, reason=reason, why=decision.why, stamp=self._clock.unix())
                 response = self._goals.refuse(request.goal_id, refusal)
         if decision.accepted and request.attached and not goal.status.is_terminal:
             self._clients.add(request.goal_id, request.client, self._clock.monotonic())

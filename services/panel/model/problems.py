@@ -8,6 +8,7 @@ from functools import wraps
 from typing import ParamSpec
 
 import gemelo
+from gemelo.schemas.reasons import Reason
 from gemelo.schemas.scene import Contact
 
 P = ParamSpec("P")
@@ -27,7 +28,7 @@ class Problem:
     value: float | None = None  # of the subject, in the unit of the check
     limit: float | None = None  # that the value is beyond
     is_refusal: bool = True  # False: something moved, and ended before its goal
-    reason: str = ""  # as `text`, in the words of who refused
+    reason: Reason | None = None  # as data, of who refused
     code: int = 0  # of a goal that the gateway has refused or ended, as in `FollowErrorCode`
 
     @property

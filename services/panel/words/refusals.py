@@ -40,10 +40,10 @@ def sentence_of(problem: Problem, joints: Joints, templates: Mapping[str, str]) 
 def place_of(problem: Problem) -> tuple[str, dict[str, str]] | None:
     """Where on its path a motion of the tool would end, as the key of a template and its values; None where it is no
     such motion."""
-    if found := ON_LINE.search(problem.reason):
+    if found := ON_LINE.search(str(problem.reason or "")):
         gone, whole = (f"{1000.0 * float(metres):.0f}" for metres in found.groups())
         return "place_on_line", {"gone": gone, "whole": whole}
-    if found := ON_TURN.search(problem.reason):
+    if found := ON_TURN.search(str(problem.reason or "")):
         return "place_on_turn", {"share": f"{float(found[1]):.0f}"}
     return None
 

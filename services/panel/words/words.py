@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.reasons import PLAIN, FrontEnd, say
 from gemelo.services.panel.model.availability import Reason
 from gemelo.services.panel.model.problems import Problem
 from gemelo.services.panel.words.en import ENGLISH
@@ -80,8 +81,10 @@ class Words:
 
     def _told(self, problem: Problem) -> str:
         """By the sentence; where that is not known, by the code, with the sentence as it came."""
+        if problem.reason is not None and problem.reason.code != PLAIN:
+            return as_sentence(say(problem.reason, self.language, FrontEnd.PAGE))
         of = self._of.sentences.of
-        known = of(problem.text) or of(problem.reason)
+        known = of(problem.text) or of(str(problem.reason or ""))
         about = self._of.codes.get(problem.code)
         return known or (f"{about} («{problem.text}»)" if about else self.said(_without_heading(problem)))
 
@@ -91,7 +94,12 @@ def _without_heading(problem: Problem) -> str:
     nearest that can, which a button takes."""
     if not problem.text.startswith(f"refused ({problem.check})"):
         return problem.text
-    return ": ".join(filter(None, (problem.reason, "" if problem.has_nearest else problem.remedy)))
+    return ": ".join(filter(None, (str(problem.reason or ""), "" if problem.has_nearest else problem.remedy)))
+
+
+def as_sentence(text: str) -> str:
+    """With its full stop."""
+    return text if text.endswith((".", "?", "!")) else f"{text}."
 
 
 def language_of(browser: str) -> str:

@@ -94,7 +94,7 @@ class ControlHandler:
         try:
             claim = self._control.take(request, session, ticket, moment)
         except GoalRejected as rejected:
-            return self._answer(ticket, rejected.reason)
+            return self._answer(ticket, str(rejected))
         self._answer_claims()
         if claim is None:
             return self._answer(ticket)
@@ -107,7 +107,7 @@ class ControlHandler:
         try:
             self._control.join(request, session)
         except GoalRejected as rejected:
-            return self._answer(ticket, rejected.reason)
+            return self._answer(ticket, str(rejected))
         self._answer(ticket)
 
     def give(self, request: ControlGive, ticket: int) -> None:
@@ -115,7 +115,7 @@ class ControlHandler:
         try:
             self._control.give(request)
         except GoalRejected as rejected:
-            return self._answer(ticket, rejected.reason)
+            return self._answer(ticket, str(rejected))
         self._answer(ticket)
 
     def step(self, absences: Mapping[str, float], moment: Moment) -> None:

@@ -65,7 +65,7 @@ class CommandHandler:
                 raise invalid("the device has not answered the commands before this one yet: wait a moment")
             arguments = arguments_of(request, self._device.arm)
         except GoalRejected as rejected:
-            self._answer(ticket, False, rejected.reason)
+            self._answer(ticket, False, str(rejected))
             return False
         self._device.commands.ask(kind, moment, self._device.parameters.command_timeout, ticket, arguments)
         return True

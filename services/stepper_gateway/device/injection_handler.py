@@ -49,7 +49,7 @@ class InjectionHandler:
                 )
             translated = replace(request, target=target_of(request, self._device.arm))
         except GoalRejected as rejected:
-            return self._answer(ticket, False, rejected.reason)
+            return self._answer(ticket, False, str(rejected))
         self._waiting.append(
             PendingInjection(translated, ticket, moment.monotonic + self._device.parameters.command_timeout)
         )

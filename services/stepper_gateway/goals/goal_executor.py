@@ -9,6 +9,7 @@ from msgspec.structs import replace
 
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.schemas.system import LogLevel
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.goals.active_goal import ActiveGoal, GoalEnding
@@ -41,6 +42,7 @@ class GoalVerdict(NamedTuple):
     accepted: bool
     code: FollowErrorCode = FollowErrorCode.SUCCESSFUL
     reason: str = ""
+    why: Reason | None = None  # the same as data
 
 
 def as_not_verified(result: FollowJointTrajectoryResult) -> FollowJointTrajectoryResult:
@@ -83,7 +85,7 @@ class GoalExecutor:
             return GoalVerdict(False, FollowErrorCode.DEVICE_FAILED, reason)
         try:
             if self._current is not None and self._current.ending is not None:
-                raise invalid("the arm is still decelerating after the last goal; send this one again when it rests")
+                raise invalid(because("goal.decelerating", remedy("wait_for_rest")))
             self.scenes.require_newest(PlannedIn.of(goal))
             checked = self._validator.check(goal, moment.unix, self._device.parameters)
             checked = checked.with_more_time(self._device.settling_time)
@@ -92,7 +94,7 @@ class GoalExecutor:
             motion_start = controller.motion_start(moment)
             path = self._validator.path(checked, motion_start, moment.unix, self._device.parameters)
         except GoalRejected as rejected:
-            return GoalVerdict(False, rejected.code, rejected.reason)
+            return GoalVerdict(False, rejected.code, str(rejected), rejected.reason)
         self._drop_waiting(moment)
         self._waiting = ActiveGoal(goal_id, checked, self._device.joints, moment)
         if checked.trajectory.stamp <= moment.unix:
@@ -204,7 +206,7 @@ class GoalExecutor:
             self.scenes.require_newest(goal.goal.planned_in)
         except GoalRejected as rejected:
             self._next.take_away()
-            self._finish(goal, GoalEnding(GoalStatusCode.ABORTED, rejected.code, rejected.reason), moment)
+            self._finish(goal, GoalEnding(GoalStatusCode.ABORTED, rejected.code, str(rejected)), moment)
 
     def _follow(self, execution: ActiveGoal, state: StateFrame, point: PathPoint, moment: Moment) -> None:
         strayed = execution.follow(point, state)
@@ -260,7 +262,7 @@ class GoalExecutor:
             self.scenes.require_newest(execution.goal.planned_in)
             path = path or self._validator.path(execution.goal, motion_start, moment.unix, self._device.parameters)
         except GoalRejected as rejected:
-            ending = GoalEnding(GoalStatusCode.ABORTED, rejected.code, rejected.reason)
+            ending = GoalEnding(GoalStatusCode.ABORTED, rejected.code, str(rejected))
             return self._finish(execution, ending, moment)
         self._preempt(moment)
         self._begin(execution, PathKnots(path), moment)

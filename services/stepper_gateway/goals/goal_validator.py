@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from gemelo.schemas.reasons import because, remedy
 from gemelo.services.stepper_gateway.goals.goal_checks import GoalChecks
 from gemelo.services.stepper_gateway.goals.limit_checks import within
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
@@ -116,7 +117,7 @@ class GoalValidator:
         self._require_near(first, motion_start, parameters)
         joined = join_path(start, path, self._limits, lambda knot: within(knot, self._joints))
         if joined is None:
-            raise invalid("no way from the arm's present motion onto the trajectory stays within the joint limits")
+            raise invalid(because("goal.start.no_way_onto", remedy("wait_for_rest")))
         return joined
 
     def _single_point(self, point: TrajectoryPoint, start: Knot, offset: float) -> TimedPath:
@@ -124,17 +125,15 @@ class GoalValidator:
         target = Knot.at_rest(point.positions)
         fastest = profile(start, target, self._limits)
         if fastest is None:
-            raise invalid("no way from the arm's present motion to the point stays within the limits")
+            raise invalid(because("goal.start.no_way_to_point", remedy("wait_for_rest")))
         wanted = point.time_from_start - offset
         if fastest.duration > wanted + 1e-6 and wanted > 0.0:
-            raise invalid(
-                f"the point cannot be reached within {wanted:.3f} s: the limits need {fastest.duration:.3f} s; "
-                "give a later time_from_start"
-            )
+            later = remedy("later_time")
+            raise invalid(because("goal.time.too_short", later, time=wanted, least=fastest.duration))
         # Ruckig cannot stretch every motion to every duration; being early by a little is within the goal.
         path = profile(start, target, self._limits, max(wanted, 0.0)) or fastest
         if not all(within(path.at(path.duration * i / 200), self._joints) for i in range(201)):
-            raise invalid("the way from the arm's present motion to the point leaves the joint limits")
+            raise invalid(because("goal.start.leaves_limits", remedy("wait_for_rest")))
         return path
 
     def _is_same(self, motion_start: MotionStart, first: Knot) -> bool:
@@ -153,12 +152,18 @@ class GoalValidator:
             linear = joint.unit == "m"
             tolerance = parameters.start_tolerance_linear if linear else parameters.start_tolerance
             if not lowest - tolerance <= position <= highest + tolerance:
-                where = f"{lowest:.4f}" if lowest == highest else f"{lowest:.4f} to {highest:.4f}"
-                distance = max(lowest - position, position - highest)
+                there = {"present": lowest} if lowest == highest else {"lowest": lowest, "highest": highest}
+                apart = {"start": position, "distance": max(lowest - position, position - highest)}
                 raise invalid(
-                    f'joint "{joint.name}": the trajectory starts at {position:.4f} {joint.unit}, the arm is at '
-                    f"{where} {joint.unit}: {distance:.4f} {joint.unit} apart, more than the {tolerance:g} "
-                    f"{joint.unit} allowed; plan from the present state"
+                    because(
+                        "goal.start.elsewhere" if lowest == highest else "goal.start.moving_elsewhere",
+                        remedy("plan_from_here"),
+                        joint=joint.name,
+                        unit=joint.unit,
+                        tolerance=tolerance,
+                        **there,
+                        **apart,
+                    )
                 )
 
 
@@ -169,9 +174,8 @@ def _require_time_ahead(trajectory: JointTrajectory, now: int) -> None:
     if end < now * 1e-9:
         raise GoalRejected(
             FollowErrorCode.OLD_HEADER_TIMESTAMP,
-            f"the trajectory ended {now * 1e-9 - end:.3f} s ago by its stamp; use stamp 0 to start now, or count from "
-            "the stamp of the newest joint_states: the time is that of stepper_gateway's host",
+            because("goal.time.past", remedy("start_now"), time=now * 1e-9 - end),
         )
     delay = trajectory.stamp * 1e-9 - now * 1e-9
     if delay > MAX_DELAY:
-        raise invalid(f"the trajectory's stamp lies {delay:.1f} s ahead, more than {MAX_DELAY:.0f} s; send it later")
+        raise invalid(because("goal.time.far_ahead", remedy("send_later"), time=delay, limit=MAX_DELAY))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.motion import JointTrajectory
+from gemelo.schemas.reasons import Reason, Remedy, because, remedy
 from gemelo.services.stepper_gateway.goals.pieces import PIECE, Pieces
 from gemelo.services.stepper_gateway.goals.rejections import invalid
 from gemelo.services.stepper_gateway.motion.knot_sources import KNOT_TIME
@@ -23,7 +24,7 @@ def points_within(trajectory: JointTrajectory, joints: tuple[Joint, ...]) -> Pie
     for index, point in enumerate(trajectory.points):
         for joint, position in zip(joints, point.positions, strict=True):
             if not joint.lower - SLACK <= position <= joint.upper + SLACK:
-                raise invalid(f"{beyond(joint, position)} at point {index} ({point.time_from_start:.3f} s)")
+                raise invalid(at_point(beyond(joint, position), index, point.time_from_start))
         if index % PIECE == PIECE - 1:
             yield
 
@@ -67,13 +68,12 @@ def within(knot: Knot, joints: tuple[Joint, ...]) -> bool:
     return all(j.lower - SLACK <= p <= j.upper + SLACK for j, p in zip(joints, knot.position, strict=True))
 
 
-def beyond(joint: Joint, position: float) -> str:
-    """The sentence for a `position` [rad] or [m] outside the limits."""
+def beyond(joint: Joint, position: float) -> Reason:
+    """A `position` [rad] or [m] outside the limits."""
     side, limit = ("lower", joint.lower) if position < joint.lower else ("upper", joint.upper)
-    return (
-        f'joint "{joint.name}": {position:.4f} {joint.unit} is beyond the {side} limit {limit:.4f} {joint.unit}; '
-        f"stay within {joint.lower:.4f} to {joint.upper:.4f} {joint.unit}"
-    )
+    within = remedy("stay_within", lower=joint.lower, upper=joint.upper, unit=joint.unit)
+    named = {"joint": joint.name, "side": side, "unit": joint.unit}
+    return because("goal.limit.position", within, value=position, limit=limit, **named)
 
 
 class _Bound:
@@ -95,29 +95,24 @@ class _Bound:
             and abs(acceleration) <= self.acceleration
         )
 
-    def complaint(self, knot: Knot, column: int, t: float) -> str:
-        """The sentence for the limit that `knot` breaks at `t` [s] in its joint number `column`."""
-        joint, unit = self.joint, self.joint.unit
+    def complaint(self, knot: Knot, column: int, t: float) -> Reason:
+        """The limit that `knot` breaks at `t` [s] in its joint number `column`."""
+        joint = self.joint
         position, velocity, acceleration = (values[column] for values in knot)
         if not self.lower <= position <= self.upper:
-            return f"{beyond(joint, position)} (between points, at {t:.3f} s)"
+            return because("goal.limit.position.between", beyond(joint, position), time=t)
         if abs(velocity) > self._rate_velocity:
             rate = abs(velocity) * joint.steps.per_unit
-            return (
-                f'joint "{joint.name}": {rate:.0f} steps/s at {t:.3f} s is more than the {self.step_rate:.0f} steps/s '
-                f"that its driver and the device can do; {_slower(rate, self.step_rate)}"
-            )
+            slower = _slower(rate, self.step_rate)
+            return because("goal.limit.step_rate", slower, joint=joint.name, rate=rate, limit=self.step_rate, time=t)
+        named = {"joint": joint.name, "unit": joint.unit}
         if abs(velocity) > self.velocity:
-            return (
-                f'joint "{joint.name}": {abs(velocity):.4f} {unit}/s at {t:.3f} s is beyond the velocity limit '
-                f"{joint.velocity:.4f} {unit}/s; {_slower(velocity, joint.velocity)}"
-            )
-        factor = (abs(acceleration) / joint.acceleration) ** 0.5
-        return (
-            f'joint "{joint.name}": {abs(acceleration):.4f} {unit}/s^2 at {t:.3f} s is beyond the acceleration limit '
-            f"{joint.acceleration:.4f} {unit}/s^2; make the trajectory {factor:.2f} times as long, give velocities "
-            "with the points, or let the planner time it"
-        )
+            slower = _slower(velocity, joint.velocity)
+            values = {"value": abs(velocity), "limit": joint.velocity, "time": t}
+            return because("goal.limit.velocity", slower, **named, **values)
+        longer = remedy("slower_or_timed", factor=(abs(acceleration) / joint.acceleration) ** 0.5)
+        values = {"value": abs(acceleration), "limit": joint.acceleration, "time": t}
+        return because("goal.limit.acceleration", longer, **named, **values)
 
 
 def step_rate_limit(joint: Joint, tick_hz: int) -> float:
@@ -125,5 +120,10 @@ def step_rate_limit(joint: Joint, tick_hz: int) -> float:
     return min(tick_hz / 2.0, 1e6 / (joint.driver.step_high_us + joint.driver.step_low_us))
 
 
-def _slower(value: float, limit: float) -> str:
-    return f"make the trajectory {abs(value) / limit:.2f} times as long"
+def at_point(reason: Reason, index: int, time: float) -> Reason:
+    """What is wrong with one point of a trajectory, at `time` [s] of it."""
+    return because("goal.limit.position.at_point", reason, point=index, time=time)
+
+
+def _slower(value: float, limit: float) -> Remedy:
+    return remedy("slower", factor=abs(value) / limit)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowErrorCode
+from gemelo.schemas.reasons import because, remedy
 from gemelo.services.stepper_gateway.goals.active_goal import ActiveGoal, GoalEnding
 from gemelo.services.stepper_gateway.goals.goal_validator import MotionStart, ValidatedGoal
 from gemelo.services.stepper_gateway.goals.rejections import invalid
@@ -32,16 +33,16 @@ class NextGoal:
     def require_place(self, checked: ValidatedGoal, present: ActiveGoal | None, after: str) -> ActiveGoal | None:
         """The goal that it is to follow, None if that one has just succeeded; raises `GoalRejected`."""
         if checked.trajectory.stamp:
-            raise invalid(f"a goal that follows goal {after} begins at its end: leave the stamp 0")
+            raise invalid(because("goal.after.stamp", goal=after))
         if present is None and self._last == (after, GoalStatusCode.SUCCEEDED):
             return None
         if present is None or present.goal_id != after:
-            ended = f"it ended {self._last[1].name}" if self._last[0] == after else "it is not under way"
-            raise invalid(f"goal {after} cannot be followed, {ended}: plan from where the arm is")
+            anew = remedy("plan_from_here")
+            if self._last[0] == after:
+                raise invalid(because("goal.after.ended", anew, goal=after, status=self._last[1].name))
+            raise invalid(because("goal.after.not_under_way", anew, goal=after))
         if self.goal is not None:
-            raise invalid(
-                f"goal {self.goal.goal_id} follows goal {after} already: send this one when that one has begun"
-            )
+            raise invalid(because("goal.after.taken", goal=self.goal.goal_id, before=after))
         return present
 
     @staticmethod

@@ -1,22 +1,26 @@
-"""The rejection of a goal: a code of the action and a sentence that names the thing."""
+"""The rejection of a goal: a code of the action and a reason that names the thing."""
 
 from __future__ import annotations
 
 from gemelo.schemas.motion import FollowErrorCode
+from gemelo.schemas.reasons import Reason, plain
 
 
 class GoalRejected(Exception):
     """A goal that is not carried out."""
 
-    def __init__(self, code: FollowErrorCode, reason: str) -> None:
-        super().__init__(reason)
+    def __init__(self, code: FollowErrorCode, reason: Reason | str) -> None:
+        super().__init__()
         self.code = code
-        self.reason = reason
+        self.reason = reason if isinstance(reason, Reason) else plain(reason)
+
+    def __str__(self) -> str:
+        return str(self.reason)
 
 
-def invalid(reason: str) -> GoalRejected:
+def invalid(reason: Reason | str) -> GoalRejected:
     return GoalRejected(FollowErrorCode.INVALID_GOAL, reason)
 
 
-def invalid_joints(reason: str) -> GoalRejected:
+def invalid_joints(reason: Reason | str) -> GoalRejected:
     return GoalRejected(FollowErrorCode.INVALID_JOINTS, reason)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from gemelo.schemas.reasons import because, remedy
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected
 
 MOST_UNHEARD = 10_000  # chosen: edits of one scene that may be missed in a row; more is no planner's version
@@ -80,12 +81,9 @@ class SceneVersions:
         if rivals := self.rivals:
             raise GoalRejected(FollowErrorCode.SCENE_CHANGED, rivals)
         if planned.epoch not in (None, newest.epoch):
-            raise _changed(
-                f"planned in version {planned.version} of a scene that the planner holds no more; another one is at "
-                f"version {newest.version} now"
-            )
+            raise _changed("goal.scene.other_planner", planned.version, newest.version)
         if planned.version < newest.version:
-            raise _changed(f"planned in scene version {planned.version}, the scene is version {newest.version} now")
+            raise _changed("goal.scene.changed", planned.version, newest.version)
 
     @property
     def rivals(self) -> str:
@@ -128,5 +126,6 @@ def _process(instance: str) -> str:
     return f"process {pid} on {host}" if host else "a process that does not sign with its instance"
 
 
-def _changed(what: str) -> GoalRejected:
-    return GoalRejected(FollowErrorCode.SCENE_CHANGED, f"{what}: plan again")
+def _changed(code: str, version: int, newest: int) -> GoalRejected:
+    reason = because(code, remedy("plan_again"), version=version, newest=newest)
+    return GoalRejected(FollowErrorCode.SCENE_CHANGED, reason)

@@ -6,7 +6,7 @@ from collections import Counter
 from itertools import pairwise
 from typing import NamedTuple
 
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import (
@@ -16,6 +16,7 @@ from gemelo.schemas.motion import (
     JointTrajectory,
     TrajectoryPoint,
 )
+from gemelo.schemas.reasons import Value, because, remedy
 from gemelo.services.stepper_gateway.goals.pieces import PIECE, Pieces
 from gemelo.services.stepper_gateway.goals.rejections import invalid, invalid_joints
 
@@ -45,7 +46,7 @@ def require_names(names: tuple[str, ...], joints: tuple[Joint, ...]) -> None:
     known = [joint.name for joint in joints]
     missing = [name for name in known if name not in names]
     if missing:
-        raise invalid_joints(f"joint {_quoted(missing)} is missing; a trajectory moves all of {', '.join(known)}")
+        raise invalid_joints(because("goal.joints.missing", joints=tuple(missing), known=tuple(known)))
 
 
 def require_known(names: tuple[str, ...], joints: tuple[Joint, ...]) -> None:
@@ -53,9 +54,9 @@ def require_known(names: tuple[str, ...], joints: tuple[Joint, ...]) -> None:
     known = [joint.name for joint in joints]
     for name, count in Counter(names).items():
         if name not in known:
-            raise invalid_joints(f'joint "{name}" is unknown{suggestion(name, known)}')
+            raise invalid_joints(because("goal.joints.unknown", nearest(name, known), joint=name))
         if count > 1:
-            raise invalid_joints(f'joint "{name}" is named {count} times; name each joint once')
+            raise invalid_joints(because("goal.joints.repeated", joint=name, count=count))
 
 
 Bounds = tuple[float | None, ...]  # one for each joint of the arm; None: no bound
@@ -89,7 +90,7 @@ def time_tolerance(goal: FollowJointTrajectoryGoal, default: float) -> float | N
     if asked == -1.0:
         return None
     if asked < 0.0:
-        raise invalid(f"goal_time_tolerance is {asked:g} s; give a time, 0 for the default or -1 for no bound")
+        raise invalid(because("goal.tolerance.time", value=asked))
     return asked or default
 
 
@@ -100,24 +101,23 @@ def _tolerances(field: str, given: tuple[JointTolerance, ...], joints: tuple[Joi
     names = [joint.name for joint in joints]
     for tolerance in given:
         if tolerance.name not in names:
-            hint = suggestion(tolerance.name, names)
-            raise invalid_joints(f'{field} is for joint "{tolerance.name}", which is unknown{hint}')
+            guess = nearest(tolerance.name, names)
+            raise invalid_joints(because("goal.tolerance.unknown_joint", guess, field=field, joint=tolerance.name))
         index = names.index(tolerance.name)
-        joint, where = joints[index], f'{field} of joint "{tolerance.name}"'
-        positions[index] = _bound(where, "position", tolerance.position, joint)
-        velocities[index] = _bound(where, "velocity", tolerance.velocity, joint) or None
-        if _bound(where, "acceleration", tolerance.acceleration, joint):
-            raise invalid(
-                f"{where}: an acceleration of {tolerance.acceleration:g} {joint.unit}/s^2 cannot be watched, because "
-                "the device measures steps and velocities only; give 0 or -1, and bound the velocity"
-            )
+        joint = joints[index]
+        positions[index] = _bound(field, "position", tolerance.position, joint)
+        velocities[index] = _bound(field, "velocity", tolerance.velocity, joint) or None
+        if _bound(field, "acceleration", tolerance.acceleration, joint):
+            named = {"field": field, "joint": joint.name, "unit": joint.unit}
+            raise invalid(because("goal.tolerance.acceleration", value=tolerance.acceleration, **named))
     return Tolerances(tuple(positions), tuple(velocities))
 
 
-def _bound(where: str, quantity: str, value: float, joint: Joint) -> float | None:
+def _bound(field: str, quantity: str, value: float, joint: Joint) -> float | None:
     """In steps; None for no bound."""
     if value < 0.0 and value != -1.0:
-        raise invalid(f"{where}: {quantity} {value:g} is negative; give a bound, 0 for the default or -1 for no bound")
+        named = {"field": field, "joint": joint.name, "quantity": quantity}
+        raise invalid(because("goal.tolerance.negative", value=value, **named))
     return None if value == -1.0 else value * joint.steps.per_unit
 
 
@@ -129,9 +129,10 @@ def _filled(given: Tolerances, defaults: list[float]) -> Tolerances:
 def _require_points(trajectory: JointTrajectory) -> Pieces[None]:
     points, width = trajectory.points, len(trajectory.joint_names)
     if not points:
-        raise invalid("the trajectory has no points")
+        raise invalid(because("goal.points.none"))
     if len(points) > MOST_POINTS:
-        raise invalid(f"the trajectory has {len(points)} points, more than {MOST_POINTS}; send it in parts")
+        parts = remedy("in_parts")
+        raise invalid(because("goal.points.too_many", parts, count=len(points), limit=MOST_POINTS))
     fields = (bool(points[0].velocities), bool(points[0].accelerations))
     for index, point in enumerate(points):
         _require_size(index, "positions", point.positions, width, True)
@@ -140,28 +141,31 @@ def _require_points(trajectory: JointTrajectory) -> Pieces[None]:
         if index % PIECE == PIECE - 1:
             yield
     if fields == (False, True):
-        raise invalid("the points have accelerations but no velocities; give both, or positions only")
+        raise invalid(because("goal.points.no_velocities"))
     yield from _require_times([point.time_from_start for point in points])
 
 
 def _require_size(index: int, field: str, values: Vector, width: int, wanted: bool) -> None:
     if len(values) != (width if wanted else 0):
-        expected = f"{width} are needed, one per joint" if wanted else "point 0 has none, so no point may"
-        raise invalid(f"point {index} has {len(values)} {field}; {expected}")
+        found: dict[str, Value] = {"point": index, "count": len(values), "field": field}
+        if wanted:
+            raise invalid(because("goal.points.width", limit=width, **found))
+        raise invalid(because("goal.points.unlike_first", **found))
 
 
 def _require_times(times: list[float]) -> Pieces[None]:
     if times[0] < 0.0:
-        raise invalid(f"point 0 has time_from_start {times[0]:g} s; it must not be negative")
+        raise invalid(because("goal.time.negative", value=times[0]))
     for index, (before, after) in enumerate(pairwise(times), start=1):
         if after <= before:
             raise invalid(
-                f"time_from_start does not increase: {before:g} s at point {index - 1}, {after:g} s at point {index}"
+                because("goal.time.not_increasing", before=before, first=index - 1, after=after, second=index)
             )
         if index % PIECE == 0:
             yield
     if times[-1] > MAX_DURATION:
-        raise invalid(f"the trajectory takes {times[-1]:g} s, more than {MAX_DURATION:g} s; send it in parts")
+        parts = remedy("in_parts")
+        raise invalid(because("goal.time.too_long", parts, time=times[-1], limit=MAX_DURATION))
 
 
 def _reordered(point: TrajectoryPoint, order: list[int]) -> TrajectoryPoint:
@@ -176,11 +180,5 @@ def _reordered(point: TrajectoryPoint, order: list[int]) -> TrajectoryPoint:
 def _require_rest_at_end(last: TrajectoryPoint, joints: tuple[Joint, ...]) -> None:
     for joint, velocity in zip(joints, last.velocities, strict=bool(last.velocities)):
         if abs(velocity) > REST:
-            raise invalid(
-                f'joint "{joint.name}" has {velocity:g} {joint.unit}/s at the last point; a trajectory must end at '
-                "rest, with velocity 0"
-            )
-
-
-def _quoted(names: list[str]) -> str:
-    return ", ".join(f'"{name}"' for name in names)
+            named = {"joint": joint.name, "unit": joint.unit}
+            raise invalid(because("goal.points.moving_end", value=velocity, **named))

@@ -67,7 +67,7 @@ class GripperExecutor:
         try:
             jaws = self._require(goal, moment)
         except GoalRejected as rejected:
-            return GoalVerdict(False, rejected.code, rejected.reason)
+            return GoalVerdict(False, rejected.code, str(rejected), rejected.reason)
         self._end(GoalStatusCode.PREEMPTED, "a newer goal took over", moment)
         now = moment.monotonic
         arrival = now + jaws.travel_time(goal.position)

@@ -36,7 +36,7 @@ class TargetFollower:
             self._targets.require_uninterrupted(silence)
             columns = self._targets.checked(targets)
         except GoalRejected as rejected:
-            return self._complain(rejected.reason, moment)
+            return self._complain(str(rejected), moment)
         self._targets.take(columns, self._controller.motion_start(moment).start.position)
         self._begin(moment)
 

@@ -1,4 +1,4 @@
-"""Compiles the catalogue: all gettext files of a language into one that is read at once. `make setup` and wheels do it."""
+"""Compiles the catalogue: all gettext files of a language into one, when a checkout or a wheel is made."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ COMPILED = "gemelo.mo"  # as catalogue.py reads it; this file runs alone where t
 
 
 def compile_languages(sources: Path, to: Path) -> list[Path]:
-    """Writes `to/<language>/gemelo.mo` of each folder of `sources`; raises `ValueError` for a code that stands twice."""
+    """Writes `to/<language>/gemelo.mo` of each folder of `sources`; raises `ValueError` for a code given twice."""
     return [_compile(folder, to / folder.name) for folder in sorted(sources.iterdir()) if folder.is_dir()]
 
 

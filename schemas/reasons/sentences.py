@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import string
 from collections.abc import Sequence
-from enum import StrEnum
+from enum import Enum
 from functools import cache
 from typing import Any
 
-from gemelo.libraries.reasons.catalogue import ENGLISH, template
-from gemelo.libraries.reasons.units import in_display_units, in_si_units
-from gemelo.schemas.reasons import Reason, Remedy, Value
+from gemelo.schemas.reasons.catalogue import ENGLISH, template
+from gemelo.schemas.reasons.reason import PLAIN, Reason, Remedy, Value
+from gemelo.schemas.reasons.units import in_display_units, in_si_units
 
 
-class FrontEnd(StrEnum):
+class FrontEnd(Enum):
     """What the reader has before him: it decides how a remedy is worded, and in which units a value stands."""
 
     COMMAND = "command"  # `gemelo home`
@@ -26,11 +26,6 @@ def say(reason: Reason, language: str = ENGLISH, front_end: FrontEnd = FrontEnd.
     return _writer(language, front_end).sentence(reason)
 
 
-def english(reason: Reason) -> str:
-    """The sentence that goes along with a message, for readers that do not know the catalogue."""
-    return say(reason)
-
-
 class _Writer(string.Formatter):
     """Puts values into the templates of one language and one front end.
 
@@ -39,11 +34,13 @@ class _Writer(string.Formatter):
     """
 
     def __init__(self, language: str, front_end: FrontEnd) -> None:
-        self._language, self._front_end = language, front_end
+        self._language, self._context = language, front_end.value
         self._units = in_display_units if front_end is FrontEnd.PAGE else in_si_units
 
     def sentence(self, what: Reason | Remedy) -> str:
         """A code that no catalogue has, as a newer program may send it, is given as it is, with its values."""
+        if what.code == PLAIN:
+            return str(what.values.get("text", ""))
         found = self._template(what.code)
         if found is None:
             values = ", ".join(f"{name} {value}" for name, value in what.values.items())
@@ -69,7 +66,7 @@ class _Writer(string.Formatter):
         return format(value, format_spec)
 
     def _template(self, code: str) -> str | None:
-        return template(code, self._language, self._front_end) or template(code, ENGLISH, self._front_end)
+        return template(code, self._language, self._context) or template(code, ENGLISH, self._context)
 
     def _word(self, word: str) -> str:
         return self._template(f"word.{word}") or word

@@ -1,18 +1,21 @@
 """The catalogue: the templates of all codes in one language, in gettext files by subject.
 
-`languages/es/goal.po` has the Spanish of all codes `goal.*`. An entry's msgid is the code; its msgctxt is empty, or names
-the front end that has words of its own for it (`page`), or is `explain`: what the code means and what to do, at length. A
-template has the names of the reason's values in braces, and behind a colon the unit of one: `{depth:m}`.
+`languages/es/goal.po` has the Spanish of all codes `goal.*`. An entry's msgid is the code; its msgctxt is empty, names
+the front end that has words of its own for it (`page`), or is `explain`: what the code means and what to do, at length.
+A template has the names of the reason's values in braces, and behind a colon the unit of one: `{depth:m}`.
 
-`compiled.py` makes one file of a language's, which takes 1 ms to read (Fluent's runtime takes 100 to import and 0.3 for
-each message, and Babel, of which it consists in part, 100 as well).
+`compiled.py` makes one file of a language's, which takes 1 ms to read. (Fluent's runtime takes some 100 ms to import
+and 0.3 ms for each message, and so does Babel, on which it stands.)
 """
 
 from __future__ import annotations
 
 from functools import cache
-from gettext import GNUTranslations
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gettext import GNUTranslations
 
 LANGUAGES = Path(__file__).resolve().parent / "languages"
 COMPILED = "gemelo.mo"
@@ -51,5 +54,7 @@ def _catalogue(language: str) -> GNUTranslations | None:
     file = folder / COMPILED
     if not file.is_file():
         raise FileNotFoundError(f"{file} is not there: the catalogue of reasons is compiled by `make setup`")
+    from gettext import GNUTranslations  # 3 ms, which only who reads a sentence waits for
+
     with file.open("rb") as opened:
         return GNUTranslations(opened)

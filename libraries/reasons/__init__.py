@@ -1,1 +1,0 @@
-"""Sentences of reasons: one catalogue of codes, in every language and for every front end."""

@@ -1,0 +1,6 @@
+"""Why something is not so: codes with values, and one catalogue of their sentences, in every language."""
+
+from gemelo.schemas.reasons.reason import PLAIN, Reason, Remedy, Value, because, plain, remedy
+from gemelo.schemas.reasons.sentences import FrontEnd, say
+
+__all__ = ["PLAIN", "FrontEnd", "Reason", "Remedy", "Value", "because", "plain", "remedy", "say"]

@@ -1,0 +1,80 @@
+"""Why something is not so: a code with values, from which each front end makes its sentence (schemas/reasons)."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+import msgspec
+
+from gemelo.schemas.message import Message
+
+Value = bool | int | float | str | tuple[str, ...]  # SI units; names of joints, links, objects and hosts as they are
+
+
+class Remedy(Message, frozen=True, kw_only=True):
+    """What would do: `home`, `wait` with a time, the nearest goal."""
+
+    code: str = ""
+    values: dict[str, Value] = msgspec.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """As of any message: no number that is not finite."""
+        _require_finite(self.values)
+
+
+class Reason(Message, frozen=True, kw_only=True):
+    """A dotted code such as `goal.limit.position`, its values, the reasons behind it, and what would do.
+
+    The catalogue of schemas/reasons has the sentence of each code in each language; no code looks into a sentence.
+    """
+
+    code: str = ""
+    values: dict[str, Value] = msgspec.field(default_factory=dict)
+    causes: tuple[Reason, ...] = ()
+    remedies: tuple[Remedy, ...] = ()
+
+    def __post_init__(self) -> None:
+        """As of any message: no number that is not finite."""
+        _require_finite(self.values)
+
+    def __str__(self) -> str:
+        """The English sentence, which goes along with a message for readers that do not know the catalogue."""
+        from gemelo.schemas.reasons.sentences import say
+
+        return say(self)
+
+
+def _require_finite(values: dict[str, Value]) -> None:
+    for name, value in values.items():
+        if type(value) is float and not isfinite(value):
+            raise ValueError(f"field `values.{name}` is {value}: it must be finite")
+
+
+def because(code: str, /, *parts: Reason | Remedy, **values: Value) -> Reason:
+    """The reason `code` with its values, the reasons behind it and what would do.
+
+    A number that is not finite goes along as its word.
+    """
+    causes = tuple(part for part in parts if isinstance(part, Reason))
+    remedies = tuple(part for part in parts if isinstance(part, Remedy))
+    return Reason(code=code, values=_finite(values), causes=causes, remedies=remedies)
+
+
+PLAIN = "plain"  # the code of a sentence that has none of its own yet
+
+
+def plain(text: str) -> Reason:
+    """A sentence without a code of its own."""
+    return Reason(code=PLAIN, values={"text": text})
+
+
+def remedy(code: str, /, **values: Value) -> Remedy:
+    """The remedy `code` with its values."""
+    return Remedy(code=code, values=_finite(values))
+
+
+def _finite(values: dict[str, Value]) -> dict[str, Value]:
+    for name, value in values.items():
+        if type(value) is float and not isfinite(value):
+            values[name] = str(value)
+    return values

@@ -1,0 +1,129 @@
+"""The catalogue of reasons against the code: each code that is raised has its sentence in every language."""
+
+from __future__ import annotations
+
+import ast
+import string
+from collections.abc import Iterator
+from functools import cache
+
+import polib
+import pytest
+
+from gemelo.libraries.runtime.deployment import project_root
+from gemelo.schemas.message import decode, encode
+from gemelo.schemas.reasons import FrontEnd, Reason, because, plain, remedy, say
+from gemelo.schemas.reasons.catalogue import ENGLISH, LANGUAGES, languages
+
+ROOT = project_root()
+BEYOND = because(
+    "goal.limit.position.at_point",
+    because(
+        "goal.limit.position",
+        remedy("stay_within", lower=-2.95, upper=2.95, unit="rad"),
+        joint="brazo_joint", value=3.2, limit=2.95, side="upper", unit="rad",
+    ),
+    point=3, time=0.2,
+)  # fmt: skip
+
+
+@cache
+def catalogue(language: str) -> dict[str, str]:
+    """The templates for all front ends, by code."""
+    files = sorted((LANGUAGES / language).glob("*.po"))
+    return {entry.msgid: entry.msgstr for file in files for entry in polib.pofile(str(file)) if not entry.msgctxt}
+
+
+def calls() -> Iterator[tuple[str, ast.Call]]:
+    """Every call of `because` and `remedy` in the product, with its file."""
+    for room in ("services", "libraries", "tools", "gemelo", "schemas"):
+        for path in (ROOT / room).rglob("*.py"):
+            if (text := path.read_text()).find("schemas.reasons") < 0:
+                continue
+            for node in ast.walk(ast.parse(text)):
+                if isinstance(node, ast.Call) and ast.unparse(node.func) in ("because", "remedy"):
+                    yield str(path.relative_to(ROOT)), node
+
+
+def constants() -> set[str]:
+    """Every string in the files that make reasons."""
+    files = {file for file, _ in calls()}
+    nodes = (node for file in files for node in ast.walk(ast.parse((ROOT / file).read_text())))
+    return {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+
+
+def places(template: str) -> set[str]:
+    """The names of the values in a template, those in a unit too."""
+    found = set()
+    for _, name, spec, _ in string.Formatter().parse(template):
+        found |= ({name} if name else set()) | (places(spec) if spec else set())
+    return found
+
+
+def test_every_code_that_is_raised_is_in_the_catalogue():
+    raised = [(file, call.args[0]) for file, call in calls() if call.args]
+    assert len(raised) > 40
+    literal = {(file, node.value) for file, node in raised if isinstance(node, ast.Constant)}
+    assert [each for each in literal if each[1] not in catalogue(ENGLISH)] == []
+
+
+def test_every_code_of_the_catalogue_is_raised():
+    raised = constants()
+    assert [code for code in catalogue(ENGLISH) if not code.startswith("word.") and code not in raised] == []
+
+
+@pytest.mark.parametrize("language", languages())
+def test_every_language_has_every_code_with_all_its_values(language: str):
+    known, english = catalogue(language), catalogue(ENGLISH)
+    assert known.keys() == english.keys()
+    assert {code: differ for code in known if (differ := places(known[code]) ^ places(english[code]))} == {}
+
+
+def test_the_values_at_a_call_are_those_of_its_template():
+    """Where both are literal: the rest comes from dictionaries, which the tests of what raises them fill in."""
+    for file, call in calls():
+        code = call.args[0] if call.args else None
+        if isinstance(code, ast.Constant) and all(word.arg for word in call.keywords):
+            given = {str(word.arg) for word in call.keywords}
+            assert places(catalogue(ENGLISH)[code.value]) - {"causes", "remedies"} == given, f"{file}: {code.value}"
+
+
+def test_a_reason_is_said_in_the_language_and_the_terms_of_its_reader():
+    assert str(BEYOND) == (
+        'joint "brazo_joint": 3.2000 rad is beyond the upper limit 2.9500 rad; stay within -2.9500 rad to 2.9500 rad '
+        "at point 3 (0.200 s)"
+    )
+    assert say(BEYOND, "es", FrontEnd.PAGE) == (
+        "brazo_joint: 183.3° está más allá del límite superior de 169.0°; quédese entre -169.0° y 169.0° "
+        "(punto 3, a los 0.200 s)"
+    )
+
+
+def test_it_travels():
+    assert decode(Reason, encode(BEYOND)) == BEYOND
+
+
+def test_a_language_without_a_folder_is_english():
+    assert say(BEYOND, "de") == str(BEYOND)
+
+
+def test_a_code_of_a_newer_program_is_given_with_its_values():
+    assert str(because("goal.moon.full", phase=0.5)) == "goal.moon.full (phase 0.5)"
+
+
+def test_a_value_that_an_older_program_does_not_send_is_a_question_mark():
+    assert str(because("goal.joints.unknown")) == 'joint "?" is unknown'
+
+
+def test_a_number_that_is_not_finite_goes_along_as_its_word():
+    assert str(because("goal.tolerance.time", value=float("nan"))).startswith("goal_time_tolerance is nan s")
+
+
+def test_a_sentence_without_a_code_is_itself_in_every_language():
+    assert say(plain("the wire is torn"), "es") == "the wire is torn"
+
+
+def test_several_remedies_are_a_choice():
+    both = because("goal.points.none", remedy("plan_again"), remedy("in_parts"))
+    assert str(both) == "the trajectory has no points; plan again or send it in parts"
+    assert say(both, "es") == "El plan no tiene puntos; planifique otra vez o envíelo por partes"
