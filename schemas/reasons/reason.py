@@ -1,4 +1,4 @@
-"""Why something is not so: a code with values, from which each front end makes its sentence (schemas/reasons)."""
+"""A reason why something is not so: a code with values, of which each front end makes its sentence."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from math import isfinite
 import msgspec
 
 from gemelo.schemas.message import Message
-
-Value = bool | int | float | str | tuple[str, ...]  # SI units; names of joints, links, objects and hosts as they are
+from gemelo.schemas.reasons.sentences import PLAIN, Value, say
 
 
 class Remedy(Message, frozen=True, kw_only=True):
@@ -39,8 +38,6 @@ class Reason(Message, frozen=True, kw_only=True):
 
     def __str__(self) -> str:
         """The English sentence, which goes along with a message for readers that do not know the catalogue."""
-        from gemelo.schemas.reasons.sentences import say
-
         return say(self)
 
 
@@ -58,9 +55,6 @@ def because(code: str, /, *parts: Reason | Remedy, **values: Value) -> Reason:
     causes = tuple(part for part in parts if isinstance(part, Reason))
     remedies = tuple(part for part in parts if isinstance(part, Remedy))
     return Reason(code=code, values=_finite(values), causes=causes, remedies=remedies)
-
-
-PLAIN = "plain"  # the code of a sentence that has none of its own yet
 
 
 def plain(text: str) -> Reason:

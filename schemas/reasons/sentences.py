@@ -3,14 +3,34 @@
 from __future__ import annotations
 
 import string
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from functools import cache
-from typing import Any
+from typing import Any, Protocol
 
 from gemelo.schemas.reasons.catalogue import ENGLISH, template
-from gemelo.schemas.reasons.reason import PLAIN, Reason, Remedy, Value
 from gemelo.schemas.reasons.units import in_display_units, in_si_units
+
+Value = bool | int | float | str | tuple[str, ...]  # SI units; names of joints, links, objects and hosts as they are
+PLAIN = "plain"  # the code of a sentence that has none of its own
+
+
+class Coded(Protocol):
+    """What the catalogue has a sentence for."""
+
+    @property
+    def code(self) -> str: ...
+    @property
+    def values(self) -> Mapping[str, Value]: ...
+
+
+class Explained(Coded, Protocol):
+    """With what is behind it, and what would do."""
+
+    @property
+    def causes(self) -> Sequence[Explained]: ...
+    @property
+    def remedies(self) -> Sequence[Coded]: ...
 
 
 class FrontEnd(Enum):
@@ -21,7 +41,7 @@ class FrontEnd(Enum):
     PAGE = "page"  # press Home
 
 
-def say(reason: Reason, language: str = ENGLISH, front_end: FrontEnd = FrontEnd.COMMAND) -> str:
+def say(reason: Explained, language: str = ENGLISH, front_end: FrontEnd = FrontEnd.COMMAND) -> str:
     """The sentence of `reason`; of a code that the language does not have, the English one."""
     return _writer(language, front_end).sentence(reason)
 
@@ -37,20 +57,22 @@ class _Writer(string.Formatter):
         self._language, self._context = language, front_end.value
         self._units = in_display_units if front_end is FrontEnd.PAGE else in_si_units
 
-    def sentence(self, what: Reason | Remedy) -> str:
+    def sentence(self, reason: Explained) -> str:
+        """With what would do behind it, where the template has no other place for that."""
+        causes = "; ".join(self.sentence(cause) for cause in reason.causes)
+        remedies = self._either([self._filled(each, self._template(each.code), {}) for each in reason.remedies])
+        found = self._template(reason.code)
+        text = self._filled(reason, found, {"causes": causes, "remedies": remedies})
+        return text if not remedies or "{remedies}" in (found or "") else f"{text}; {remedies}"
+
+    def _filled(self, what: Coded, found: str | None, within: Mapping[str, str]) -> str:
         """A code that no catalogue has, as a newer program may send it, is given as it is, with its values."""
         if what.code == PLAIN:
             return str(what.values.get("text", ""))
-        found = self._template(what.code)
         if found is None:
             values = ", ".join(f"{name} {value}" for name, value in what.values.items())
             return f"{what.code} ({values})" if values else what.code
-        if isinstance(what, Remedy):
-            return self.vformat(found, (), _Values(what.values))
-        remedies = self._either([self.sentence(each) for each in what.remedies])
-        within = {"causes": "; ".join(self.sentence(cause) for cause in what.causes), "remedies": remedies}
-        text = self.vformat(found, (), _Values(what.values | within))
-        return text if not remedies or "{remedies}" in found else f"{text}; {remedies}"
+        return self.vformat(found, (), _Values({**what.values, **within}))
 
     def format_field(self, value: Value, format_spec: str) -> str:
         """One value as it is written."""
