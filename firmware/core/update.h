@@ -18,7 +18,7 @@ constexpr uint8_t kImageMagic = 0xE9;     // standard: its first byte
 constexpr size_t kImageChipOffset = 12;   // standard: of the chip's id, u16
 // Standard: of esp_app_desc_t's version, behind that header, the first segment's (8 bytes) and 16 bytes of its own.
 constexpr size_t kImageVersionOffset = 48;
-constexpr size_t kImageVersionSize = 32;
+constexpr size_t kImageVersionSize = 32;   // standard: the same
 constexpr uint16_t kVirtualChip = 0xFFFE;  // chosen: of a virtual device; ESP-IDF's invalid id is 0xFFFF
 
 enum class UpdateStep : uint8_t { Begin = 1, Data, End, Abort };

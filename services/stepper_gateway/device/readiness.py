@@ -10,7 +10,7 @@ from gemelo.schemas.device_config import InputRole
 from gemelo.schemas.device_faults import fault_text
 from gemelo.services.stepper_gateway.links.frames import StateFlag, StateFrame
 
-LEAST_FIRMWARE = (1, 0, 0)  # that this gateway drives; raise it with a frame or field that an older one does not have
+LEAST_FIRMWARE = (1, 0, 0)  # that is driven; chosen: the first; raise it with a frame that an older one does not have
 
 _VERSION = re.compile(r"(\d+)\.(\d+)\.(\d+)")
 
