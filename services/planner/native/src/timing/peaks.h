@@ -1,5 +1,5 @@
 // The largest velocity, acceleration and jerk of the quintics through a trajectory's points, between them too; the
-// operations stand in the order of services/planner/timing/peaks.py.
+// operations stand in the order of services/planner/timing/timing.py.
 #pragma once
 
 #include <algorithm>
