@@ -28,7 +28,13 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         kind = type(self)
-        values = (_values_of.get(kind) or _look_at(kind))(self)
+        try:
+            read = _values_of[kind]
+        except KeyError:
+            read = _look_at(kind)
+        if read is None:
+            return
+        values = read(self)
         for value in values:
             found = type(value)
             if found is float:
@@ -56,10 +62,10 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
 WITHOUT_FLOATS = (str, bytes, int, Enum, type(None), Message)
 
 _fields_of: dict[type[Message], tuple[str, ...]] = {}  # that a float may be in, by its type as it is declared
-_values_of: dict[type[Message], Callable[[Message], tuple[Any, ...]]] = {}  # of these fields
+_values_of: dict[type[Message], Callable[[Message], tuple[Any, ...]] | None] = {}  # of these fields; None: it has none
 
 
-def _look_at(kind: type[Message]) -> Callable[[Message], tuple[Any, ...]]:
+def _look_at(kind: type[Message]) -> Callable[[Message], tuple[Any, ...]] | None:
     """Finds the fields of a kind of message that may hold a float, once; messages within it look at their own."""
     fields = tuple(name for name, declared in _declared(kind).items() if _may_hold_a_float(declared))
     _fields_of[kind] = fields
@@ -69,12 +75,8 @@ def _look_at(kind: type[Message]) -> Callable[[Message], tuple[Any, ...]]:
         only = attrgetter(*fields)
         _values_of[kind] = lambda message: (only(message),)
     else:
-        _values_of[kind] = _no_values
+        _values_of[kind] = None
     return _values_of[kind]
-
-
-def _no_values(_message: Message) -> tuple[Any, ...]:
-    return ()
 
 
 def _declared(kind: type[Message]) -> dict[str, object]:

@@ -509,7 +509,7 @@ class Node:
 
         Call before each turn of a loop that must not act beside another.
         """
-        return self._stop_watch.is_certain(self.clock.monotonic(), lambda: self.is_connected, self._name.newer)
+        return self._stop_watch.is_certain(self.clock.monotonic(), lambda: self.is_connected, lambda: self._name.newer)
 
     def _watched(self, certificate: str) -> CertificateWatch | None:
         """Its watch, which has looked at it once; None where this host shows none."""

@@ -43,7 +43,7 @@ def test_a_second_node_that_gives_way_at_its_start_ends_nobody() -> None:
 
 def turns(watch: StopWatch, start: float, seconds: float, connected: bool = True, newer: str = "") -> list[bool]:
     """Of 50 a second from `start` [s] on."""
-    return [watch.is_certain(start + i / 50, lambda: connected, newer) for i in range(round(seconds * 50))]
+    return [watch.is_certain(start + i / 50, lambda: connected, lambda: newer) for i in range(round(seconds * 50))]
 
 
 def test_a_node_that_was_stopped_is_certain_of_its_name_only_after_the_router_has_it_back() -> None:

@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from queue import Empty, SimpleQueue
 from types import FrameType
 from typing import TypeVar
@@ -132,7 +133,7 @@ class VirtualClock:
     def drive(self, loop: DrivenLoop) -> None:
         with self.baton:
             turns = self._loops[loop] = LoopTurns(loop)
-            loop.on_task(lambda: self._wake(turns))
+            loop.on_task(partial(self._wake, turns))
             self._plan(turns, loop.due())
 
     def release(self, loop: DrivenLoop) -> None:

@@ -59,10 +59,10 @@ class StopWatch:
         self._certain_from: float | None = None  # [s] monotonic, at the earliest; None while nothing is in doubt
         self._connected_since: float | None = None
 
-    def is_certain(self, now: float, is_connected: Callable[[], bool], newer: str) -> bool:
+    def is_certain(self, now: float, is_connected: Callable[[], bool], newer: Callable[[], str]) -> bool:
         """True if the name is this node's; ask at every turn of its loop, at `now` [s] monotonic, before all else.
 
-        `newer` is the token of a node that has started since under the same name.
+        `newer` gives the token of a node that has started since under the same name; it is asked where there is doubt.
         """
         gap = 0.0 if self._last is None else now - self._last
         self._last = now
@@ -72,6 +72,6 @@ class StopWatch:
             return True
         self._connected_since = (self._connected_since or now) if is_connected() else None
         is_back = self._connected_since is not None and now - self._connected_since >= BACK
-        if is_back and now >= self._certain_from and not newer:
+        if is_back and now >= self._certain_from and not newer():
             self._certain_from = None
         return self._certain_from is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceMode
@@ -15,10 +16,17 @@ LEAST_FIRMWARE = (1, 0, 0)  # that is driven; chosen: the first; raise it with a
 _VERSION = re.compile(r"(\d+)\.(\d+)\.(\d+)")
 
 
+@lru_cache(maxsize=4)  # it is looked at with every input
+def _version(firmware: str) -> tuple[int, ...] | None:
+    """Of a firmware's text; None for a board that has no version."""
+    found = _VERSION.match(firmware)
+    return tuple(map(int, found.groups())) if found is not None else None
+
+
 def outdated_reason(name: str, firmware: str) -> str:
     """A sentence where device `name` says a version below LEAST_FIRMWARE; empty for a board that has no version."""
-    found = _VERSION.match(firmware)
-    if found is None or tuple(map(int, found.groups())) >= LEAST_FIRMWARE:
+    version = _version(firmware)
+    if version is None or version >= LEAST_FIRMWARE:
         return ""
     least = ".".join(map(str, LEAST_FIRMWARE))
     return (

@@ -78,6 +78,7 @@ class DeviceSession:
         self.link_up = False
         self.link_reason = "no connection yet"
         self.latest: StateFrame | None = None  # of any number of joints
+        self.state: StateFrame | None = None  # the latest, if it is one of this arm
         self.state_arrival = -1.0e9  # [s] monotonic
         self.boot_id = 0
         self.status: StatusReport | None = None  # what the present boot has said about itself
@@ -87,11 +88,6 @@ class DeviceSession:
     def is_open_loop(self) -> bool:
         """True if the device does not say what it has executed: its steps are those that were sent."""
         return self.status is not None and self.status.open_loop
-
-    @property
-    def state(self) -> StateFrame | None:
-        """The latest state, if it is one of this arm."""
-        return self.latest if self.latest is not None and self.fits(self.latest) else None
 
     @property
     def is_armed(self) -> bool:
@@ -157,6 +153,7 @@ class DeviceSession:
         if self.latest is not None and state.t_us <= self.latest.t_us and is_fresh:
             return False, is_new_boot
         self.latest, self.state_arrival = state, arrival
+        self.state = state if self.fits(state) else None
         return True, is_new_boot
 
     def question(self, moment: Moment) -> Sync:
@@ -301,7 +298,7 @@ class DeviceSession:
         self._old_boots = [boot for boot in self._old_boots if boot != boot_id]
         self._others.forget(boot_id)
         self.boot_id, self.status = boot_id, self._reports.get(boot_id)
-        self.latest = None
+        self.latest = self.state = None
         self._doubted, self._checks = None, StateChecks()
         self.clock.reset()
         self._sync_due = 0.0
