@@ -1,4 +1,4 @@
-"""A language of the page: one file with its words, and one row of the table of languages."""
+"""A language: one file with the page's words, one row of the table of languages, and a folder of the catalogue."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.schemas.reasons.compiled import compile_languages
 from tests.additions import ROOT, added, row_added, run_in
 
 PORTUGUESE = '''"""The page in Portuguese."""
@@ -22,9 +23,14 @@ PORTUGUESE = Language(
     Sentences({"a newer goal took over": "uma meta mais nova assumiu"}, {"mode": {"IDLE": "em repouso"}}),
 )
 '''
+GOAL = """
+msgid "goal.limit.position"
+msgstr "{joint}: {value:{unit}} passa do limite de {limit:{unit}}"
+"""
 SCRIPT = """
 import json, sys
 from pathlib import Path
+from gemelo.schemas.reasons import because
 from gemelo.services.panel.model.problems import Problem
 from gemelo.services.panel.words.words import Words, language_of
 from tests.panel.memory_page import memory_page
@@ -32,7 +38,10 @@ from tests.runtime.support import until
 
 words = Words(language_of("pt-BR"))
 problem = Problem("refused (reach): too far", check="reach", subject="tool", value=0.2, limit=0.5)
-written = [words("plan"), words.problem(problem)[1], words.said("a newer goal took over"), words.said("not known")]
+at = because("goal.limit.position", joint="q1", value=1.0, limit=0.5, unit="rad", side="upper")
+rejected = words.problem(Problem("refused by stepper_gateway", reason=at))[1]
+written = [words("plan"), rejected, words.problem(problem)[1]]
+written += [words.said("a newer goal took over"), words.said("not known")]
 with memory_page("rm1", Path(sys.argv[1])) as page:
     page.draw(3)
     page.browser.choose("Language / Idioma", "Português")
@@ -55,7 +64,15 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     table = row_added(words, after=spanish, row='    "pt": PORTUGUESE,')[words]
     first = "from gemelo.services.panel.words.refusals import"
     table = table.replace(first, f"from gemelo.services.panel.words.pt import PORTUGUESE\n{first}")
-    return added(tmp_path_factory.mktemp("project"), {"services/panel/words/pt.py": PORTUGUESE, words: table})
+    catalogue = "schemas/reasons/catalogue.py"  # a file of its own, which looks for languages beside it
+    languages = "schemas/reasons/languages/"
+    files = {"services/panel/words/pt.py": PORTUGUESE, words: table, catalogue: (ROOT / catalogue).read_text()}
+    folder = added(tmp_path_factory.mktemp("project"), {**files, f"{languages}beside_the_others": ""})
+    sources = tmp_path_factory.mktemp("languages")
+    (sources / "pt").mkdir()
+    (sources / "pt/goal.po").write_text(GOAL)
+    compile_languages(sources, folder / languages)  # as `make setup` does
+    return folder
 
 
 def test_a_new_language_is_chosen_by_a_browser_and_by_a_person_and_says_what_it_knows(
@@ -66,5 +83,6 @@ def test_a_new_language_is_chosen_by_a_browser_and_by_a_person_and_says_what_it_
     assert done.returncode == 0, done.stderr
     *written, is_on_the_page = json.loads(done.stdout.splitlines()[-1])
     refused = "Esse ponto fica 200.0 mm fora do alcance da ferramenta."
-    assert written == ["Planejar", refused, "uma meta mais nova assumiu", "not known"]
+    rejected = "q1: 57.3° passa do limite de 28.6°."
+    assert written == ["Planejar", rejected, refused, "uma meta mais nova assumiu", "not known"]
     assert is_on_the_page
