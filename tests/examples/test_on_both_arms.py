@@ -38,6 +38,8 @@ def test_a_script_ends_by_itself_and_shows_what_it_says(
     simulated: SimulatedArm, name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     make_ready(simulated)
+    assert simulated.wait_for(lambda: simulated.device.mode is gemelo.DeviceMode.IDLE, 20.0)
+    simulated.move(named="home")  # whatever script this worker has run before
     monkeypatch.setattr(time, "sleep", simulated.sim.sleep)
     runpy.run_path(f"examples/{name}.py", run_name="__main__")
     output, errors = capsys.readouterr()
