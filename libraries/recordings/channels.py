@@ -65,14 +65,19 @@ def channel_of(topic: Topic[Any]) -> Channel:
     return Channel(topic.key, topic.message.__name__, schema_of(described(topic)), metadata)
 
 
-def _inlined(node: Json, definitions: dict[str, Json]) -> Json:
+def _inlined(node: Json, definitions: dict[str, Json], within: tuple[str, ...] = ()) -> Json:
+    """`within` are the kinds that `node` is a part of: one that holds itself, as a reason its causes, is any object
+    there, as readers follow no reference."""
     if isinstance(node, list):
-        return [_inlined(item, definitions) for item in node]
+        return [_inlined(item, definitions, within) for item in node]
     if not isinstance(node, dict):
         return node
     reference = node.get("$ref")
     if isinstance(reference, str):
-        target = cast("dict[str, Json]", definitions[reference.rsplit("/", 1)[-1]])
+        kind = reference.rsplit("/", 1)[-1]
+        if kind in within:
+            return {"type": "object"}
+        target = cast("dict[str, Json]", definitions[kind])
         beside = {key: value for key, value in node.items() if key != "$ref"}
-        return _inlined({**target, **beside}, definitions)
-    return {key: _inlined(value, definitions) for key, value in node.items()}
+        return _inlined({**target, **beside}, definitions, (*within, kind))
+    return {key: _inlined(value, definitions, within) for key, value in node.items()}

@@ -16,7 +16,7 @@ from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
 from gemelo.libraries.recordings import foxglove
-from gemelo.libraries.recordings.channels import Entry, schema_of
+from gemelo.libraries.recordings.channels import Entry, channel_of, schema_of
 from gemelo.libraries.recordings.table import recorded_topics
 from gemelo.schemas.frames import FrameTransform, FrameTransforms, RobotDescription
 from gemelo.schemas.joints import JointState
@@ -46,6 +46,12 @@ def test_every_schema_stands_alone(topic):
     assert "$ref" not in text
     assert schema["type"] == "object"
     assert set(schema["properties"]) == set(topic.message.__struct_fields__)
+
+
+@table("topic", recorded_topics(), ids=lambda topic: topic.key)
+def test_every_channel_that_is_recorded_has_a_schema_that_ends_where_a_kind_holds_itself(topic):
+    """A reason holds its causes, which are reasons."""
+    assert b"$ref" not in channel_of(topic).schema
 
 
 def test_messages_come_back_with_both_times_and_their_schema(recording):
