@@ -61,7 +61,9 @@ def reference(gateway: WiredGateway) -> None:
 def test_a_move_arrives_at_the_board_and_every_line_is_acknowledged(baud: int) -> None:
     board = PtyBoard()
     with wired(board, baud) as (gateway, link):
-        assert board.speed == getattr(termios, f"B{baud}")
+        assert gateway.run(30.0, lambda: board.speed == getattr(termios, f"B{baud}")), (
+            "the first state is before the port"
+        )
         assert link.device.exchange.counts.lines == 0, "nothing is sent before a person says where the joints are"
         reference(gateway)
         assert gateway.move_to(END).accepted
