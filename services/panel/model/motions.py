@@ -46,6 +46,7 @@ class Motions:
         self._led: gemelo.Plan | None = None  # the last one that was made to be executed at once
         self.plan: gemelo.Plan | None = None
         self.motion: gemelo.Motion | None = None
+        self._executed: gemelo.Plan | None = None  # the last one that the arm has begun to go along
         self.shows_plan = False  # by a ghost that goes along it: until it is executed, and again when a person asks
         self.version = 0  # +1 with every change
 
@@ -59,6 +60,11 @@ class Motions:
     def is_planning(self) -> bool:
         """True while a plan is made, or has been asked for."""
         return self._one.locked() or self._asked > 0
+
+    @property
+    def has_plan_to_execute(self) -> bool:
+        """True for a plan along which the arm has not gone yet, or one that is being made."""
+        return self.is_planning or (self.plan is not None and self.plan is not self._executed)
 
     def ask(self) -> None:
         """A plan was asked for by a press: the one before is none any more, and an Execute that follows waits.
@@ -159,7 +165,7 @@ class Motions:
         motion: gemelo.Motion | None = None
         try:
             motion = self.motion = self._arm.start(plan)
-            self.shows_plan = False
+            self._executed, self.shows_plan = plan, False
             self._changed()
             motion.wait()
         except Exception as error:

@@ -72,7 +72,7 @@ class MoveTab:
         self.tool.show(goal)
         self._show_problem()
         self._show_live()
-        set_if_new(self.execute, "color", "green" if motions.plan is not None or motions.is_planning else "gray")
+        set_if_new(self.execute, "color", "green" if motions.has_plan_to_execute else "gray")
         if motions.version != self._plan_version or motions.is_moving or motions.is_planning:
             self._plan_version = motions.version
             set_if_new(self.plan, "content", self._plan_text())
