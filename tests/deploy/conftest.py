@@ -53,6 +53,11 @@ class Machine:
             self.root / "firmware/bindings/build.sh", "mkdir -p firmware/build; touch firmware/build/libgemelo_core.so"
         )
         self.write(self.root / "services/planner/native/build.sh", "exit 0")
+        self.write(self.root / "schemas/reasons/languages/en/goal.po", "")
+        self.write(
+            self.root / "schemas/reasons/compiled.py",
+            "import pathlib, sys; pathlib.Path(sys.argv[1], 'en', 'gemelo.mo').touch()",
+        )
         self.write(self.root / "services/broker/native/main.go", "package main")
 
     def link(self, name: str) -> None:

@@ -115,7 +115,8 @@ def borne(opened: Sessions) -> dict[str, set[str]]:
             settle(session, name, opened["logger" if name != "logger" else "planner"])
         found: dict[str, set[str]] = {owner: set() for owner in opened}
         for _, owner, _, name in (key.split("/") for key in seen(opened["logger"])):
-            found[owner] |= {name} - {"logger"}  # its own token needs no router
+            # The logger's own token needs no router, and a barrier may be seen for a moment after its end.
+            found[owner] |= {name} - {"logger", "barrier"}
     return found
 
 
