@@ -83,6 +83,7 @@ def test_a_move_from_the_desk_goes_on_exactly_when_a_link_is_cut_and_healed(host
     with made.cut(host):
         time.sleep(CUT)  # how long the link is down is what this is about
     outcome = json.loads(desk.stdout.readline())
+    assert outcome["status"] == "SUCCEEDED", outcome
     assert outcome["longest_gap"] > CUT / 2, "the cut was not felt"
     assert {key: outcome[key] for key in ("status", "is_exact", "jumps", "positions_afterwards")} == {
         "status": "SUCCEEDED", "is_exact": True, "jumps": [], "positions_afterwards": 1,

@@ -153,7 +153,7 @@ def test_ctrl_c_while_the_planner_searches_ends_the_plan_and_nothing_moves(twin:
         process.send_signal(signal.SIGINT)
         code, _, errors = ended(process)
     assert code == 1
-    said_last = r"gemelo\.errors\.Interrupted: the plan was cancelled after .* s, while searching: nothing moves"
+    said_last = r"gemelo\.api\.errors\.Interrupted: the plan was cancelled after .* s, while searching: nothing moves"
     assert re.fullmatch(said_last, errors.splitlines()[-1])
     assert arm.joints == where
 
