@@ -13,7 +13,7 @@ from pathlib import Path
 
 import msgspec
 
-CORE = Path(__file__).parents[1] / "core"
+CORE = Path(__file__).resolve().parents[1] / "core"
 REASONS = Path(__file__).with_name("uncovered.toml")
 
 Place = tuple[str, str]  # file, text of the line

@@ -36,6 +36,9 @@ rm1 = ["planner"]
 address = "10.77.0.3"
 roles = ["operator", "viewer"]
 """
+# Beside a busy process the kernel measures longer round trips, sends again later after a cut, and a client that hears
+# nothing for 2 s holds its gateway for lost.
+pytestmark = pytest.mark.alone
 CUT = 1.0  # [s]
 NODES = {"stepper_gateway": "cell", "state_publisher": "cell", "planner": "brain"}
 ON = NODES | {"virtual_esp32": "cell", "broker": "cell", "router": "brain"}
