@@ -11,6 +11,7 @@ from gemelo.libraries.robot_import.mended import Mended, numbers_in
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 PLACES = 9  # significant digits of a limit that is written
+ROUNDING = 1e-4  # [rad] or [m] by which limits that are meant to be the same may differ
 
 
 def soft_limits(mended: Mended) -> None:
@@ -38,10 +39,17 @@ def _narrow_softly(mended: Mended, element: ET.Element, joint: UrdfJoint, safety
     elif not narrow[0] < narrow[1]:
         remedy = "left out: correct them where the joint must stay within them"
         mended.warn(safety, subject, f"{said} leave no travel within its limits {lower:g} to {upper:g}", remedy)
-    elif narrow == (lower, upper):
+    elif _is_near(low, lower) and _is_near(high, upper):
+        mended.say(safety, subject, f"{said} are its limits", "left out")
+    elif _is_near(narrow[0], lower) and _is_near(narrow[1], upper):
         mended.say(safety, subject, f"{said} are not within its limits {lower:g} to {upper:g}", "the limits hold")
     else:
         mended.say(safety, subject, f"{said} are within its limits {lower:g} to {upper:g}", set_ends(element, *narrow))
+
+
+def _is_near(value: float | None, limit: float) -> bool:
+    """True where they differ by no more than rounding."""
+    return value is not None and abs(value - limit) < ROUNDING
 
 
 def calibrations(mended: Mended) -> None:

@@ -43,6 +43,8 @@ SOFT = {
     "narrower": ("-1.0", "1.0", (-1.0, 1.0), 'its soft limits -1 to 1 are within its limits -2 to 2 -> lower="-1"'),
     "on one side": ("-9", "0.5", (-2.0, 0.5), 'upper="0.5"'),
     "wider": ("-9", "9", (-2.0, 2.0), "are not within its limits -2 to 2 -> the limits hold"),
+    "the same": ("-2", "2", (-2.0, 2.0), "its soft limits -2 to 2 are its limits -> left out"),
+    "rounded": ("-1.99999", "2.00001", (-2.0, 2.0), "its soft limits -1.99999 to 2.00001 are its limits -> left out"),
     "none": ("0", "0", (-2.0, 2.0), "has no soft limits -> left out"),
     "beyond the limits": ("5", "6", (-2.0, 2.0), "leave no travel within its limits -2 to 2 -> left out"),
 }
