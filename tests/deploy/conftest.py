@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 import stat
 import subprocess
 import sys
@@ -32,6 +33,11 @@ mkdir -p "$(dirname "$2")"
 printf '#!/bin/sh\\nexit 0\\n' > "$2"
 chmod +x "$2"
 """
+
+
+def heed_hang_ups() -> None:
+    """As a terminal starts it: tests that run under nohup ignore SIGHUP, and so would a shell that they start."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 class Machine:
@@ -86,6 +92,7 @@ class Machine:
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
+            preexec_fn=heed_hang_ups,
         )
 
     def bootstrap(self, **environ: str) -> subprocess.CompletedProcess[str]:
