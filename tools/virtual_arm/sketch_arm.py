@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Callable
 from dataclasses import replace
 
 import msgspec
@@ -17,10 +16,10 @@ from gemelo.schemas.robot import Dialect
 from gemelo.services.stepper_gateway.links.foreign import ra_messages
 from gemelo.services.stepper_gateway.links.foreign.ra_device import RaDevice
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, LinkInput, Moment, StepInput
-from gemelo.tools.virtual_arm.virtual_arm import GATEWAY_ZERO, UNIX, rm1
+from gemelo.tools.virtual_arm.foreign_arm import ForeignArm
+from gemelo.tools.virtual_arm.gateway_driver import GatewayParameters, LinkInput
+from gemelo.tools.virtual_arm.virtual_arm import GATEWAY_ZERO, rm1
 
-PERIOD = 0.02  # [s] of the gateway's loop
 STEP = 0.005  # [s] of virtual time
 
 
@@ -31,7 +30,7 @@ def ra_arm(message_time: float = 2.0) -> ArmDescription:
     return heard_by_the_board(replace(arm, device=device))
 
 
-class SketchArm(GatewayDriver):
+class SketchArm(ForeignArm):
     """Messages take `delay` to `delay` + `jitter` [s], in order, as over TCP."""
 
     def __init__(
@@ -44,11 +43,9 @@ class SketchArm(GatewayDriver):
         pass_time: float = PASS,
         seed: int = 1,
     ) -> None:
-        super().__init__()
+        super().__init__(STEP)
         self.arm = arm or ra_arm()
-        self.now = 0.0
         self._delay, self._jitter, self._rng = delay, jitter, random.Random(seed)
-        self._beat = 0.0
         boots = itertools.count(1001)
         self.device = RaDevice(self.arm, lambda: next(boots), GATEWAY_ZERO)
         self.sketch = HostSketch(
@@ -63,25 +60,8 @@ class SketchArm(GatewayDriver):
         self.start_core(self.arm, seed, GatewayParameters())
         self.handle(LinkInput(True, ""))
 
-    @property
-    def moment(self) -> Moment:
-        return Moment(UNIX + round(self.now * 1e9), GATEWAY_ZERO + self.now)
-
     def send(self, kind: Kind, payload: bytes) -> None:
         self.device.receive(kind, payload, self.moment.monotonic)
-
-    def run(self, seconds: float, until: Callable[[], bool] | None = None) -> bool:
-        """Lets `seconds` [s] pass, or less: until `until`; whether that came true."""
-        end = self.now + seconds
-        while self.now < end:
-            if until is not None and until():
-                return True
-            self.now += STEP
-            self._exchange()
-            if self.now >= self._beat:
-                self._beat += PERIOD
-                self.handle(StepInput())
-        return until is None or until()
 
     def _exchange(self) -> None:
         monotonic = self.moment.monotonic

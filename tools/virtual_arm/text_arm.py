@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Callable
 from dataclasses import replace
 
 import msgspec
@@ -14,10 +13,10 @@ from gemelo.schemas.device import DeviceCommandKind
 from gemelo.schemas.robot import Dialect
 from gemelo.services.stepper_gateway.links.foreign.text_device import TextDevice
 from gemelo.services.stepper_gateway.links.link import Kind
-from gemelo.tools.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, LinkInput, Moment, StepInput
-from gemelo.tools.virtual_arm.virtual_arm import GATEWAY_ZERO, UNIX, rm1
+from gemelo.tools.virtual_arm.foreign_arm import ForeignArm
+from gemelo.tools.virtual_arm.gateway_driver import GatewayParameters, LinkInput
+from gemelo.tools.virtual_arm.virtual_arm import GATEWAY_ZERO, rm1
 
-PERIOD = 0.02  # [s] of the gateway's loop
 STEP = 0.001  # [s] of virtual time
 TRIP = 0.009  # [s] of a line and its answer; chosen: what both take at 115,200 baud, and the board between them
 BAUD = 115_200
@@ -31,42 +30,24 @@ def text_arm() -> ArmDescription:
     return heard_by_the_board(replace(arm, device=msgspec.structs.replace(arm.device, dialect=Dialect.TEXT)))
 
 
-class TextArm(GatewayDriver):
+class TextArm(ForeignArm):
     """The board answers every line `trip` [s] later, while it answers."""
 
     def __init__(self, *, trip: float = TRIP, seed: int = 1) -> None:
-        super().__init__()
-        self.arm, self.now, self._trip = text_arm(), 0.0, trip
+        super().__init__(STEP)
+        self.arm, self._trip = text_arm(), trip
         self.answers_lines = True
         self.lines: list[tuple[float, tuple[float, ...]]] = []  # [s] and [rad] or [m] of each
         self._answers: list[tuple[float, bytes]] = []  # that are under way, with [s] of their arrival
-        self._beat = 0.0
         boots = itertools.count(1001)
         self.device = TextDevice(self.arm, lambda: next(boots), GATEWAY_ZERO, BAUD)
         self._link = (True, "")
         self.start_core(self.arm, seed, GatewayParameters())
         self.handle(LinkInput(*self._link))
 
-    @property
-    def moment(self) -> Moment:
-        return Moment(UNIX + round(self.now * 1e9), GATEWAY_ZERO + self.now)
-
     def send(self, kind: Kind, payload: bytes) -> None:
         if not self.device.objection:
             self.device.receive(kind, payload, self.moment.monotonic)
-
-    def run(self, seconds: float, until: Callable[[], bool] | None = None) -> bool:
-        """Lets `seconds` [s] pass, or less: until `until`; whether that came true."""
-        end = self.now + seconds
-        while self.now < end:
-            if until is not None and until():
-                return True
-            self.now += STEP
-            self._exchange()
-            if self.now >= self._beat:
-                self._beat += PERIOD
-                self.handle(StepInput())
-        return until is None or until()
 
     def _exchange(self) -> None:
         monotonic = self.moment.monotonic
