@@ -1,8 +1,8 @@
 """The catalogue: the templates of all codes in one language, in gettext files by subject.
 
-`languages/es/goal.po` has the Spanish of all codes `goal.*`. An entry's msgid is the code; its msgctxt is empty, names
-the front end that has words of its own for it (`page`), or is `explain`: what the code means and what to do, at length.
-A template has the names of the reason's values in braces, and behind a colon the unit of one: `{depth:m}`.
+`languages/es/goal.po` has the Spanish of all codes `goal.*`. An entry's msgid is the code; its msgctxt is empty, or
+names the front end that has words of its own for it (`page`). A template has the names of the reason's values in
+braces, and behind a colon the unit of one: `{depth:m}`.
 
 `compiled.py` makes one file of a language's, which takes 1 ms to read. (Fluent's runtime takes some 100 ms to import
 and 0.3 ms for each message, and so does Babel, on which it stands.)
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 LANGUAGES = Path(__file__).resolve().parent / "languages"
 COMPILED = "gemelo.mo"
 ENGLISH = "en"
-EXPLAIN = "explain"
 
 
 def languages() -> tuple[str, ...]:
@@ -35,13 +34,6 @@ def template(code: str, language: str, context: str = "") -> str | None:
         return None
     own = known.pgettext(context, code)
     found = own if own != code else known.gettext(code)
-    return found if found != code else None
-
-
-def explanation(code: str, language: str) -> str | None:
-    """What a code means and what to do, at length; None where the language does not say."""
-    known = _catalogue(language)
-    found = code if known is None else known.pgettext(EXPLAIN, code)
     return found if found != code else None
 
 

@@ -37,7 +37,6 @@ class FrontEnd(Enum):
     """What the reader has before him: it decides how a remedy is worded, and in which units a value stands."""
 
     COMMAND = "command"  # `gemelo home`
-    PYTHON = "python"  # arm.home()
     PAGE = "page"  # press Home
 
 
