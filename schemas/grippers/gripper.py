@@ -36,7 +36,8 @@ Drive = PulseDrive | SwitchDrive
 class GripperRecord(RobotRecord, frozen=True, kw_only=True):
     """What every kind of gripper has. Openings are between the jaws.
 
-    A kind is a file of its own beside this one, and a row of `kinds.Gripper`: its keys, `drive`, and `fault`.
+    A kind is a file of its own beside this one, and a row of `kinds.Gripper`: its keys, `drive` (what the board is told
+    to drive, of one without a fault), and `fault`.
     """
 
     open: Positive  # [m]
@@ -44,11 +45,6 @@ class GripperRecord(RobotRecord, frozen=True, kw_only=True):
     effort: Positive  # [N] that it closes with, by its data sheet: nothing measures it
     tolerance: Positive = 0.001  # [m] from the goal that counts as there
     jaw: Edges | None = None  # of one jaw, in the tool frame: along x, along y (the way it moves), beyond it along z
-
-    @property
-    def drive(self) -> Drive:
-        """What the board is told to drive; of one without a `fault`."""
-        raise NotImplementedError
 
     def fault(self) -> tuple[str, str]:
         """The key of this kind that is wrong, and why with the remedy; both empty if none is. What depends on `drive`
