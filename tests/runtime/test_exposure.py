@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.runtime.bus.router import router_setup
 from gemelo.libraries.runtime.deployment import DeploymentError, exposure, is_loopback, load_deployment
-from gemelo.services.router import main as router
 from gemelo.tools.stack.start_check import exposed
 from tests.runtime.locks import Lock
 from tests.runtime.support import ROOT, free_port, until
@@ -77,7 +77,7 @@ def test_an_insecure_router_starts_and_says_so(tmp_path):
 def test_a_configuration_counts_as_locked_only_with_certificates_and_permissions(tmp_path):
     file = Lock(tmp_path / "lock", roles=()).write_router(7000)
     wanted = load_deployment(environ={"GEMELO_ROUTER_CONFIGURATION": str(file)}).router
-    assert router.configured(wanted)[1:] == (("127.0.0.1", 7000), True)
+    assert router_setup(wanted)[1:] == (("127.0.0.1", 7000), True)
     sound = file.read_text()
     for harm in (
         ('"enable_mtls": true', '"enable_mtls": false'),
@@ -87,9 +87,9 @@ def test_a_configuration_counts_as_locked_only_with_certificates_and_permissions
     ):
         assert harm[0] in sound
         file.write_text(sound.replace(*harm))
-        assert router.configured(wanted)[2] is False
+        assert router_setup(wanted)[2] is False
     file.write_text("{ listen: ")
     with pytest.raises(DeploymentError, match=r"router\.configuration: .*router\.json5 cannot be used"):
-        router.configured(wanted)
+        router_setup(wanted)
     with pytest.raises(DeploymentError, match=r"needs router\.configuration"):
-        router.configured(load_deployment(environ={"GEMELO_ROUTER_TLS": "true"}).router)
+        router_setup(load_deployment(environ={"GEMELO_ROUTER_TLS": "true"}).router)
