@@ -95,3 +95,27 @@ def test_buttons_that_come_later_share_a_row_in_every_frame(jogged: Jogged, chro
         assert [pair for pair in tops if pair[0] != pair[1]] == []
     finally:
         context.close()
+
+
+MARKS = """() => {
+  const mark = document.createElement('span');
+  document.body.append(mark);
+  const renew = (time) => { mark.dataset.gemeloSent = time; requestAnimationFrame(renew); };
+  requestAnimationFrame(renew);
+}"""
+
+
+def test_what_the_browser_tells_of_itself_in_every_frame_replaces_no_click(jogged: Jogged, chromium: Browser) -> None:
+    """viser sends the newest of the messages of 50 ms, of the page's controls and of the hidden field alike."""
+    context = new_context(chromium, viewport={"width": 900, "height": 700}, device_scale_factor=0.5)
+    page = context.new_page()
+    page.goto(f"http://127.0.0.1:{jogged.server.get_port()}")
+    try:
+        home = page.get_by_role("button", name="Home")
+        home.wait_for(timeout=OPENING)
+        page.evaluate(MARKS)
+        for count in range(1, 21):
+            home.evaluate("(button) => button.click()")
+            until(lambda: jogged.pressed, lambda pressed, count=count: pressed == ["Home"] * count)
+    finally:
+        context.close()

@@ -6,8 +6,9 @@ a person's own keyboard, after a click or the Tab key on this page since it had 
 another page. The
 browser's language, its wish for dark colours, its frame rate and the newest header that it has drawn come back through
 a hidden text field: with each header that bears a new mark, and when the rate has changed; a page on which nothing
-changes says nothing. A click into the image of a camera comes at once: a press and its release are taken for it, since
-the image may have been replaced by the next one between the two.
+changes says nothing. viser sends only the newest of the messages of 50 ms, so nothing of this is sent within ACTING
+of what a person does: it would replace his click. A click into the image of a camera comes at once: a press and its
+release are taken for it, since the image may have been replaced by the next one between the two.
 Where the Stop button is scrolled out of sight or covered, a second one stands at the bottom, beside the controls where
 there is room, else upon them. While the controls are built anew there is no such button, or one that the page no longer
 knows: every Stop is counted, and told through the hidden field as well.
@@ -28,6 +29,7 @@ LARGEST_UPLOAD = 20_000_000  # [bytes] chosen: the planner takes 500,000 triangl
 DRAGGED = 6  # [pixels] of the page from the press to the release, from which on it was no click
 RATE_CHANGED = 0.3  # share of the frame rate by which it must change before the browser tells it by itself
 STILL_MEANT = 5000.0  # [ms] chosen: an older Stop that a browser tells when it is connected again stops nothing
+ACTING = 150.0  # [ms] chosen: three of viser's intervals after what a person has done
 STOP_SIGN = "■"  # how the Stop button's text begins, in every language
 
 SCRIPT = """
@@ -120,19 +122,29 @@ SCRIPT = """
     if (isOfPair && !place.width) Object.assign(place, {display: 'inline-block', width: 'calc(50% - 1.25em)'});
   });
   new MutationObserver(arrange).observe(document.body, {childList: true, subtree: true});
+  let acted = 0, isDown = false;
+  const findChannel = () => [...document.querySelectorAll('input')].find((i) => i.value.startsWith('CHANNEL'));
+  const act = (e) => { if (e.target !== findChannel()) acted = performance.now(); };
+  ['pointerdown', 'pointerup', 'click', 'keydown', 'keyup', 'input', 'change', 'wheel'].forEach((kind) =>
+    window.addEventListener(kind, act, true));
+  window.addEventListener('pointerdown', () => { isDown = true; }, true);
+  ['pointerup', 'pointercancel', 'blur', 'pointermove'].forEach((kind) =>
+    window.addEventListener(kind, (e) => { isDown = isDown && kind === 'pointermove' && e.buttons > 0; }, true));
   const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;
   let frames = 0, began = performance.now(), rate = 0, told = '', toldClicks = 0, toldRate = 0;
   const tell = () => {
     frames += 1;
     const now = performance.now();
     if (now - began > 1000) { rate = frames * 1000 / (now - began); frames = 0; began = now; keepStop(); }
-    const field = [...document.querySelectorAll('input')].find((i) => i.value.startsWith('CHANNEL'));
+    const field = findChannel();
     const sent = (document.querySelector('[data-gemelo-sent]') || {dataset: {}}).dataset.gemeloSent || '';
     if (field) {
       field.parentElement.parentElement.parentElement.parentElement.style.display = 'none';
       const hasNewRate = Math.abs(rate - toldRate) > RATE_CHANGED * toldRate;
-      const isNew = field.value === 'CHANNEL';
-      if (isNew || sent !== told || clicks !== toldClicks || stops !== toldStops || tooLarge || hasNewRate) {
+      const isUrgent = field.value === 'CHANNEL' || clicks !== toldClicks || stops !== toldStops || tooLarge;
+      const isActing = isDown || now - acted < ACTING;
+      if (isActing) told = sent;  // told later, the mark would be that of a lag that is none
+      if (isUrgent || (!isActing && (sent !== told || hasNewRate))) {
         told = sent;
         toldClicks = clicks;
         toldStops = stops;
@@ -201,6 +213,7 @@ def script_html() -> str:
         "LARGEST_UPLOAD": str(LARGEST_UPLOAD),
         "DRAGGED": str(DRAGGED),
         "RATE_CHANGED": str(RATE_CHANGED),
+        "ACTING": str(ACTING),
     }
     for name, value in values.items():
         script = script.replace(name, value)
