@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from gemelo.api.arguments import Target
 from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.motion import FollowJointTrajectoryResult
 from gemelo.schemas.planning import Refusal
 from gemelo.schemas.reasons import Reason, plain
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from gemelo.api.homing_report import HomingReport
 
 
-class Error(Exception):
+class Error(ReasonedError):
     """Every error of this package but Ctrl-C.
 
     >>> try:
@@ -47,11 +48,13 @@ class BadArgument(Error, ValueError):
     joint "brazo_joint": 30 rad is beyond its limits, ... rad: if it is in degrees, write gemelo.deg(30)
     """
 
-    def __init__(self, reason: str, remedy: str = "", out_of: ArgumentRange | None = None) -> None:
-        super().__init__(f"{reason}: {remedy}" if remedy else reason)
+    def __init__(self, reason: Reason | str, remedy: str = "", out_of: ArgumentRange | None = None) -> None:
+        super().__init__(reason)
         self.out_of = out_of  # the range, where the argument is out of one
-        self.reason = reason  # without the remedy
-        self.remedy = remedy  # what to write instead; empty where the reason says it
+        self.remedy = remedy  # what to write instead, which `reason` does not say; empty where that says it
+
+    def __str__(self) -> str:
+        return f"{self.reason}: {self.remedy}" if self.remedy else str(self.reason)
 
 
 class Refused(Error):
