@@ -1,4 +1,4 @@
-"""The errors of the API: each is one sentence for a person, and fields for a program."""
+"""The errors of the API: each is a reason, with its sentence in the terms of a script, and fields."""
 
 from __future__ import annotations
 
@@ -10,15 +10,20 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.motion import FollowJointTrajectoryResult
 from gemelo.schemas.planning import Refusal
-from gemelo.schemas.reasons import Reason, plain
+from gemelo.schemas.reasons import FrontEnd, Reason, plain, say
 from gemelo.schemas.scene import Contact
 
 if TYPE_CHECKING:
     from gemelo.api.homing_report import HomingReport
 
 
+def as_reason(text: Reason | str) -> Reason:
+    """A sentence without a code is a reason too."""
+    return text if isinstance(text, Reason) else plain(text)
+
+
 class Error(ReasonedError):
-    """Every error of this package but Ctrl-C.
+    """Every error of this package but Ctrl-C. `reason` is why, as data; `message` the whole sentence, as data too.
 
     >>> try:
     ...     arm.move(named="nowhere")
@@ -26,6 +31,14 @@ class Error(ReasonedError):
     ...     print(error)
     no named state "nowhere"; known are folded, home, left, lifted, ready, right
     """
+
+    def __init__(self, message: Reason | str = "", reason: Reason | str = "") -> None:
+        """`reason`: that within `message` which a program looks at; the message itself where it is left out."""
+        super().__init__(reason or message)
+        self.message = as_reason(message)
+
+    def __str__(self) -> str:
+        return say(self.message, front_end=FrontEnd.SCRIPT)
 
 
 class ArgumentRange(NamedTuple):
@@ -49,12 +62,9 @@ class BadArgument(Error, ValueError):
     """
 
     def __init__(self, reason: Reason | str, remedy: str = "", out_of: ArgumentRange | None = None) -> None:
-        super().__init__(reason)
+        super().__init__(f"{reason}: {remedy}" if remedy else reason, reason)
         self.out_of = out_of  # the range, where the argument is out of one
         self.remedy = remedy  # what to write instead, which `reason` does not say; empty where that says it
-
-    def __str__(self) -> str:
-        return f"{self.reason}: {self.remedy}" if self.remedy else str(self.reason)
 
 
 class Refused(Error):
@@ -70,7 +80,7 @@ class Refused(Error):
 
     def __init__(
         self,
-        message: str,
+        message: Reason | str,
         *,
         check: str = "",
         subject: str = "",
@@ -85,9 +95,7 @@ class Refused(Error):
         refusal: Refusal | None = None,
         contacts: Sequence[Contact] = (),
     ) -> None:
-        super().__init__(message)
-        # Of the planner, the gateway or the device, as data: a code, values and remedies; `str` of it is its sentence.
-        self.reason = reason if isinstance(reason, Reason) else plain(reason or message)
+        super().__init__(message, reason)  # the reason is that of the planner, the gateway or the device
         self.refusal = refusal  # the planner's own message; None where another refuses
         self.check = check  # what was checked, as "reach", "joint limit", "collision"; empty where the device refuses
         self.subject = subject  # the joint, pair of links, or axis of the pose
@@ -113,14 +121,15 @@ class Aborted(Error):
 
     def __init__(
         self,
-        message: str,
+        message: Reason | str,
         status: GoalStatusCode = GoalStatusCode.ABORTED,
         code: int = 0,
         stopped_at: Mapping[str, float] | None = None,
         result: FollowJointTrajectoryResult | None = None,
         homing: HomingReport | None = None,
+        reason: Reason | str = "",
     ) -> None:
-        super().__init__(message)
+        super().__init__(message, reason)
         self.status = status  # ABORTED, PREEMPTED or CANCELED
         self.code = code  # FollowErrorCode
         self.stopped_at = dict(stopped_at or {})  # [rad] or [m] by joint, from the steps that were read back
@@ -144,7 +153,7 @@ class Lost(Error):
     gemelo.api.errors.Lost: no stepper_gateway of parol6 at the router ...; there is rm1: gemelo.connect("rm1")
     """
 
-    def __init__(self, message: str, robots: tuple[str, ...] = (), has_begun: bool = False) -> None:
+    def __init__(self, message: Reason | str, robots: tuple[str, ...] = (), has_begun: bool = False) -> None:
         super().__init__(message)
         self.has_begun = has_begun  # True where a motion was under way, of which nothing more is heard
         self.robots = robots  # the arms that are on the router, where the one asked for is not
@@ -159,13 +168,14 @@ class Interrupted(KeyboardInterrupt):
 
     def __init__(
         self,
-        message: str,
+        message: Reason | str,
         stopped_at: Mapping[str, float] | None = None,
         status: GoalStatusCode = GoalStatusCode.UNKNOWN,
         result: FollowJointTrajectoryResult | None = None,
         homing: HomingReport | None = None,
     ) -> None:
-        super().__init__(message)
+        self.message = self.reason = as_reason(message)
+        super().__init__(say(self.message, front_end=FrontEnd.SCRIPT))
         self.status = status  # how the motion ended: CANCELED, or SUCCEEDED where it had just arrived
         self.result = result  # of the motion: executed steps and errors; None where nothing moved, or it is not known
         self.stopped_at = dict(stopped_at or {})  # [rad] or [m] by joint; empty where it is not known

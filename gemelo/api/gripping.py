@@ -19,6 +19,7 @@ from gemelo.schemas.device import InjectKind, InjectRequest
 from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
 from gemelo.schemas.grippers.gripper import PulseDrive
 from gemelo.schemas.grippers.kinds import Gripper
+from gemelo.schemas.reasons import because
 from gemelo.schemas.scene import SceneGrip, SceneRelease
 from gemelo.schemas.topics import DEVICE_INJECT, DEVICE_STATUS, GRIPPER_COMMAND, GRIPPER_STATE
 
@@ -138,7 +139,8 @@ class Gripping:
             handle = client.send(goal, lambda feedback: self._session.notify(), attached=True)
         except runtime.GoalRefused as error:
             check = check_of(error, "gripper")
-            raise Refused(f"refused: {error}", check=check, code=error.code, reason=error.reason) from error
+            said = because("refused.by", error.reason, server=client.action.server)
+            raise Refused(said, check=check, code=error.code, reason=error.reason) from error
         except runtime.RequestRefused as error:
             raise Refused(str(error)) from error
         except (runtime.NoAnswer, runtime.BusError) as error:

@@ -19,6 +19,7 @@ from gemelo.schemas.motion import (
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
 )
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
 
 Handle = GoalHandle[FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
@@ -191,9 +192,8 @@ class Motion:
             self._handle = client.send(goal, lambda feedback: self._session.notify(), attached=not self.is_detached)
         except runtime.GoalRefused as error:
             check = check_of(error, "execution")
-            raise Refused(
-                f"refused by {client.action.server}: {error}", check=check, code=error.code, reason=error.reason
-            ) from error
+            said = because("refused.by", error.reason, server=client.action.server)
+            raise Refused(said, check=check, code=error.code, reason=error.reason) from error
         except runtime.RequestRefused as error:
             raise Refused(str(error)) from error
         except (runtime.NoAnswer, runtime.BusError) as error:

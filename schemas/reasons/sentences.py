@@ -37,6 +37,7 @@ class FrontEnd(Enum):
     """What the reader has before him: it decides how a remedy is worded, and in which units a value stands."""
 
     COMMAND = "command"  # `gemelo home`
+    SCRIPT = "script"  # arm.home()
     PAGE = "page"  # press Home
 
 

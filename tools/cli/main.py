@@ -10,6 +10,7 @@ from typing import NoReturn
 
 from gemelo.libraries.runtime.process.leaving import end_process
 from gemelo.tools.cli.commands import COMMANDS, GROUPS
+from gemelo.tools.cli.common import language
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown, usage
 from gemelo.tools.cli.common.output import escaped_output
 from gemelo.tools.cli.parser import Options, build
@@ -19,7 +20,8 @@ EPILOG = (
     "A command is for the robot that runs. `gemelo --robot NAME COMMAND` is for one of several, for another arm of\n"
     "urdf/, or for a recording that is played; `gemelo use NAME` chooses one of several for this folder.\n"
     "`gemelo --simulate COMMAND` is for a twin of its own in virtual time, for which nothing needs to run;\n"
-    "`--simulate=START` has it stand in a named state, or unreferenced."
+    "`--simulate=START` has it stand in a named state, or unreferenced.\n"
+    "`gemelo --lang es COMMAND` prints Spanish, which is the default where $LANG begins with es; JSON stays as it is."
 )
 
 
@@ -28,24 +30,22 @@ def parse(arguments: Sequence[str]) -> Options:
     return build(COMMANDS, GROUPS, ABOUT, EPILOG, arguments).parse_args(arguments)
 
 
-def with_simulation(arguments: list[str]) -> list[str]:
-    """Without `--simulate` or `--simulate=START` before the command, which is for a twin of its own then."""
-    if not arguments or arguments[0].partition("=")[0] != "--simulate":
-        return arguments
-    from gemelo.tools.cli.simulated import choose  # slow to load, for --simulate alone
+def with_leading_options(arguments: list[str]) -> list[str]:
+    """The command with its own arguments: without `--simulate`, `--robot` and `--lang` before it, which are obeyed."""
+    while arguments:
+        option, _, value = arguments[0].partition("=")
+        if option == "--simulate":
+            from gemelo.tools.cli.simulated import choose  # slow to load, for --simulate alone
 
-    choose(arguments[0])
-    return arguments[1:]
-
-
-def with_robot(arguments: list[str]) -> list[str]:
-    """Without `--robot NAME` before the command, which chooses the robot for this process."""
-    if arguments[:1] != ["--robot"]:
-        return arguments
-    if len(arguments) < 2:
-        raise usage("--robot NAME: the name of an arm in urdf/, of a recording that is played, or its folder")
-    choose_robot(arguments[1])
-    return arguments[2:]
+            choose(arguments.pop(0))
+        elif option in LEADING and not value:
+            if len(arguments) < 2:
+                raise usage(LEADING[option][0])
+            LEADING[option][1](arguments[1])
+            del arguments[:2]
+        else:
+            break
+    return arguments
 
 
 def choose_robot(name: str) -> None:
@@ -84,6 +84,22 @@ def robot_folder(name: str) -> str:
     raise unknown("robot", name, sorted({*known, *running}))
 
 
+def choose_language(name: str) -> None:
+    """Raises `CommandError` for a language that there is no folder of."""
+    if name not in (known := language.known()):
+        raise unknown("language", name, known)
+    language.choose(name)
+
+
+LEADING = {  # options before the command, each with a value: what is said without it, and what it does
+    "--robot": (
+        "--robot NAME: the name of an arm in urdf/, of a recording that is played, or its folder",
+        choose_robot,
+    ),
+    "--lang": ("--lang LANGUAGE: the language of the sentences, as es or en", choose_language),
+}
+
+
 def run(arguments: Sequence[str] | None = None) -> ExitCode:
     """Runs one command line, by default that of the process; prints every failure as one sentence on stderr, and
     nothing with control characters of others."""
@@ -93,7 +109,8 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
 
 def _run(given: list[str]) -> ExitCode:
     try:
-        options = parse(with_simulation(with_robot(with_simulation(given))))
+        language.choose(language.of_environment(os.environ))
+        options = parse(with_leading_options(given))
         code: ExitCode = options.command.load("run")(options)
         sys.stdout.flush()
         return code

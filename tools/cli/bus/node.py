@@ -67,7 +67,7 @@ def require_alive(session: CommandSession, name: str) -> None:
     alive = living(session)
     if name not in alive:
         error = unknown("node", name, alive)
-        raise CommandError(str(error), ExitCode.FAILED)
+        raise CommandError(error, ExitCode.FAILED)
 
 
 def living(session: CommandSession) -> list[str]:

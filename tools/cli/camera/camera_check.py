@@ -13,7 +13,7 @@ from gemelo.api.targets import FULL
 from gemelo.libraries.vision.calibration.accuracy import Accuracy, Budget, Cause, judge
 from gemelo.tools.cli.camera.camera_images import Subject, subject
 from gemelo.tools.cli.camera.camera_tip import ask_offset, step_floor, tip_length, tip_option
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands, usage
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.units import LENGTH, parse_quantity
 from gemelo.tools.cli.parser import Options, Parser, positive_integer
@@ -62,7 +62,7 @@ def run(options: Options) -> ExitCode:
         try:
             pointings = [*_pointings(arm, camera, above + tip, options.tags)]
         except gemelo.Error as error:
-            raise CommandError(in_commands(str(error))) from error
+            raise CommandError(error) from error
     report(camera, pointings)
     return ExitCode.OK
 

@@ -23,7 +23,7 @@ from gemelo.tools.cli.camera import camera_poses
 from gemelo.tools.cli.camera.camera_boards import bar_option, tag_board
 from gemelo.tools.cli.camera.camera_images import from_bus, info_of, subject
 from gemelo.tools.cli.camera.camera_tip import ask_offset, step_floor, tip_length, tip_option
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands, usage
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
 from gemelo.tools.cli.common.session import connect, connect_arm, load_robot
 from gemelo.tools.cli.parser import Options, Parser, positive_integer
 
@@ -97,7 +97,7 @@ def _touch(arm: Arm, corner: str, tip: float) -> tuple[float, float, float]:
     try:
         pose, floor = arm.pose(), step_floor(arm)
     except gemelo.Error as error:
-        raise CommandError(in_commands(str(error))) from error
+        raise CommandError(error) from error
     x, y, z = compose((pose.position, pose.orientation), ((0.0, 0.0, tip), (0.0, 0.0, 0.0, 1.0)))[0]
     point = x - beside[0], y - beside[1], z
     coarse = f"; the arm's steps end up to {1e3 * floor:.1f} mm beside" if floor > COARSE and not any(beside) else ""

@@ -22,7 +22,7 @@ def cell_of(robot: Robot) -> Cell:
     try:
         return deployed_cell(robot.deployment) if robot.deployment.cell else _published(robot)
     except DescriptionError as error:
-        raise usage(str(error)) from error
+        raise usage(error) from error
 
 
 def _published(robot: Robot) -> Cell:

@@ -9,7 +9,7 @@ import msgspec
 import gemelo
 from gemelo.libraries.arm.cell.cell_file import deployed_cell
 from gemelo.libraries.arm.errors import DescriptionError
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option
 
@@ -32,7 +32,7 @@ def run(options: Options) -> ExitCode:
         try:
             found = arm.detect(options.thing, camera=options.camera, scene=options.scene)
         except gemelo.Error as error:
-            raise CommandError(in_commands(str(error))) from error
+            raise CommandError(error) from error
     if options.json:
         print(msgspec.json.encode([_fields(seen) for seen in found]).decode())
     else:

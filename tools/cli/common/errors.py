@@ -9,8 +9,11 @@ from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gemelo.tools.cli.common.language import sentence
+
 if TYPE_CHECKING:
     from gemelo.libraries.arm.model.description import ArmDescription, Joint
+    from gemelo.schemas.reasons import Reason
     from gemelo.schemas.robot import DigitalOutput, Input, Sensor
 
 
@@ -25,16 +28,17 @@ class ExitCode(IntEnum):
 
 
 class CommandError(Exception):
-    """Ends a command: one sentence for a person, one exit code for the shell."""
+    """Ends a command: one sentence for a person in his language, one exit code for the shell."""
 
-    def __init__(self, message: str, code: ExitCode = ExitCode.FAILED) -> None:
-        super().__init__(message)
+    def __init__(self, cause: Reason | BaseException | str, code: ExitCode = ExitCode.FAILED) -> None:
+        """`cause`: why, as data; another's error, with its reason where it has one; or a sentence."""
+        super().__init__(cause if isinstance(cause, str) else text_of(cause))
         self.code = code
 
 
-def usage(message: str) -> CommandError:
+def usage(cause: Reason | BaseException | str) -> CommandError:
     """The error of a command line that cannot be understood; exit code 2."""
-    return CommandError(message, ExitCode.USAGE)
+    return CommandError(cause, ExitCode.USAGE)
 
 
 def require_folder(path: Path, owner: str) -> None:
@@ -98,6 +102,20 @@ COMMAND_OF = (  # methods of `gemelo` that its sentences name, and the commands 
     (r"gemelo\.(mm|deg)\(([-+.\de]+)\)", r"\2\1"),
     (r'gemelo\.connect\("([\w-]+)"\)', r"`gemelo --robot \1 ...`"),
 )
+
+
+def text_of(cause: Reason | BaseException) -> str:
+    """The sentence in the language of this command line; of an error without a code, its own with commands in it."""
+    reason = _reason_of(cause)
+    return in_commands(str(cause)) if reason is None else sentence(reason)
+
+
+def _reason_of(cause: Reason | BaseException) -> Reason | None:
+    """What is said whole, else what an error is about; None where that has no code."""
+    from gemelo.schemas.reasons import PLAIN, Reason  # 30 ms, where something is refused
+
+    parts = (cause, getattr(cause, "message", None), getattr(cause, "reason", None))
+    return next((each for each in parts if isinstance(each, Reason) and each.code != PLAIN), None)
 
 
 def in_commands(text: str) -> str:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
 import gemelo
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands, usage
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
@@ -40,7 +40,7 @@ def load_robot() -> Robot:
     try:
         return find_robot(ask=chosen_twin() is None)
     except gemelo.Error as error:
-        raise usage(in_commands(str(error))) from error
+        raise usage(error) from error
 
 
 @contextmanager
@@ -67,15 +67,13 @@ def reported(robot: Robot) -> Iterator[None]:
     try:
         yield
     except gemelo.Lost as error:
-        raise CommandError(
-            other_robots(robot.deployment, robot.description) or str(error), ExitCode.NO_STACK
-        ) from error
+        raise CommandError(other_robots(robot.deployment, robot.description) or error, ExitCode.NO_STACK) from error
     except gemelo.BadArgument as error:
-        raise usage(in_commands(str(error))) from error
+        raise usage(error) from error
     except gemelo.Error as error:
-        raise CommandError(in_commands(str(error))) from error
+        raise CommandError(error) from error
     except gemelo.Interrupted as error:
-        raise CommandError(in_commands(str(error)), ExitCode.CANCELLED) from error
+        raise CommandError(error, ExitCode.CANCELLED) from error
 
 
 @contextmanager
@@ -99,11 +97,11 @@ def connect(robot: Robot | None = None) -> Iterator[CommandSession]:
         with opened as node:
             yield CommandSession(node.deployment, arm, node)
     except NoAnswer as error:
-        raise CommandError(other_robots(deployment, arm) or str(error), ExitCode.NO_STACK) from error
+        raise CommandError(other_robots(deployment, arm) or error, ExitCode.NO_STACK) from error
     except BusError as error:
-        raise CommandError(str(error), ExitCode.NO_STACK) from error
+        raise CommandError(error, ExitCode.NO_STACK) from error
     except (RequestRefused, ServerLost) as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
 
 
 def share_control(session: CommandSession) -> None:
@@ -122,7 +120,7 @@ def require_router(deployment: Deployment) -> None:
     try:
         robot_files.require_router(deployment)
     except gemelo.Lost as error:
-        raise CommandError(str(error), ExitCode.NO_STACK) from error
+        raise CommandError(error.message, ExitCode.NO_STACK) from error
 
 
 def other_robots(deployment: Deployment, arm: ArmDescription) -> str:

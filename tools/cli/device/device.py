@@ -159,7 +159,7 @@ def send(arm: Arm, wanted: DeviceCommand | StopKind, what: str = "") -> ExitCode
     try:
         answer = arm.device.send(wanted, what)
     except gemelo.Refused as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
     what = what or (wanted.value if isinstance(wanted, StopKind) else str(wanted.__struct_config__.tag))
     print(f"{what} done: device mode {answer.mode.name}{f'; {answer.reason}' if answer.reason else ''}")
     return ExitCode.OK

@@ -79,7 +79,7 @@ def press(arm: Arm, word: str, rest: Sequence[str]) -> ExitCode:
     try:
         arm.device.inject(request.kind.value, request.target, request.value)
     except gemelo.Refused as error:
-        raise CommandError(str(error) if error.check == "virtual" else f"press refused: {error.reason}") from error
+        raise CommandError(error if error.check == "virtual" else f"press refused: {error.reason}") from error
     print(f"{' '.join([word, *rest])}: done")
     return ExitCode.OK
 

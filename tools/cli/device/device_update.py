@@ -64,7 +64,7 @@ def run(options: Options) -> ExitCode:
         require_private(str(key))
         signature = sign(key, image)  # also that the key is good, before anything is asked of the device
     except SignatureError as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
     except AccessError as error:
         raise CommandError(f"{error}; `gemelo device update --make-key` makes a key") from error
     print(f"{options.file}: {header.project} {header.version} for {header.chip}, {len(image)} bytes", flush=True)
@@ -107,7 +107,7 @@ def wire_of(options: Options) -> Iterator[UpdateWire]:
     try:
         access = gateway_access(deployment.mqtt)
     except AccessError as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
     with mqtt_wire(access, device) as wire:
         yield wire
 

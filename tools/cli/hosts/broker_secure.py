@@ -58,7 +58,7 @@ def run(options: Options) -> ExitCode:
             return ExitCode.OK
         credentials = credentials_of(folder, devices[0], f"mqtts://{hosts[0]}:{port}", options.wifi_ssid)
     except AccessError as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
     return provision(options.serial, options.baud, require_sound(credentials))
 
 

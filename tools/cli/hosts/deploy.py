@@ -74,7 +74,7 @@ def run_check(options: Options) -> ExitCode:
     try:
         print("\n".join((*near, *((renewal(site),) if near else ()), *authority_told(site, site_folder(site)))))
     except ConfigurationError as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
     return ExitCode.OK
 
 
@@ -114,7 +114,7 @@ def run_keys(options: Options) -> ExitCode:
     except OSError as error:
         raise CommandError(f"{error.filename}: {error.strerror}") from error
     except ConfigurationError as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
     rows = [
         (each.host, each.name, time.strftime("%Y-%m-%d", time.gmtime(each.expires)), "new" if each.is_new else "kept")
         for each in made
@@ -144,7 +144,7 @@ def run_install(options: Options) -> ExitCode:
             install.run(commands)
             print("what ran already runs on with its old files: `systemctl restart gemelo.target` there, arm at rest")
     except ConfigurationError as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
     return ExitCode.OK
 
 
@@ -157,7 +157,7 @@ def site_named(name: str) -> Site:
     try:
         return load_site(file, root)
     except ConfigurationError as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
 
 
 def made_here(site: Site) -> tuple[Certificate, ...]:
@@ -167,7 +167,7 @@ def made_here(site: Site) -> tuple[Certificate, ...]:
     try:
         return made(site, site_folder(site))
     except ConfigurationError as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
 
 
 def site_folder(site: Site) -> Path:

@@ -115,7 +115,7 @@ def seen_robot(deployment: Deployment, robot: str) -> SeenRobot:
                     node.wait(0.05)
             return SeenRobot(nodes, device.message if "stepper_gateway" in nodes else None)
     except BusError as error:
-        raise CommandError(str(error), ExitCode.NO_STACK) from error
+        raise CommandError(error, ExitCode.NO_STACK) from error
 
 
 def seen_nodes(node: Node) -> dict[str, SeenNode]:
@@ -134,7 +134,7 @@ def _deployment(site: Site) -> Deployment:
     try:
         deployment = load_started()
     except ConfigurationError as error:
-        raise usage(str(error)) from error
+        raise usage(error) from error
     own, wanted = deployment.router, site.hosts[site.router.host]
     if (own.host, own.port) != (wanted.address, site.router.port):
         raise usage(

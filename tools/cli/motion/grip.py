@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands, usage
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
 from gemelo.tools.cli.common.output import control
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.units import LENGTH, parse_quantity
@@ -72,7 +72,7 @@ def grip(arm: Arm, to: Grip, max_effort: float, as_json: bool) -> ExitCode:
     try:
         gripped = arm.grip(to, max_effort=max_effort, on_progress=show)
     except gemelo.Error as error:
-        raise CommandError(in_commands(str(error))) from error
+        raise CommandError(error) from error
     finally:
         if is_live:
             control("\r", sys.stderr)

@@ -57,7 +57,7 @@ def home(arm: Arm, names: Sequence[str], as_json: bool = False) -> ExitCode:
     try:
         ended = arm.home(*joints, on_progress=screen.show, on_cancel=screen.on_cancel)
     except gemelo.Refused as error:
-        raise CommandError(in_commands(str(error))) from error
+        raise CommandError(error) from error
     except (gemelo.Aborted, gemelo.Interrupted) as error:
         if error.homing is None:
             raise

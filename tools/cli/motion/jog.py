@@ -150,7 +150,7 @@ def jog_for(arm: Arm, command: JogCommand, seconds: float) -> ExitCode:
     except gemelo.Interrupted:
         code = ExitCode.CANCELLED
     except gemelo.Refused as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
     print(position.line)
     for limit in limits.values():
         print(f"limited by {limit.message}")

@@ -160,7 +160,7 @@ def make_plan(arm: Arm, request: PlanRequest, quiet: bool = False) -> Plan:
     except gemelo.Refused as error:
         raise refusal_error(error, request.goal, arm.description) from error
     except gemelo.Interrupted as error:
-        raise CommandError(str(error), ExitCode.CANCELLED) from error
+        raise CommandError(error, ExitCode.CANCELLED) from error
     finally:
         block.say()
 
@@ -195,11 +195,11 @@ def follow(arm: Arm, plan: Plan, quiet: bool = False) -> MoveReport:
         try:
             motion = arm.execute(plan, detached=True, on_progress=on_progress, on_cancel=on_cancel)
         except gemelo.Refused as error:
-            raise CommandError(str(error)) from error
+            raise CommandError(error) from error
         except gemelo.Lost as error:
             if not error.has_begun:
                 raise
-            raise CommandError(str(error)) from error
+            raise CommandError(error) from error
         except (gemelo.Aborted, gemelo.Interrupted) as error:
             return _report_of_end(arm, plan, error)
     return report_of(arm.description, plan, motion.status, motion.result, motion.stopped_at)
@@ -209,6 +209,6 @@ def _report_of_end(arm: Arm, plan: Plan, error: gemelo.Aborted | gemelo.Interrup
     """The report of a motion that ended before its goal; raises `CommandError` where nobody says how it ended."""
     is_interrupted = isinstance(error, gemelo.Interrupted)
     if error.result is None:
-        raise CommandError(str(error), ExitCode.CANCELLED if is_interrupted else ExitCode.FAILED) from error
+        raise CommandError(error, ExitCode.CANCELLED if is_interrupted else ExitCode.FAILED) from error
     report = report_of(arm.description, plan, error.status, error.result, error.stopped_at)
     return replace(report, interrupted=is_interrupted)

@@ -9,7 +9,7 @@ import msgspec
 import gemelo
 from gemelo.libraries.arm.cell.cell_file import deployed_cell
 from gemelo.libraries.arm.errors import DescriptionError
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option
 
@@ -36,7 +36,7 @@ def run(options: Options) -> ExitCode:
         try:
             picked = arm.pick(options.thing, to=options.to, camera=options.camera, on_progress=show)
         except gemelo.Error as error:
-            raise CommandError(in_commands(str(error))) from error
+            raise CommandError(error) from error
     fields = picked._asdict() | {"seen": picked.seen._asdict()}
     print(msgspec.json.encode(fields).decode() if options.json else picked)
     return ExitCode.OK

@@ -48,7 +48,7 @@ def verify(arm: Arm, names: list[str], as_json: bool) -> ExitCode:
     try:
         found = arm.verify(*names, on_progress=None if as_json else _tell)
     except (gemelo.Refused, gemelo.Aborted) as error:
-        raise CommandError(in_commands(str(error))) from error
+        raise CommandError(error) from error
     ledger = arm.ledger
     report = VerifyReport(
         passed=found.passed, homed=found.homed, without_switch=found.without_switch, steps_off=found.steps_off,

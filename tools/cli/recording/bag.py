@@ -79,7 +79,7 @@ def one_sentence() -> Iterator[None]:
     try:
         yield
     except (BadRecording, NothingToExport) as error:
-        raise usage(str(error)) from error
+        raise usage(error) from error
     except FileExistsError as error:
         raise CommandError(f'"{error.filename}" is there already: name another with -o, or remove it') from error
     except OSError as error:

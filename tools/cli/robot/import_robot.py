@@ -63,6 +63,6 @@ def run(options: Options) -> ExitCode:
     try:
         folder = import_robot(wanted)
     except (DescriptionError, OSError) as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
     print(f"GEMELO_ROBOT={shlex.quote(str(folder))} make up")
     return ExitCode.OK

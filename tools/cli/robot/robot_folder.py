@@ -75,7 +75,7 @@ def _findings(folder: Path, xacro: Mapping[str, str]) -> list[Finding]:
     try:
         return source_findings(ImportOptions(folder, Path(), yes=True, xacro=xacro))
     except DescriptionError as error:
-        raise CommandError(str(error)) from error
+        raise CommandError(error) from error
 
 
 def fit_options(parser: Parser) -> None:
@@ -155,7 +155,7 @@ def print_matrix(folder: Path, write: bool, always_within: float | None) -> Exit
         arm = load_arm(folder)
         text = read_text(arm.srdf_path)
     except (ValueError, OSError) as error:
-        raise usage(str(error)) from error
+        raise usage(error) from error
     verdicts = collision_matrix(arm, tell=_say, always_within=always_within)
     wanted, lines = plan_of(text, verdicts)
     print(listing(verdicts))

@@ -237,4 +237,4 @@ def _read(path: Path) -> PlanningScene:
     try:
         return read_scene(path)
     except gemelo.Error as error:
-        raise usage(str(error)) from error
+        raise usage(error) from error

@@ -149,7 +149,7 @@ def echo(
         try:
             found = known.buffer.look_up_stamped(target, source)
         except FrameError as error:
-            raise CommandError(str(error)) from error
+            raise CommandError(error) from error
         print(form(field.of(found)), flush=True)
         printed += 1
         if printed == count:

@@ -1,0 +1,52 @@
+"""The language of a command line: that of `--lang`, else of the environment. JSON is the same in every language."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gemelo.schemas.reasons import Reason
+
+ENGLISH = "en"
+VARIABLES = ("LC_ALL", "LC_MESSAGES", "LANG")  # the first that is set decides, as POSIX has it
+
+
+class _Chosen:
+    language = ENGLISH
+
+
+def language() -> str:
+    """The language of this command line."""
+    return _Chosen.language
+
+
+def choose(name: str) -> None:
+    """The sentences of this command line are in the language `name` from now on."""
+    _Chosen.language = name
+
+
+def known() -> tuple[str, ...]:
+    """The languages that there are."""
+    from gemelo.schemas.reasons.catalogue import languages  # 30 ms, for another language than English alone
+
+    return languages()
+
+
+def of_environment(environ: Mapping[str, str]) -> str:
+    """The language of the locale, as `es_MX.UTF-8`; English where there is no folder of it."""
+    locale = next(filter(None, map(environ.get, VARIABLES)), "")
+    name = locale.partition(".")[0].partition("_")[0].lower()
+    return name if name not in ("", "c", "posix", ENGLISH) and name in known() else ENGLISH
+
+
+def sentence(reason: Reason) -> str:
+    """In the language of this command line, with its commands."""
+    from gemelo.schemas.reasons import FrontEnd, say  # 30 ms, where something is refused
+
+    return say(reason, language(), FrontEnd.COMMAND)
+
+
+def reason_or(why: Reason | None, text: str) -> str:
+    """The sentence of `why`; `text`, the same in English, where an older program sent it alone."""
+    return text if why is None else sentence(why)
