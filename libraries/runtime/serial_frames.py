@@ -19,6 +19,9 @@ SYNC = 6
 _HEADER = struct.Struct("<BBBBI")
 _CRC = struct.Struct("<I")
 _SYNC = struct.Struct("<Q")
+_COMMAND = struct.Struct("<IQBBH")
+COMMAND, DISARM = 3, 7
+NEVER = 2**64 - 1  # of a command that does not expire
 
 
 class JsonFrame(IntEnum):
@@ -135,6 +138,11 @@ def build_frame(kind: int, body: bytes, boot_id: int = 0, joints: int = 0) -> by
     """A frame of any kind: header, body and CRC."""
     frame = _HEADER.pack(MAGIC, VERSION, kind, joints, boot_id) + body
     return frame + _CRC.pack(zlib.crc32(frame))
+
+
+def disarm_frame(number: int) -> bytes:
+    """DISARM for whatever boot is there; one of another `number` is another command."""
+    return build_frame(COMMAND, _COMMAND.pack(number, NEVER, DISARM, 0, 0))
 
 
 def parse_json_frame(frame: bytes) -> JsonText | None:

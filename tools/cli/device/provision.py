@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +15,7 @@ import msgspec
 from gemelo.libraries.runtime.serial_frames import (
     JsonFrame,
     PacketDecoder,
+    disarm_frame,
     json_frame,
     packet,
     parse_json_frame,
@@ -49,6 +51,14 @@ def add_options(parser: Parser) -> None:
     """Adds port, names, networks and --factory-reset."""
     parser.add_argument("--serial", required=True, metavar="PORT", help="as /dev/ttyUSB0")
     parser.add_argument("--baud", type=positive_integer, default=BAUD, metavar="BAUD", help="921600 if not said")
+    add_network_options(parser)
+    parser.add_argument("--factory-reset", action="store_true", help="forget everything, configuration included")
+    parser.add_argument("-y", "--yes", action="store_true", help="do not ask before a factory reset")
+    parser.epilog = f"{PASSWORDS}\n\n{parser.epilog}"
+
+
+def add_network_options(parser: Parser) -> None:
+    """Adds what a board can be told over its line: its name, networks, certificates and rate."""
     parser.add_argument("--device", metavar="NAME", help="its name: that of [device] in robot.toml")
     parser.add_argument("--wifi-ssid", metavar="NAME", help="the network; its password is asked for")
     parser.add_argument("--mqtt-uri", metavar="URI", help="as mqtt://host:1883, or mqtts://host:8883")
@@ -65,9 +75,6 @@ def add_options(parser: Parser) -> None:
         metavar="BAUD",
         help="of its serial line from now on, as 115200 for a driver of <SEQ,...>; then also [serial] baud",
     )
-    parser.add_argument("--factory-reset", action="store_true", help="forget everything, configuration included")
-    parser.add_argument("-y", "--yes", action="store_true", help="do not ask before a factory reset")
-    parser.epilog = f"{PASSWORDS}\n\n{parser.epilog}"
 
 
 def run(options: Options) -> ExitCode:
@@ -82,9 +89,14 @@ def run(options: Options) -> ExitCode:
             raise usage("--factory-reset forgets everything: tell the device anew afterwards, in a command of its own")
         confirm(f"The device at {options.serial} forgets its networks, passwords and configuration.", options.yes)
         return provision(options.serial, options.baud, CredentialsChange(factory_reset=True))
+    return provision(options.serial, options.baud, credentials_of(options, options.device))
+
+
+def credentials_of(options: Options, device: str | None) -> CredentialsChange:
+    """What the options say, and the passwords that they want; raises `CommandError`."""
     wifi, mqtt = options.wifi_ssid, options.mqtt_user
     credentials = CredentialsChange(
-        device=options.device,
+        device=device,
         wifi_ssid=wifi,
         mqtt_uri=options.mqtt_uri,
         mqtt_user=mqtt,
@@ -98,7 +110,7 @@ def run(options: Options) -> ExitCode:
         if mqtt is None
         else password("MQTT password", MQTT_PASSWORD, os.environ, MQTT_DEVICE_PASSWORD),
     )
-    return provision(options.serial, options.baud, require_sound(credentials))
+    return require_sound(credentials)
 
 
 class BoardLine(Protocol):
@@ -120,6 +132,15 @@ class BoardStatus(msgspec.Struct, frozen=True):
 
     device: str = ""
     firmware: str = ""
+
+
+class ConfigAnswer(msgspec.Struct, frozen=True):
+    """The JSON of `config/ack`."""
+
+    crc32: int
+    accepted: bool
+    part: str = ""
+    reason: str = ""
 
 
 def provision(port: str, baud: int, credentials: CredentialsChange) -> ExitCode:
@@ -145,6 +166,8 @@ class BoardExchange:
     def __init__(self, line: BoardLine) -> None:
         self._line = line
         self._packets = PacketDecoder()
+        self._came: deque[bytes] = deque()  # frames behind an answer
+        self.newest_status: BoardStatus | None = None  # of this exchange
 
     def send(self, text: bytes, patience: float = PATIENCE) -> ProvisionAnswer:
         """Sends `text` until the board answers: opening the port may have restarted it.
@@ -159,6 +182,21 @@ class BoardExchange:
             )
         return _decoded(ack, ProvisionAnswer)
 
+    def configure(self, text: bytes, patience: float = PATIENCE) -> None:
+        """Disarms the board and sends it the configuration.
+
+        Raises `CommandError` where it refuses, or says nothing for `patience` [s].
+        """
+        self._line.write(packet(disarm_frame(time.time_ns() & 0xFFFF_FFFF)))
+        question = packet(json_frame(JsonFrame.CONFIG, text))
+        ack = self._exchange(question, JsonFrame.CONFIG_ACK, patience, AGAIN)
+        if ack is None:
+            raise CommandError(f"the board does not answer its configuration in {patience:g} s")
+        answer = _decoded(ack, ConfigAnswer)
+        if not answer.accepted:
+            part = f"{answer.part}: " if answer.part else ""
+            raise CommandError(f"the board refuses the configuration of robot.toml: {part}{answer.reason}")
+
     def status(self, patience: float = TO_RESTART) -> BoardStatus | None:
         """The board's status after its restart; None if it says nothing for `patience` [s]."""
         status = self._exchange(packet(sync_frame(0)), JsonFrame.STATUS, patience, 1.0)
@@ -170,9 +208,14 @@ class BoardExchange:
             if now >= next_try:
                 self._line.write(question)
                 next_try = now + again
-            for frame in self._packets.feed(self._line.read(4096)):
-                found = parse_json_frame(frame)
-                if found is not None and found.kind is answer:
+            self._came.extend(self._packets.feed(self._line.read(4096)))
+            while self._came:
+                found = parse_json_frame(self._came.popleft())
+                if found is None:
+                    continue
+                if found.kind is JsonFrame.STATUS:
+                    self.newest_status = _decoded(found.text, BoardStatus)
+                if found.kind is answer:
                     return found.text
         return None
 
