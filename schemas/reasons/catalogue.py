@@ -1,7 +1,8 @@
 """The catalogue: the templates of all codes in one language, in gettext files by subject.
 
 `languages/es/goal.po` has the Spanish of all codes `goal.*`. An entry's msgid is the code; its msgctxt is empty, or
-names the front end that has words of its own for it (`page`). A template has the names of the reason's values in
+names the front end that has words of its own for it (`page`), or is `explain`: what the code means, or all codes that
+begin with it. A template has the names of the reason's values in
 braces, and behind a colon the unit of one: `{depth:m}`.
 
 `compiled.py` makes one file of a language's, which takes 1 ms to read. (Fluent's runtime takes some 100 ms to import
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 LANGUAGES = Path(__file__).resolve().parent / "languages"
 COMPILED = "gemelo.mo"
 ENGLISH = "en"
+EXPLAIN = "explain"
+WORD = "word."  # before a word that stands in for a value
+INDEX, ENTRY, PART = "index", "\x1e", "\x1f"  # as compiled.py writes it
 
 
 def languages() -> tuple[str, ...]:
@@ -35,6 +39,28 @@ def template(code: str, language: str, context: str = "") -> str | None:
     own = known.pgettext(context, code)
     found = own if own != code else known.gettext(code)
     return found if found != code else None
+
+
+def entries(language: str) -> frozenset[tuple[str, str]]:
+    """The context and id of everything that a language has."""
+    known = _catalogue(language)
+    if known is None:
+        return frozenset()
+    parts = (each.split(PART) for each in known.pgettext(INDEX, INDEX).split(ENTRY))
+    return frozenset((context, name) for context, name in parts)
+
+
+def codes(language: str = ENGLISH) -> tuple[str, ...]:
+    """Those of reasons and of remedies, sorted."""
+    return tuple(sorted(name for context, name in entries(language) if not context and not name.startswith(WORD)))
+
+
+def explanation(code: str, language: str) -> str:
+    """What the code means, else what those mean that begin as it does; empty where the language says neither."""
+    known, parts = _catalogue(language), code.split(".")
+    names = [".".join(parts[:count]) for count in range(len(parts), 0, -1)]
+    texts = ((name, known.pgettext(EXPLAIN, name)) for name in names) if known is not None else ()
+    return next((text for name, text in texts if text != name), "")
 
 
 @cache

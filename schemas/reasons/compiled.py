@@ -8,6 +8,7 @@ from pathlib import Path
 import polib
 
 COMPILED = "gemelo.mo"  # as catalogue.py reads it; this file runs alone where the project is built
+INDEX, ENTRY, PART = "index", "\x1e", "\x1f"  # what there is, which gettext itself does not list
 
 
 def compile_languages(sources: Path, to: Path) -> list[Path]:
@@ -25,6 +26,8 @@ def _compile(folder: Path, to: Path) -> Path:
                 raise ValueError(f"{file}: {entry.msgid} stands twice: take one of the two away")
             seen.add(key)
             whole.append(entry)
+    index = ENTRY.join(PART.join(each) for each in sorted(seen))
+    whole.append(polib.POEntry(msgctxt=INDEX, msgid=INDEX, msgstr=index))
     to.mkdir(parents=True, exist_ok=True)
     whole.save_as_mofile(str(to / COMPILED))
     return to / COMPILED

@@ -13,6 +13,7 @@ import yaml
 from PIL import Image
 
 import gemelo
+from gemelo.schemas.reasons.catalogue import codes, explanation
 from tests.gemelo.public import own_names
 
 ROOT = Path(__file__).parents[2]
@@ -121,3 +122,13 @@ def test_every_public_name_has_its_place_in_the_api_pages_once() -> None:
     named = [name for page in sorted((ROOT / "docs/api").glob("*.md")) for name in DIRECTIVE.findall(page.read_text())]
     assert sorted(named) == sorted(own_names())
     assert [name for name in named if not hasattr(gemelo, name)] == []
+
+
+@pytest.mark.parametrize("language", FIRST)
+def test_the_page_of_reasons_has_every_code_with_what_it_means_and_an_example(laid: Path, language: str) -> None:
+    make_reasons = SimpleNamespace(**runpy.run_path(str(ROOT / "docs/make_reasons.py")))
+    make_reasons.main(laid)
+    text = (laid / make_reasons.PAGES[language]).read_text(encoding="utf-8")
+    assert [code for code in codes() if f"| `{code}` | " not in text] == []
+    assert explanation("goal.limit.position", language) in text
+    assert make_reasons.MARK not in text

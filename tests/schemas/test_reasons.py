@@ -13,7 +13,8 @@ import pytest
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.message import decode, encode
 from gemelo.schemas.reasons import FrontEnd, Reason, because, plain, remedy, say
-from gemelo.schemas.reasons.catalogue import ENGLISH, LANGUAGES, languages
+from gemelo.schemas.reasons.catalogue import ENGLISH, EXPLAIN, LANGUAGES, codes, entries, languages
+from gemelo.schemas.reasons.examples import example_of, examples
 
 ROOT = project_root()
 BEYOND = because(
@@ -127,3 +128,23 @@ def test_several_remedies_are_a_choice():
     both = because("goal.points.none", remedy("plan_again"), remedy("in_parts"))
     assert str(both) == "the trajectory has no points; plan again or send it in parts"
     assert say(both, "es") == "El plan no tiene puntos; planifique otra vez o envíelo por partes"
+
+
+def test_what_is_explained_is_a_code_or_the_beginning_of_some_in_every_language():
+    explained = {
+        language: {name for context, name in entries(language) if context == EXPLAIN} for language in languages()
+    }
+    assert all(names == explained[ENGLISH] for names in explained.values())
+    known = codes()
+    assert [name for name in explained[ENGLISH] if not any(f"{code}.".startswith(f"{name}.") for code in known)] == []
+
+
+def test_an_example_is_that_of_a_real_cause_and_has_the_values_of_its_template():
+    assert sum(example_of(code) is each for code, each in examples().items()) > 30
+    for code in codes():
+        assert set(example_of(code).values) == places(catalogue(ENGLISH)[code]) - {"causes", "remedies"}, code
+
+
+def test_the_index_has_every_template_that_the_files_have():
+    for language in languages():
+        assert {name for context, name in entries(language) if not context} == set(catalogue(language))

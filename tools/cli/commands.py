@@ -269,6 +269,10 @@ COMMANDS = (
             "robot.robot_folder:run_check", "robot.robot_folder:check_option"),
     Command(("doctor",), "what keeps a twin from working here: machine, files, router, broker, device, clocks",
             "watch.doctor:run", JSON, "gemelo doctor"),
+    Command(("explain",), "what a code of a refusal means, with an example and what to do; without one, all codes",
+            "explain:run", "explain:add_options", "gemelo explain goal.limit.position"),
+    Command(("languages",), "the languages of the sentences, and which texts one of them lacks",
+            "explain:run_languages", "explain:language_options", "gemelo languages es"),
     Command(("version",), "the versions of gemelo, of its wire protocol and of Python", "version:run"),
     Command(("completion",), "bash completion: source <(gemelo completion)", "completion:run"),
 )  # fmt: skip

@@ -64,11 +64,14 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> CommandError:
     """`no topic "joint_state": did you mean "joint_states"?`, or the list of all known names."""
+    from gemelo.schemas.reasons import because, remedy  # 30 ms, where something is refused
+
     known = sorted(known)
-    guess = nearest(name, known)
-    if guess is not None:
-        return usage(f'no {kind} "{name}": did you mean "{guess}"?')
-    return usage(f'no {kind} "{name}": there is {", ".join(known) if known else "none at all"}')
+    if guess := nearest(name, known):
+        hint = remedy("did_you_mean", name=guess)
+    else:
+        hint = remedy("there_is", names=", ".join(known)) if known else remedy("there_is_none")
+    return usage(because("cli.unknown", hint, kind=kind, name=name))
 
 
 def joint_of(arm: ArmDescription, name: str) -> Joint:
