@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections import Counter
 from collections.abc import Mapping
+
+from gemelo.schemas.reasons import Reason, because
 
 Where = tuple[str | int, ...]  # keys, and indices of arrays
 
@@ -20,6 +23,16 @@ def toml_lines(text: str) -> dict[Where, int]:
 def nearest_line(lines: Mapping[Where, int], place: Where) -> int:
     """The line of `place`, or of the nearest thing around it that is written; 0 where there is none."""
     return next((lines[place[:end]] for end in range(len(place), 0, -1) if place[:end] in lines), 0)
+
+
+def syntax_mistake(error: tomllib.TOMLDecodeError, text: str) -> tuple[int, Reason]:
+    """The line (from 1) of what is not TOML, and what is wrong with it, in the parser's words."""
+    at = re.search(r" \(at line (\d+), column (\d+)\)$", str(error))
+    if at is None:
+        problem = str(error).removesuffix(" (at end of document)")
+        return text.rstrip().count("\n") + 1, because("file.toml.end", problem=problem)
+    problem = str(error)[: at.start()]
+    return int(at[1]), because("file.toml.syntax", problem=problem, column=int(at[2]))
 
 
 class _Scanner:

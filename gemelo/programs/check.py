@@ -14,6 +14,7 @@ from gemelo.programs.points import Point
 from gemelo.programs.program import Program
 from gemelo.programs.sequence import Leg, legs_of, lost_blend
 from gemelo.programs.steps import Attach, Detach, Grip, MotionStep, Pick, StepPath, Wait, WaitFor, path_text, words_of
+from gemelo.schemas.reasons import Reason, because
 
 SAME = 1e-6  # [rad] or [m] between two states that are one
 MOST_LEGS = 5_000  # that one check plans
@@ -32,7 +33,7 @@ class CheckedLeg:
     planner: str = ""  # that found the path
     planning_time: float = 0.0  # [s]
     refusal: Refused | None = None  # why there is no plan
-    note: str = ""  # what a person should know
+    notes: tuple[Reason, ...] = ()  # what a person should know
     times: int = 1  # how often it is carried out like this: a repeat whose rounds are alike is planned once
 
     @property
@@ -42,6 +43,11 @@ class CheckedLeg:
     @property
     def ok(self) -> bool:
         return self.refusal is None
+
+    @property
+    def note(self) -> str:
+        """The notes in one line."""
+        return "; ".join(map(str, self.notes))
 
     @property
     def tightest(self) -> tuple[str, float]:
@@ -56,7 +62,7 @@ class ProgramCheck:
     program: str
     mistakes: tuple[Mistake, ...]  # of the files; with any of them nothing is planned
     legs: tuple[CheckedLeg, ...]
-    note: str = ""  # what was left out
+    left_out: Reason | None = None  # what was not planned
 
     @property
     def ok(self) -> bool:
@@ -69,9 +75,18 @@ class ProgramCheck:
         return sum(leg.duration * leg.times for leg in self.legs)
 
     @property
-    def refusals(self) -> tuple[str, ...]:
-        """A sentence for every leg that was refused."""
-        return tuple(f"step {path_text(leg.path)} ({leg.text}): {leg.refusal}" for leg in self.legs if leg.refusal)
+    def note(self) -> str:
+        """What was not planned, in one sentence; empty where everything was."""
+        return str(self.left_out or "")
+
+    @property
+    def refusals(self) -> tuple[Reason, ...]:
+        """Why each leg that was refused was."""
+        return tuple(
+            because("program.step.failed", leg.refusal.reason, step=path_text(leg.path), text=leg.text)
+            for leg in self.legs
+            if leg.refusal
+        )
 
     @property
     def margins(self) -> dict[str, float]:
@@ -103,7 +118,7 @@ def check_program(
         return ProgramCheck(program.name, mistakes, ())
     search = _Check(arm, points, start if start is not None else arm.joints, on_leg)
     search.plan_all(legs_of(program, programs, first))
-    return ProgramCheck(program.name, (), tuple(search.legs.values()), search.note)
+    return ProgramCheck(program.name, (), tuple(search.legs.values()), search.left_out)
 
 
 class _Check:
@@ -113,16 +128,16 @@ class _Check:
         self._arm, self._points, self._on_leg = arm, points, on_leg
         self.legs: dict[object, CheckedLeg] = {}
         self._ends: dict[object, Mapping[str, float] | None] = {}
-        self.note = ""
+        self.left_out: Reason | None = None
         self._joints: Mapping[str, float] = dict(start)
-        self._scene_note = ""
+        self._scene_note: Reason | None = None
 
     def plan_all(self, legs: Iterator[Leg]) -> None:
         """Until the end, or until it is not known where the arm would be."""
         held: Leg | None = None
         for count, leg in enumerate(legs):
             if count >= MOST_CARRIED_OUT or len(self.legs) >= MOST_LEGS:
-                self.note = f"only the first {count} legs were checked: step {path_text(leg.path)} on they are not"
+                self.left_out = because("program.check.only_first", count=count, step=path_text(leg.path))
                 return
             if held is not None and not self._plan(held, leg):
                 return
@@ -142,7 +157,7 @@ class _Check:
                 self._on_leg(found)
         end = self._ends[key]
         if end is None:
-            self.note = f"nothing after step {path_text(leg.path)} was planned: where the arm would be is not known"
+            self.left_out = because("program.check.end_unknown", step=path_text(leg.path))
             return False
         self._joints = end
         return True
@@ -150,12 +165,12 @@ class _Check:
     def _checked(self, leg: Leg, following: Leg | None) -> tuple[CheckedLeg, Mapping[str, float] | None]:
         """The leg, and the joint values after it."""
         step, text = leg.steps[-1], "; ".join(words_of(step) for step in leg.steps)
-        made = CheckedLeg(leg.paths, leg.rounds, text, note=self._note(leg, following))
+        made = CheckedLeg(leg.paths, leg.rounds, text, notes=self._notes(leg, following))
         if not leg.is_motion:
             if isinstance(step, Pick):
                 return self._picked(step, made), None
             if isinstance(step, Attach | Detach | Grip):
-                self._scene_note = f'planned in the scene as it is now, without step {path_text(leg.path)} ("{text}")'
+                self._scene_note = because("program.check.scene_as_now", step=path_text(leg.path), text=text)
             return replace(made, duration=step.time if isinstance(step, Wait) else 0.0), self._joints
         try:
             plan = plan_leg(self._arm, leg, self._points, self._joints)
@@ -176,17 +191,18 @@ class _Check:
         try:
             self._arm.require_pickable(step.thing, step.place)
         except (Refused, BadArgument) as error:
-            refusal = error if isinstance(error, Refused) else Refused(str(error), check="cell", subject=step.thing)
-            return replace(made, refusal=refusal)
-        return replace(made, note="; ".join(filter(None, (made.note, "it is planned when the thing is seen"))))
+            if not isinstance(error, Refused):
+                error = Refused(str(error), check="cell", subject=step.thing, reason=error.reason)
+            return replace(made, refusal=error)
+        return replace(made, notes=(*made.notes, because("program.check.planned_when_seen")))
 
-    def _note(self, leg: Leg, following: Leg | None) -> str:
+    def _notes(self, leg: Leg, following: Leg | None) -> tuple[Reason, ...]:
         notes = list(lost_blend((leg, following)).values()) if following is not None else []
         if isinstance(leg.steps[-1], WaitFor):
-            notes.append("how long the sensor lets the arm wait is not known")
-        if leg.is_motion and self._scene_note:
+            notes.append(because("program.check.wait_unknown"))
+        if leg.is_motion and self._scene_note is not None:
             notes.append(self._scene_note)
-        return "; ".join(notes)
+        return tuple(notes)
 
     def _goal_of(self, step: object) -> Mapping[str, float] | None:
         """Where a refused motion would have ended, if its goal is given in joint values."""

@@ -18,12 +18,13 @@ from gemelo.programs.points import Point
 from gemelo.programs.sequence import Leg
 from gemelo.programs.steps import Attach, Detach, Grip, Output, Pick, Wait, WaitFor
 from gemelo.schemas.motion import FollowErrorCode
+from gemelo.schemas.reasons import Reason, because
 
 LOOK_AHEAD = 50  # legs that are looked through for the next motion
 HAND_OVER = 1.0  # [s] before the end of a motion that the next is handed over; the gateway sends 0.5 s ahead at most
 SENSOR_PERIOD = 0.05  # [s] between two looks at a sensor, of which there are 10 a second
 
-OnLeg = Callable[[Leg | None, int, int, str], object]  # the leg, legs done, legs planned, why it pauses
+OnLeg = Callable[[Leg | None, int, int, Reason | None], object]  # the leg, legs done, legs planned, why it pauses
 
 
 class Failed(Error):
@@ -92,7 +93,7 @@ class Execution:
             except Error as error:
                 if self._controls.stop.is_set():
                     return
-                raise Failed(str(error)) from error
+                raise Failed(error.reason) from error
             if self._controls.stop.is_set():
                 return
             self._done += len(leg.steps)
@@ -103,7 +104,7 @@ class Execution:
         handed_over = self.following is not None and self.following.leg is leg and self.following.motion is not None
         if handed_over or not self._controls.wants_pause:
             return
-        self._on_leg(leg, self._done, self._planned, "paused before this step")
+        self._on_leg(leg, self._done, self._planned, because("program.run.paused"))
         self._arm.wait_for(lambda: self._controls.stop.is_set() or not self._controls.wants_pause, None)
 
     def _carry_out(self, leg: Leg) -> None:
@@ -244,14 +245,20 @@ class Execution:
         return leg
 
     def _tell(self, leg: Leg | None) -> None:
-        self._on_leg(leg, self._done, self._planned, "")
+        self._on_leg(leg, self._done, self._planned, None)
 
 
 def _is_met(step: WaitFor, value: float) -> bool:
     return (step.above is not None and value > step.above) or (step.below is not None and value < step.below)
 
 
-def _not_met(step: WaitFor, value: float | None) -> str:
-    wanted = f"above {step.above:g}" if step.above is not None else f"below {step.below:g}"
-    reads = "has no reading" if value is None else f"reads {value:g}"
-    return f'sensor "{step.sensor}" {reads}, not {wanted}, after {step.timeout:g} s'
+def _not_met(step: WaitFor, value: float | None) -> Reason:
+    sensor, time = step.sensor, step.timeout
+    if step.above is not None:
+        if value is None:
+            return because("program.sensor.silent_above", sensor=sensor, limit=step.above, time=time)
+        return because("program.sensor.not_above", sensor=sensor, value=value, limit=step.above, time=time)
+    assert step.below is not None
+    if value is None:
+        return because("program.sensor.silent_below", sensor=sensor, limit=step.below, time=time)
+    return because("program.sensor.not_below", sensor=sensor, value=value, limit=step.below, time=time)

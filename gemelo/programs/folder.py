@@ -7,11 +7,12 @@ from pathlib import Path
 
 from gemelo.api.arm import Arm
 from gemelo.api.errors import BadArgument
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.programs.names import checked_folder, program_name
 from gemelo.programs.program import Program
 from gemelo.programs.reading import read_program
 from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.reasons import because
 
 
 def programs_folder(of: Arm | Deployment) -> Path:
@@ -56,22 +57,26 @@ class Programs(Mapping[str, Program]):
     def require(self, name: str) -> Program:
         """The program; raises `BadArgument` with the nearest name, `ProgramError` with the mistakes of its file."""
         if name not in self:
-            raise BadArgument(f'no program "{program_name(name)}" in {self.folder}{suggestion(name, self)}')
+            raise self._absent(name)
         return self[name]
 
     def remove(self, name: str) -> None:
         """Deletes its file; raises `BadArgument`."""
         if name not in self:
-            raise BadArgument(f'no program "{program_name(name)}" in {self.folder}{suggestion(name, self)}')
+            raise self._absent(name)
         self.file(name).unlink(missing_ok=True)
 
     def rename(self, old: str, new: str) -> None:
         """Gives its file another name; calls of it elsewhere are not changed. Raises `BadArgument`."""
         if new in self and new != old:
-            raise BadArgument(f'there is a program "{new}": remove it first, or take another name')
+            raise BadArgument(because("program.exists", program=new))
         if old not in self:
-            raise BadArgument(f'no program "{program_name(old)}" in {self.folder}{suggestion(old, self)}')
+            raise self._absent(old)
         self.file(old).rename(self.file(new))
+
+    def _absent(self, name: str) -> BadArgument:
+        known = nearest(name, self)
+        return BadArgument(because("program.absent", known, program=program_name(name), folder=str(self.folder)))
 
     def file(self, name: str) -> Path:
         """Where the program of that name is, or would be; raises `BadArgument` for what is no name."""

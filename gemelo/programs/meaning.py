@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from gemelo.api.errors import BadArgument, Error
 from gemelo.api.gripping import opening_of
 from gemelo.api.targets import joint_state
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import program_name, read_text
@@ -17,6 +17,7 @@ from gemelo.programs.program import Program
 from gemelo.programs.reading import parse_program, value_mistakes
 from gemelo.programs.steps import AnyStep, Attach, Call, Grip, MotionStep, Output, Pick, WaitFor
 from gemelo.programs.values import DEEPEST, Wrong, in_words_of_a_file
+from gemelo.schemas.reasons import because
 
 PointsByName = Mapping[str, Point]
 ProgramsByName = Mapping[str, Program]
@@ -43,10 +44,9 @@ def find_mistakes_in_file(
         program, mistakes = parse_program(path.name.removesuffix(".toml"), read_text(path), path)
     except ProgramError as error:
         return error.mistakes
-    except Error as error:
-        return (Mistake(str(path), 0, (), str(error).removeprefix(f"{path} ")),)
-    found = {*mistakes, *find_mistakes(program, robot, points, programs)}
-    return tuple(sorted(found, key=lambda each: (each.file != str(path), each.file, each.line, each.step)))
+    found = find_mistakes(program, robot, points, programs)
+    mistakes += [mistake for mistake in found if mistake not in mistakes]
+    return tuple(sorted(mistakes, key=lambda each: (each.file != str(path), each.file, each.line, each.step)))
 
 
 class _Search:
@@ -61,7 +61,7 @@ class _Search:
         self._seen.add(program.name)
         mistakes = value_mistakes(program)
         if program.robot and program.robot != self._robot.name:
-            what = f'it is for robot "{program.robot}", and this one is "{self._robot.name}": correct robot = ...'
+            what = because("program.robot.other", robot=program.robot, present=self._robot.name)
             mistakes.append(program.mistake((), "robot", what))
         called: list[Mistake] = []
         for path, step in program.all_steps():
@@ -70,7 +70,7 @@ class _Search:
                 try:
                     called += self._call(step, callers)
                 except BadArgument as error:
-                    mistakes.append(program.mistake(path, "program", str(error)))
+                    mistakes.append(program.mistake(path, "program", error.reason))
         yield from sorted(mistakes, key=lambda each: (each.line, each.step))
         yield from called
 
@@ -80,37 +80,41 @@ class _Search:
             case MotionStep():
                 yield from self._motion(step)
             case Output():
-                yield from _unknown("name", "output", step.name, [each.name for each in robot.outputs], robot)
+                outputs = [each.name for each in robot.outputs]
+                yield from _unknown("name", "program.output.unknown", step.name, outputs, robot)
             case Grip():
                 yield from self._grip(step)
             case Pick():
                 if robot.gripper is None:
-                    yield "thing", f"{robot.name} has no gripper: write a [gripper] into its robot.toml"
+                    yield "thing", because("program.gripper.none", robot=robot.name)
             case WaitFor():
-                yield from _unknown("sensor", "sensor", step.sensor, [each.name for each in robot.sensors], robot)
+                sensors = [each.name for each in robot.sensors]
+                yield from _unknown("sensor", "program.sensor.unknown", step.sensor, sensors, robot)
             case Attach():
                 for key, link in (("link", step.link), *(("touch", each) for each in step.touch)):
-                    yield from _unknown(key, "link", link or robot.tool_frame, robot.model.link_names, robot)
+                    links = robot.model.link_names
+                    yield from _unknown(key, "program.link.unknown", link or robot.tool_frame, links, robot)
             case _:
                 return
 
     def _grip(self, step: Grip) -> Iterator[Wrong]:
         gripper = self._robot.gripper
         if gripper is None:
-            yield "to", f"{self._robot.name} has no gripper: write a [gripper] into its robot.toml"
+            yield "to", because("program.gripper.none", robot=self._robot.name)
             return
         try:
             opening_of(gripper, step.to)
         except BadArgument as error:
-            yield "to", in_words_of_a_file(str(error))
+            yield "to", in_words_of_a_file(error, "to")
 
     def _motion(self, step: MotionStep) -> Iterator[Wrong]:
         if step.point and step.point not in self._points:
-            yield "point", f'no point "{step.point}" of {self._robot.name}{suggestion(step.point, self._points)}'
+            near = nearest(step.point, self._points)
+            yield "point", because("point.unknown", near, point=step.point, robot=self._robot.name)
         if step.state:
-            yield from _unknown("state", "named state", step.state, self._robot.state_names, self._robot)
+            yield from _unknown("state", "program.state.unknown", step.state, self._robot.state_names, self._robot)
         if step.frame:
-            yield from _unknown("frame", "link", step.frame, self._robot.model.link_names, self._robot)
+            yield from _unknown("frame", "program.link.unknown", step.frame, self._robot.model.link_names, self._robot)
         if step.joints:
             yield from self._joints(step.joints)
 
@@ -118,33 +122,35 @@ class _Search:
         try:
             joint_state(self._robot, joints, "joints")
         except BadArgument as error:
-            yield "joints", in_words_of_a_file(str(error))
+            yield "joints", in_words_of_a_file(error, "joints")
             return
         for name, value in joints.items():
             joint = self._robot.joint(name)
             if not joint.is_within(joint.rounded(value)):
-                limits = f"{joint.lower:.4g} to {joint.upper:.4g} {joint.unit}"
-                yield "joints", f'joint "{name}" = {value:g} {joint.unit} is beyond its limits, {limits}'
+                yield "joints", because(
+                    "program.joint.limits", joint=name, value=value,
+                    lower=joint.lower, upper=joint.upper, unit=joint.unit,
+                )  # fmt: skip
 
     def _call(self, step: Call, callers: tuple[str, ...]) -> Iterator[Mistake]:
         """The mistakes of a called program; raises `BadArgument` where it cannot be called."""
         if step.program in callers:
-            circle = " calls ".join(f'"{each}"' for each in (*callers[callers.index(step.program) :], step.program))
-            raise BadArgument(f"this would never end: {circle}; take one of these calls out, or use repeat")
+            circle = (*callers[callers.index(step.program) :], step.program)
+            raise BadArgument(because("program.calls.endless", programs=circle))
         if len(callers) > DEEPEST:
-            raise BadArgument(f"calls are more than {DEEPEST} deep: {', '.join(callers)}")
+            raise BadArgument(because("program.calls.nested", programs=callers, limit=DEEPEST))
         if step.program not in self._programs:
-            raise BadArgument(f'no program "{program_name(step.program)}"{suggestion(step.program, self._programs)}')
+            near = nearest(step.program, self._programs)
+            raise BadArgument(because("program.unknown", near, program=program_name(step.program)))
         try:
             called = self._programs[step.program]
         except ProgramError as error:
             return iter(error.mistakes)
         except Error as error:
-            raise BadArgument(str(error)) from error
+            raise BadArgument(error.reason) from error
         return self.of(called, (*callers, step.program))
 
 
-def _unknown(key: str, kind: str, name: str, known: object, robot: ArmDescription) -> Iterator[Wrong]:
-    assert isinstance(known, list | tuple)
+def _unknown(key: str, code: str, name: str, known: Collection[str], robot: ArmDescription) -> Iterator[Wrong]:
     if name not in known:
-        yield key, f'{robot.name} has no {kind} "{name}"{suggestion(name, known)}'
+        yield key, because(code, nearest(name, known), robot=robot.name, name=name)

@@ -10,10 +10,11 @@ from gemelo.api.errors import BadArgument
 from gemelo.api.planning import Plan
 from gemelo.api.targets import FULL, Target, Waypoint
 from gemelo.api.units import Pose
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.programs.points import Point
 from gemelo.programs.sequence import Leg
 from gemelo.programs.steps import Arc, Line, MotionStep, goal_of
+from gemelo.schemas.reasons import because
 
 ALLOWED_TIME = 5.0  # [s] for one plan
 
@@ -64,7 +65,7 @@ def waypoint_of(step: MotionStep, points: Mapping[str, Point]) -> Waypoint:
 def require_point(points: Mapping[str, Point], name: str) -> Point:
     """The point; raises `BadArgument`."""
     if name not in points:
-        raise BadArgument(f'no point "{name}"{suggestion(name, points)}')
+        raise BadArgument(because("point.gone", nearest(name, points), point=name))
     return points[name]
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import hashlib
 import math
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from gemelo.api.errors import BadArgument, Error
+from gemelo.api.errors import BadArgument
 from gemelo.api.targets import Joints, named_joints
 from gemelo.api.whole_files import write_whole
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.toml_lines import nearest_line, toml_lines
 from gemelo.programs.mistakes import Mistake, ProgramError
@@ -20,6 +20,7 @@ from gemelo.programs.names import checked_folder, point_name, read_text
 from gemelo.programs.program import VERSION
 from gemelo.programs.reading import load_toml
 from gemelo.programs.toml_text import key_text, value_text
+from gemelo.schemas.reasons import Reason, because
 
 LARGEST_PICTURE = 10_000_000  # [bytes]
 KINDS = {b"\x89PNG\r\n\x1a\n": "png", b"\xff\xd8\xff": "jpg"}  # of pictures, by how they begin
@@ -78,7 +79,7 @@ class Points(Mapping[str, Point]):
         with self._lock:
             self.reload()
             if name in self._points and not overwrite:
-                raise BadArgument(f'there is a point "{name}": overwrite it, or take another name')
+                raise BadArgument(because("point.exists.overwrite", point=name))
             self._save({**self._points, name: Point(values, kept)})
 
     def rename(self, old: str, new: str) -> None:
@@ -88,7 +89,7 @@ class Points(Mapping[str, Point]):
             self.reload()
             self.require(old)
             if new in self._points and new != old:
-                raise BadArgument(f'there is a point "{new}": remove it first, or take another name')
+                raise BadArgument(because("point.exists", point=new))
             self._save({new if name == old else name: point for name, point in self._points.items()})
 
     def remove(self, name: str) -> None:
@@ -101,7 +102,7 @@ class Points(Mapping[str, Point]):
     def require(self, name: str) -> Point:
         """The point; raises `BadArgument` with the nearest name."""
         if name not in self._points:
-            raise BadArgument(f'no point "{name}" of {self._robot.name}{suggestion(name, self._points)}')
+            raise BadArgument(because("point.unknown", nearest(name, self._points), point=name, robot=self._robot.name))
         return self._points[name]
 
     def __getitem__(self, name: str) -> Point:
@@ -117,9 +118,9 @@ class Points(Mapping[str, Point]):
         """Under a name made of its content."""
         kind = next((kind for begin, kind in KINDS.items() if content.startswith(begin)), "")
         if not kind:
-            raise BadArgument(f"the picture ({len(content)} bytes) is neither PNG nor JPEG")
+            raise BadArgument(because("point.picture.format", size=len(content)))
         if len(content) > LARGEST_PICTURE:
-            raise BadArgument(f"the picture has {len(content)} bytes, more than {LARGEST_PICTURE}")
+            raise BadArgument(because("point.picture.size", size=len(content), limit=LARGEST_PICTURE))
         path = self._pictures / f"{hashlib.sha256(content).hexdigest()[:16]}.{kind}"
         write_whole(path, content)
         return path
@@ -141,15 +142,16 @@ class Points(Mapping[str, Point]):
 def _whole(robot: ArmDescription, name: str, joints: Joints) -> dict[str, float]:
     """Values of all joints, in their order, each within its limits; raises `BadArgument`."""
     values = named_joints(robot, joints, f'point "{name}"')
-    missing = [joint for joint in robot.joint_names if joint not in values]
+    missing = tuple(joint for joint in robot.joint_names if joint not in values)
     if missing:
-        raise BadArgument(f'point "{name}" has no value for joint {", ".join(missing)}: a point has all joints')
+        raise BadArgument(because("point.joint.missing", point=name, joints=missing))
     for joint in robot.joints:
         if not joint.is_within(joint.rounded(values[joint.name])):
-            raise BadArgument(
-                f'point "{name}": joint "{joint.name}" = {values[joint.name]:g} {joint.unit} is beyond its limits, '
-                f"{joint.lower:.4g} to {joint.upper:.4g} {joint.unit}"
-            )
+            why = because(
+                "point.joint.limits", point=name, joint=joint.name, value=values[joint.name],
+                lower=joint.lower, upper=joint.upper, unit=joint.unit,
+            )  # fmt: skip
+            raise BadArgument(why)
     return {joint: values[joint] for joint in robot.joint_names}
 
 
@@ -168,46 +170,47 @@ def _read(file: Path, robot: ArmDescription) -> dict[str, Point]:
     lines = toml_lines(text)
     mistakes: list[Mistake] = []
 
-    def say(what: str, *place: str) -> None:
+    def add(what: Reason, *place: str) -> None:
         line = nearest_line(lines, place)
         mistakes.append(Mistake(str(file), line, (), what))
 
-    if data.get("version") != VERSION:
-        say(f"version = {data.get('version')!r}: this gemelo reads version = {VERSION}", "version")
+    if "version" not in data:
+        add(because("file.version.none", known=VERSION), "version")
+    elif data["version"] != VERSION:
+        add(because("file.version.other", value=repr(data["version"]), known=VERSION), "version")
     if data.get("robot", robot.name) != robot.name:
-        say(f"these are points of {data['robot']!r}, and the robot is {robot.name!r}", "robot")
+        add(because("point.robot.other", robot=str(data["robot"]), present=robot.name), "robot")
     for key in data.keys() - {"version", "robot", "points"}:
-        say(f'unknown key "{key}"{suggestion(key, ("version", "robot", "points"))}', key)
+        add(because("file.key.unknown", nearest(key, ("version", "robot", "points")), key=key), key)
     given = data.get("points", {})
     if not isinstance(given, dict):
-        say(f"points = {given!r} is no table of points, as [points.above]", "points")
+        add(because("point.table", value=repr(given)), "points")
         given = {}
     found: dict[str, Point] = {}
     for name, point in given.items():
         try:
-            found[name] = _point(name, point, robot, file, say)
-        except (BadArgument, Error) as error:
-            say(str(error), "points", name, "joints")
+            found[name] = _point(name, point, robot, file, add)
+        except BadArgument as error:
+            add(error.reason, "points", name, "joints")
     if mistakes:
         raise ProgramError(sorted(mistakes, key=lambda each: each.line))
     return found
 
 
-def _point(name: str, given: object, robot: ArmDescription, file: Path, say: object) -> Point:
-    assert callable(say)
+def _point(name: str, given: object, robot: ArmDescription, file: Path, add: Callable[..., None]) -> Point:
     point_name(name)
     if not isinstance(given, dict) or not isinstance(given.get("joints"), dict):
-        raise BadArgument(f'point "{name}" has no joints, as joints = {{{robot.joint_names[0]} = 0.5}}')
+        raise BadArgument(because("point.joint.none", point=name, example=f"{{{robot.joint_names[0]} = 0.5}}"))
     for key in given.keys() - {"joints", "picture"}:
-        say(f'point "{name}" has no key "{key}"{suggestion(key, ("joints", "picture"))}', "points", name, key)
+        add(because("point.key", nearest(key, ("joints", "picture")), point=name, key=key), "points", name, key)
     for joint, value in given["joints"].items():
         if isinstance(value, bool | str) or not math.isfinite(value):
-            raise BadArgument(f'point "{name}": joint "{joint}" = {value!r} is no finite number, in rad or m')
+            raise BadArgument(because("point.joint.number", point=name, joint=joint, value=repr(value)))
     point = Point(_whole(robot, name, given["joints"]))
     picture = given.get("picture")
     if picture is None:
         return point
     if not isinstance(picture, str) or "\0" in picture or ".." in Path(picture).parts or Path(picture).is_absolute():
-        say(f'point "{name}": picture = {picture!r} is no file beside the points', "points", name, "picture")
+        add(because("point.picture.place", point=name, value=repr(picture)), "points", name, "picture")
         return point
     return replace(point, picture=file.parent / picture)

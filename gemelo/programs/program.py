@@ -11,8 +11,9 @@ from gemelo.api.whole_files import write_whole
 from gemelo.libraries.toml_lines import Where
 from gemelo.programs.mistakes import Mistake
 from gemelo.programs.names import program_name
-from gemelo.programs.steps import AnyStep, Repeat, StepPath
+from gemelo.programs.steps import AnyStep, Repeat, StepPath, path_text
 from gemelo.programs.toml_text import program_text
+from gemelo.schemas.reasons import Reason, because
 
 VERSION = 1  # of the files of programs and points
 
@@ -46,9 +47,9 @@ class Program:
             if depth == len(path) - 1:
                 return found
             steps = found.steps if isinstance(found, Repeat) else ()
-        raise BadArgument(
-            f'program "{self.name}" has no step {".".join(str(i + 1) for i in path) or "without a number"}'
-        )
+        if not path:
+            raise BadArgument(because("program.step.no_number", program=self.name))
+        raise BadArgument(because("program.step.absent", program=self.name, step=path_text(path)))
 
     def all_steps(self) -> Iterator[tuple[StepPath, AnyStep]]:
         """Every step with its path, those of repeats behind the repeat."""
@@ -61,19 +62,19 @@ class Program:
     def save(self, folder: str | Path | None = None) -> Path:
         """Writes `<name>.toml` in `folder`, or where it was read from; the comments of a file there are lost."""
         if folder is None and self.file is None:
-            raise BadArgument(f'program "{self.name}" was read from no file: say in which folder to save it')
+            raise BadArgument(because("program.file.none", program=self.name))
         path = Path(folder) / f"{self.name}.toml" if folder is not None else self.file
         assert path is not None
         if "\0" in str(path):
-            raise BadArgument(f"folder cannot be {str(folder)!r}: no path has a NUL in it")
+            raise BadArgument(because("program.folder.nul", folder=str(folder)))
         write_whole(path, self.to_toml().encode())
         return path
 
-    def mistake(self, path: StepPath, key: str, what: str) -> Mistake:
+    def mistake(self, path: StepPath, key: str, what: Reason) -> Mistake:
         """A mistake at the key of a step, with its line where the program was read from a file."""
         place = step_place(path)
         line = self.lines.get((*place, key), self.lines.get(place, 0))
-        return Mistake(str(self.file) if self.file else f'program "{self.name}"', line, path, what)
+        return Mistake(str(self.file or self.name), line, path, what)
 
 
 def step_place(path: StepPath) -> Where:

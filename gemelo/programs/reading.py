@@ -13,13 +13,15 @@ from typing import Any
 import msgspec
 
 from gemelo.api.gripping import CLOSE, OPEN
-from gemelo.libraries.arm.errors import suggestion
-from gemelo.libraries.toml_lines import Where, nearest_line, toml_lines
+from gemelo.libraries.arm.errors import nearest
+from gemelo.libraries.toml_lines import Where, nearest_line, syntax_mistake, toml_lines
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import read_text
 from gemelo.programs.program import VERSION, Program, step_place
 from gemelo.programs.steps import KINDS, AnyStep, Repeat, Step, StepPath, Wait
 from gemelo.programs.values import DEEPEST, MOST_STEPS, wrong_values
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import Reason, because
 
 UNITS = {"m": ("m", 1.0), "cm": ("m", 0.01), "mm": ("m", 0.001), "rad": ("rad", 1.0), "deg": ("rad", math.pi / 180.0),
          "s": ("s", 1.0), "ms": ("s", 0.001), "min": ("s", 60.0), "m/s": ("m/s", 1.0), "mm/s": ("m/s", 0.001),
@@ -27,18 +29,19 @@ UNITS = {"m": ("m", 1.0), "cm": ("m", 0.01), "mm": ("m", 0.001), "rad": ("rad", 
 MEASURED = {"position": "m", "offset": "m", "through": "m", "center": "m", "blend": "m", "rpy": "rad",
             "tool_speed": "m/s", "to": "m",
             "time": "s", "timeout": "s", "share": "%", "joints": "rad or m"}  # fmt: skip
-EXPECTED = {
-    str: 'a text in quotes, as "ready"',
-    bool: "true or false",
-    int: "a whole number",
-    float: "a number",
-    float | None: "a number",
-    dict[str, float]: "numbers by joint, as {elbow = 0.5}",
-    tuple[float, float, float] | None: "three numbers, as [0.25, 0.15, 0.1]",
-    tuple[float, float, float, float] | None: "four numbers, as [0, 0, 0, 1]",
-    str | float: '"open", "close" or a length',
-    tuple[str, ...]: 'texts, as ["link_1", "link_2"]',
+EXPECTED = {  # by type, what the catalogue calls it
+    str: "expected.text",
+    bool: "expected.boolean",
+    int: "expected.integer",
+    float: "expected.number",
+    float | None: "expected.number",
+    dict[str, float]: "expected.by_joint",
+    tuple[float, float, float] | None: "expected.three",
+    tuple[float, float, float, float] | None: "expected.four",
+    str | float: "expected.opening",
+    tuple[str, ...]: "expected.texts",
 }
+A_STEP = '{do = "go", state = "ready"}'
 BY_KIND = {str(kind.__struct_config__.tag): kind for kind in KINDS}
 NOTHING = Wait(time=0.0)  # stands where a step could not be read, so that the numbers of the others stay
 
@@ -70,12 +73,9 @@ def load_toml(text: str, file: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise ProgramError([Mistake(file, 0, (), "this is nested far too deep")]) from None
+        raise ProgramError([Mistake(file, 0, (), because("file.toml.nested"))]) from None
     except tomllib.TOMLDecodeError as error:
-        at = re.search(r" \(at line (\d+), column (\d+)\)$", str(error))
-        line = int(at[1]) if at else text.rstrip().count("\n") + 1
-        said = str(error)[: at.start()] if at else str(error).removesuffix(" (at end of document)")
-        what = f"this is not TOML: {said}{f' (column {at[2]})' if at else ' (at the end)'}"
+        line, what = syntax_mistake(error, text)
         raise ProgramError([Mistake(file, line, (), what)]) from None
 
 
@@ -92,25 +92,25 @@ class _Reader:
         known = ("version", "robot", "steps")
         for key in data:
             if key not in known:
-                self._say((key,), (), f'unknown key "{key}"{suggestion(key, known)}')
+                self._add((key,), (), because("file.key.unknown", nearest(key, known), key=key))
         version, robot = data.get("version"), data.get("robot", "")
-        if version != VERSION or isinstance(version, bool | float):
-            said = f"version = {version!r}" if "version" in data else "no version is given"
-            self._say(("version",), (), f"{said}: this gemelo reads version = {VERSION}")
+        if "version" not in data:
+            self._add(("version",), (), because("file.version.none", known=VERSION))
+        elif version != VERSION or isinstance(version, bool | float):
+            self._add(("version",), (), because("file.version.other", value=_shown(version), known=VERSION))
         if not isinstance(robot, str):
-            self._say(("robot",), (), f"robot = {robot!r} is not {EXPECTED[str]}")
+            wrong = because("program.value.kind", key="robot", value=_shown(robot), expected=EXPECTED[str])
+            self._add(("robot",), (), wrong)
         steps = self._steps(data.get("steps", []), ())
         return steps, robot if isinstance(robot, str) else ""
 
     def _steps(self, given: object, around: StepPath) -> tuple[AnyStep, ...]:
         place = (*step_place(around), "steps")
         if not isinstance(given, list):
-            self._say(
-                place, around, f'steps = {_shown(given)} is no list of steps, as [{{do = "go", state = "ready"}}]'
-            )
+            self._add(place, around, because("program.steps.kind", value=_shown(given), example=f"[{A_STEP}]"))
             return ()
         if len(around) > DEEPEST:
-            self._say(place, around, f"repeats are nested more than {DEEPEST} deep: make a program of it, and call it")
+            self._add(place, around, because("program.repeat.nested", limit=DEEPEST))
             return ()
         return tuple(self._step(each, (*around, index)) for index, each in enumerate(given))
 
@@ -118,15 +118,15 @@ class _Reader:
         self._count += 1
         place = step_place(path)
         if self._count == MOST_STEPS + 1:
-            self._say(place, path, f"a program has at most {MOST_STEPS} steps: make several, and call them")
+            self._add(place, path, because("program.steps.many", limit=MOST_STEPS))
         if self._count > MOST_STEPS:
             return NOTHING
         if not isinstance(given, dict):
-            self._say(place, path, f'{_shown(given)} is no step, as {{do = "go", state = "ready"}}')
+            self._add(place, path, because("program.step.kind", value=_shown(given), example=A_STEP))
             return NOTHING
         kind = BY_KIND.get(given["do"]) if isinstance(given.get("do"), str) else None
         if kind is None:
-            self._say((*place, "do"), path, _unknown_kind(given))
+            self._add((*place, "do"), path, _unknown_kind(given))
             return NOTHING
         return self._of_kind(kind, given, path)
 
@@ -135,15 +135,15 @@ class _Reader:
         fields = {field.name: field for field in msgspec.structs.fields(kind)}
         for key in given:
             if key != "do" and key not in fields:
-                is_right = self._say((*place, key), path, f'{given["do"]} has no key "{key}"{suggestion(key, fields)}')
+                unknown = because("program.step.key", nearest(key, fields), step=given["do"], key=key)
+                is_right = self._add((*place, key), path, unknown)
         values: dict[str, Any] = {}
         for name, field in fields.items():
             if name in given:
                 values[name] = self._field(kind, name, field.type, given[name], path)
                 is_right = is_right and values[name] is not None
             elif field.required:
-                expected = _expected(kind, name, field.type)
-                is_right = self._say(place, path, f'{given["do"]} needs "{name}": {expected}')
+                is_right = self._add(place, path, _missing(given["do"], kind, name, field.type))
         if not is_right:
             return NOTHING if kind is not Repeat else Repeat(count=1, steps=values.get("steps") or (NOTHING,))
         found: AnyStep = kind(**values)  # type: ignore[assignment]
@@ -156,18 +156,18 @@ class _Reader:
         try:
             return msgspec.convert(_in_si(name, value), expected)
         except (msgspec.ValidationError, _BadUnit) as error:
-            said = f": {error}" if isinstance(error, _BadUnit) else ""
-            self._say(place, path, f"{name} = {_shown(value)} is not {_expected(kind, name, expected)}{said}")
+            why = error.reason if isinstance(error, _BadUnit) else None
+            self._add(place, path, _of_another_kind(kind, name, expected, value, why))
             return None
 
-    def _say(self, place: Where, path: StepPath, what: str) -> bool:
+    def _add(self, place: Where, path: StepPath, what: Reason) -> bool:
         """Keeps a mistake, at the line of the place or of what is around it; False."""
         line = nearest_line(self.lines, place)
         self.mistakes.append(Mistake(self.file, line, path, what))
         return False
 
 
-class _BadUnit(Exception):
+class _BadUnit(ReasonedError):
     """A number with a unit that its key does not take, or without the one that it needs."""
 
 
@@ -185,32 +185,57 @@ def _in_si(name: str, value: object) -> object:
 
 def _number(value: object, unit: str) -> object:
     if unit == "%" and isinstance(value, int | float) and not isinstance(value, bool):
-        raise _BadUnit(f'write it in per cent: "{value if value > 1 else value * 100:g}%"')
+        text = f"{value if value > 1 else value * 100:g}%"
+        raise _BadUnit(because("program.value.percent", text=text))
     if not isinstance(value, str):
         return value
     found = re.fullmatch(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(\S+)\s*", value)
     base, factor = UNITS.get(found[2], ("", 1.0)) if found else ("", 1.0)
     if found is None or base not in unit.split(" or "):
-        known = ", ".join(name for name, (base, _) in UNITS.items() if base in unit.split(" or "))
-        raise _BadUnit(f"{value!r} has none of the units {known}")
+        known = tuple(name for name, (base, _) in UNITS.items() if base in unit.split(" or "))
+        raise _BadUnit(because("program.value.unit", value=_shown(value), known=known))
     return float(Decimal(found[1]) / 100) if base == "%" else float(found[1]) * factor
+
+
+def _of_another_kind(kind: type[Step], name: str, expected: Any, value: object, why: Reason | None) -> Reason:
+    """`why`: what is wrong with its unit."""
+    word, unit, shown = _expected(kind, name, expected), _unit_of(name), _shown(value)
+    if why is not None and unit:
+        return because("program.value.no_unit", why, key=name, value=shown, expected=word, unit=unit)
+    if why is not None:
+        return because("program.value.no_share", why, key=name, value=shown, expected=word)
+    if unit:
+        return because("program.value.kind_and_unit", key=name, value=shown, expected=word, unit=unit)
+    return because("program.value.kind", key=name, value=shown, expected=word)
+
+
+def _missing(step: str, kind: type[Step], name: str, expected: Any) -> Reason:
+    word, unit = _expected(kind, name, expected), _unit_of(name)
+    if unit:
+        return because("program.step.needs_with_unit", step=step, key=name, expected=word, unit=unit)
+    return because("program.step.needs", step=step, key=name, expected=word)
 
 
 def _expected(kind: type[Step], name: str, expected: Any) -> str:
     if name == "share":
-        return 'a share in per cent, as "50%"'
+        return "expected.share"
     if kind is Repeat and name == "steps":
-        return "a list of steps"
-    unit = MEASURED.get(name)
-    return EXPECTED.get(expected, "of that kind") + (f", in {unit} or with its unit" if unit else "")
+        return "expected.steps"
+    return EXPECTED.get(expected, "expected.kind")
 
 
-def _unknown_kind(given: Mapping[str, Any]) -> str:
+def _unit_of(name: str) -> str:
+    """Empty for a share, whose per cent is said with its kind."""
+    return "" if name == "share" else MEASURED.get(name, "")
+
+
+def _unknown_kind(given: Mapping[str, Any]) -> Reason:
+    known = tuple(BY_KIND)
     if "do" not in given:
-        return f"a step says what it does: do = one of {', '.join(BY_KIND)}"
+        return because("program.step.no_kind", known=known)
     if not isinstance(given["do"], str):
-        return f"do = {_shown(given['do'])} is not one of {', '.join(BY_KIND)}"
-    return f'there is no step "{given["do"]}"{suggestion(given["do"], BY_KIND)}'
+        return because("program.step.kind_of_kind", value=_shown(given["do"]), known=known)
+    return because("program.step.unknown", nearest(given["do"], known), step=given["do"])
 
 
 def _shown(value: object) -> str:

@@ -17,6 +17,7 @@ from gemelo.programs.points import Point
 from gemelo.programs.program import Program
 from gemelo.programs.sequence import Leg, called_programs, legs_of
 from gemelo.programs.steps import StepPath, path_text, words_of
+from gemelo.schemas.reasons import Reason, because
 
 
 class RunStatus(StrEnum):
@@ -26,7 +27,7 @@ class RunStatus(StrEnum):
     RUNNING = "running"
     PAUSED = "paused"  # until somebody says `resume` or `step`
     STOPPED = "stopped"  # by `stop`
-    FAILED = "failed"  # `message` says why
+    FAILED = "failed"  # `why` says it
     DONE = "done"
 
     @property
@@ -46,8 +47,13 @@ class RunState:
     done: int = 0  # steps that have been carried out, each as often as it was
     planned: int = 0  # legs that have been planned so far
     started_at: float = 0.0  # [s] UNIX; 0 before the start
-    message: str = ""  # why it has paused, stopped or failed
+    why: Reason | None = None  # it has paused, stopped or failed
     failure: Error | None = field(default=None, compare=False)  # that it has failed by
+
+    @property
+    def message(self) -> str:
+        """Why it has paused, stopped or failed, in one sentence; empty otherwise."""
+        return str(self.why or "")
 
     @property
     def step(self) -> StepPath:
@@ -95,7 +101,8 @@ class ProgramRun:
         stops = self._stops
         with self._lock:
             if self._thread is not None and self._thread.is_alive():
-                raise Error(f'program "{self.program.name}" is {self._state.status}: stop it before it starts again')
+                status = self._state.status
+                raise Error(because("program.run.goes_on", program=self.program.name, status=str(status)))
             require_right(self.program, self._arm.description, self._points, self._programs)
             programs = called_programs(self.program, self._programs)
             legs = legs_of(self.program, programs, first)
@@ -129,7 +136,7 @@ class ProgramRun:
                 if not (was_starting and isinstance(error, Refused)):  # else the motion is held as soon as it is known
                     self._controls.holds = False
                     raise
-            self._put(replace(self._state, status=RunStatus.PAUSED, message="held on its path"))
+            self._put(replace(self._state, status=RunStatus.PAUSED, why=because("program.run.held")))
 
     def resume(self) -> None:
         """Goes on after `pause`, `hold` or `step`."""
@@ -156,8 +163,8 @@ class ProgramRun:
         end = None if timeout is None else clock.monotonic() + timeout
         while self._goes_on:
             left = 1.0 if end is None else end - clock.monotonic()
-            if left <= 0.0:
-                raise TimeoutError(f'program "{self.program.name}" still runs after {timeout:g} s')
+            if timeout is not None and left <= 0.0:
+                raise TimeoutError(str(because("program.run.still", program=self.program.name, time=timeout)))
             self._arm.wait_for(lambda: not self._goes_on, min(left, 1.0))
         if self._state.status.is_over and self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join()  # it has said its last word
@@ -177,47 +184,61 @@ class ProgramRun:
                     self._arm.resume()
             self._controls.holds = self._controls.pauses = False
             self._controls.pauses_after_one = one_step
-            self._put(replace(self._state, status=RunStatus.RUNNING, message=""))
+            self._put(replace(self._state, status=RunStatus.RUNNING, why=None))
             self._arm.wake()
 
     def _require(self, status: RunStatus) -> None:
         if self._state.status is not status:
-            raise Error(f'program "{self.program.name}" is {self._state.status}, not {status}')
+            is_now = str(self._state.status)
+            raise Error(because("program.run.other", program=self.program.name, status=is_now, required=str(status)))
 
     def _run(self, execution: Execution) -> None:
         """The run's own thread."""
-        status, message = RunStatus.DONE, ""
+        status, why = RunStatus.DONE, None
         failure: Error | None = None
         try:
             execution.run()
         except Error as error:
-            status, message = RunStatus.FAILED, f"step {self._where()}: {error}"
+            status, why = RunStatus.FAILED, self._failed(error.reason)
             failure = error.__cause__ if isinstance(error.__cause__, Error) else error
         except BaseException as error:
-            status, message = RunStatus.FAILED, f"step {self._where()}: {type(error).__name__}: {error}"
+            defect = because("program.run.defect", kind=type(error).__name__, error=str(error))
+            status, why = RunStatus.FAILED, self._failed(defect)
             raise
         else:
             if self._controls.stop.is_set():
-                status, message = RunStatus.STOPPED, f"stopped in step {self._where()}"
+                status, why = RunStatus.STOPPED, self._stopped()
         finally:
             with self._lock:
-                self._put(replace(self._state, status=status, message=message, failure=failure))
+                self._put(replace(self._state, status=status, why=why, failure=failure))
 
-    def _on_leg(self, leg: Leg | None, done: int, planned: int, pause: str) -> None:
+    def _on_leg(self, leg: Leg | None, done: int, planned: int, pause: Reason | None) -> None:
         """The execution tells what it is at."""
         with self._lock:
             state = replace(self._state, done=done, planned=planned)
             if leg is not None:
                 state = replace(state, steps=leg.paths, rounds=leg.rounds, text="; ".join(map(words_of, leg.steps)))
-            if pause:
-                state = replace(state, status=RunStatus.PAUSED, message=pause)
+            if pause is not None:
+                state = replace(state, status=RunStatus.PAUSED, why=pause)
             self._put(state)
 
-    def _where(self) -> str:
-        """The present step for a person, with its rounds."""
-        step, rounds = path_text(self._state.step), self._state.rounds
-        about = f", round {'.'.join(str(number + 1) for number in rounds)}" if rounds else ""
-        return f"{step}{about} ({self._state.text})" if step else "none"
+    def _failed(self, why: Reason) -> Reason:
+        """With the present step, and the round of every repeat around it."""
+        step, rounds, text = path_text(self._state.step), path_text(self._state.rounds), self._state.text
+        if not step:
+            return why
+        if rounds:
+            return because("program.step.failed_in_round", why, step=step, round=rounds, text=text)
+        return because("program.step.failed", why, step=step, text=text)
+
+    def _stopped(self) -> Reason:
+        """With the present step, and the round of every repeat around it."""
+        step, rounds, text = path_text(self._state.step), path_text(self._state.rounds), self._state.text
+        if not step:
+            return because("program.run.stopped_before")
+        if rounds:
+            return because("program.run.stopped_in_round", step=step, round=rounds, text=text)
+        return because("program.run.stopped", step=step, text=text)
 
     def _put(self, state: RunState) -> None:
         if state != self._state:

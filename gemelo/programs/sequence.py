@@ -9,6 +9,7 @@ from itertools import pairwise
 from gemelo.api.errors import BadArgument
 from gemelo.programs.program import Program
 from gemelo.programs.steps import AnyStep, Call, Go, Line, MotionStep, Repeat, Speed, StepPath, path_text
+from gemelo.schemas.reasons import Reason, because
 
 MOST_JOINED = 20  # chosen: motions in one plan; more would keep the arm waiting for it
 
@@ -51,10 +52,20 @@ def require_step(program: Program, programs: Mapping[str, Program], path: StepPa
     steps: tuple[AnyStep, ...] = program.steps
     for depth, index in enumerate(path):
         if not 0 <= index < len(steps):
-            there = f"it has {len(steps)}" if steps else "there is none"
-            inside = f" in step {path_text(path[:depth])}" if depth else ""
-            raise BadArgument(f'program "{program.name}" has no step {path_text(path)}: {there}{inside}')
+            raise BadArgument(_absent(program.name, path, depth, len(steps)))
         steps = _inner(steps[index], programs)
+
+
+def _absent(program: str, path: StepPath, depth: int, count: int) -> Reason:
+    """`count`: the steps that there are in the step which the first `depth` numbers of `path` lead to."""
+    step, around = path_text(path), path_text(path[:depth])
+    if around and count:
+        return because("program.step.absent_in_step", program=program, step=step, count=count, around=around)
+    if around:
+        return because("program.step.none_in_step", program=program, step=step, around=around)
+    if count:
+        return because("program.step.absent_of", program=program, step=step, count=count)
+    return because("program.step.none", program=program, step=step)
 
 
 def called_programs(
@@ -69,7 +80,7 @@ def called_programs(
     for _, step in program.all_steps():
         if isinstance(step, Call) and step.program not in found:
             if step.program in callers:
-                raise BadArgument(f"programs call one another without end: {', '.join(callers)}, {step.program}")
+                raise BadArgument(because("program.calls.endless", programs=(*callers, step.program)))
             called = programs[step.program]
             found |= {step.program: called, **called_programs(called, programs, callers)}
     return found
@@ -89,13 +100,13 @@ def joins(first: Leg, second: Leg) -> bool:
     )
 
 
-def lost_blend(legs: tuple[Leg, ...]) -> dict[StepPath, str]:
+def lost_blend(legs: tuple[Leg, ...]) -> dict[StepPath, Reason]:
     """The steps of `legs` whose blend has no effect, and why; the last of `legs` is not judged."""
     notes = {}
     for leg, following in pairwise(legs):
         step = leg.steps[-1]
         if isinstance(step, MotionStep) and step.blend > 0.0 and not joins(leg, following):
-            notes[leg.paths[-1]] = "blend has no effect: no motion of the same kind and speed follows at once"
+            notes[leg.paths[-1]] = because("program.blend.lost")
     return notes
 
 

@@ -7,6 +7,7 @@ import re
 import msgspec
 
 from gemelo.api.errors import BadArgument
+from gemelo.schemas.reasons import because
 
 StepPath = tuple[int, ...]  # from 0: the step's place in its list, after those of the repeats and calls around it
 
@@ -130,9 +131,10 @@ def kind_of(step: Step) -> str:
 def goal_of(step: MotionStep) -> str:
     """Which of `GOALS` it has; raises `BadArgument` where it has not exactly one."""
     given = [name for name in GOALS if getattr(step, name)]
-    if len(given) != 1:
-        said = f"not {' and '.join(given)} at once" if given else "none is given"
-        raise BadArgument(f"a motion goes to one of {', '.join(GOALS)}: {said}")
+    if not given:
+        raise BadArgument(because("program.goal.none", known=GOALS))
+    if len(given) > 1:
+        raise BadArgument(because("program.goal.several", known=GOALS, given=tuple(given)))
     return given[0]
 
 
@@ -144,7 +146,7 @@ def path_text(path: StepPath) -> str:
 def parse_path(text: str) -> StepPath:
     """From "3.1" to (2, 0); raises `BadArgument`."""
     if not re.fullmatch(r"[1-9][0-9]{0,5}(\.[1-9][0-9]{0,5}){0,15}", text):
-        raise BadArgument(f'"{text}" is no step: write its number, and after a dot that within a repeat or call: 3.1')
+        raise BadArgument(because("program.step.number", text=text))
     return tuple(int(part) - 1 for part in text.split("."))
 
 

@@ -10,8 +10,9 @@ from functools import partial
 from gemelo.api.errors import BadArgument
 from gemelo.api.targets import FASTEST, point, quaternion, turned, vector
 from gemelo.programs.steps import Arc, Line, MotionStep, Repeat, Speed, Step, Wait, WaitFor, goal_of
+from gemelo.schemas.reasons import PLAIN, Reason, because, plain, remedy
 
-Wrong = tuple[str, str]  # the key, and what is wrong with it
+Wrong = tuple[str, Reason]  # the key, and what is wrong with it
 
 LONGEST = 86_400.0  # [s] that a step may wait
 MOST_ROUNDS = 1_000_000  # of a repeat
@@ -45,11 +46,11 @@ def _motion(step: MotionStep) -> Iterator[Wrong]:
             yield from _tried(name, partial(point, name, values))
     for name, value in step.joints.items():
         if not math.isfinite(value):
-            yield "joints", f'joint "{name}" is {value}: it must be finite'
+            yield "joints", because("program.joint.not_finite", joint=name, value=value)
     yield from _turned(step)
     yield from _within("blend", step.blend, 0.0, WIDEST_BLEND, "m")
     if step.frame and step.offset is None:
-        yield "frame", f'frame = "{step.frame}" says along which axes an offset is: it goes with offset alone'
+        yield "frame", because("program.frame.alone", frame=step.frame)
     if isinstance(step, Line | Arc):
         yield from _within("tool_speed", step.tool_speed, 0.0, FASTEST, "m/s")
     if isinstance(step, Arc):
@@ -60,15 +61,15 @@ def _goal(step: MotionStep) -> Iterator[Wrong]:
     try:
         goal_of(step)
     except BadArgument as error:
-        yield "", str(error)
+        yield "", error.reason
 
 
 def _turned(step: MotionStep) -> Iterator[Wrong]:
     given = [name for name in ("orientation", "rpy", "along") if getattr(step, name) is not None]
     if given and step.position is None:
-        yield given[0], f"{given[0]} says how the tool is turned at a position: give position too"
+        yield given[0], because("program.turn.position", key=given[0])
     if len(given) > 1:
-        yield given[1], f"say how the tool is turned once, not by {' and '.join(given)}"
+        yield given[1], because("program.turn.several", keys=tuple(given))
     if step.orientation is not None:
         yield from _tried("orientation", partial(quaternion, "orientation", step.orientation))
     if step.rpy is not None:
@@ -76,44 +77,44 @@ def _turned(step: MotionStep) -> Iterator[Wrong]:
     if step.along is not None:
         yield from _tried("along", partial(vector, "along", step.along, 3, "a direction"))
         if not any(step.along):
-            yield "along", "along = [0, 0, 0] is no direction"
+            yield "along", because("program.turn.no_direction")
 
 
 def _arc(step: Arc) -> Iterator[Wrong]:
     if (step.through is None) == (step.center is None):
-        yield "through", "an arc goes by one of through and center"
+        yield "through", because("program.arc.by")
     if step.joints or step.state:
-        yield "", "an arc is the tool's: give point, position or offset, not joints or a state"
+        yield "", because("program.arc.goal")
 
 
 def _wait_for(step: WaitFor) -> Iterator[Wrong]:
     yield from _within("timeout", step.timeout, 0.0, LONGEST, "s")
     if (step.above is None) == (step.below is None):
-        yield "above", "a sensor is waited for with one of above and below"
+        yield "above", because("program.wait_for.bound")
     for name, value in (("above", step.above), ("below", step.below)):
         if value is not None and not math.isfinite(value):
-            yield name, f"{name} is {value}: it must be finite"
+            yield name, because("program.value.not_finite", key=name, value=value)
 
 
 def _share(share: float) -> Iterator[Wrong]:
     if not 0.0 < share <= 1.0:
-        yield "share", f"share = {share * 100.0:g}% is not above 0% and at most 100%"
+        yield "share", because("program.speed.share", value=share)
 
 
 def _repeat(step: Repeat) -> Iterator[Wrong]:
     if not 1 <= step.count <= MOST_ROUNDS:
-        yield "count", f"count = {step.count} is not 1 to {MOST_ROUNDS}"
+        yield "count", because("program.repeat.count", value=step.count, limit=MOST_ROUNDS)
     if not step.steps:
-        yield "steps", "a repeat needs steps: steps = [...]"
+        yield "steps", because("program.repeat.empty")
 
 
 def _within(name: str, value: float, least: float, most: float, unit: str) -> Iterator[Wrong]:
     if not math.isfinite(value):
-        yield name, f"{name} is {value}: it must be finite"
+        yield name, because("program.value.not_finite", key=name, value=value)
     elif not least <= value <= most:
         thousandth = unit.startswith("m") and least <= value / 1000.0 <= most
-        hint = f': if it is in mm, write "{value:g}m{unit}"' if thousandth else ""
-        yield name, f"{name} = {value:g} {unit} is not {least:g} to {most:g} {unit}{hint}"
+        hint = (remedy("write_millimetres", text=f"{value:g}m{unit}"),) if thousandth else ()
+        yield name, because("program.value.range", *hint, key=name, value=value, least=least, most=most, unit=unit)
 
 
 def _tried(name: str, check: Callable[[], object]) -> Iterator[Wrong]:
@@ -121,9 +122,12 @@ def _tried(name: str, check: Callable[[], object]) -> Iterator[Wrong]:
     try:
         check()
     except BadArgument as error:
-        yield name, in_words_of_a_file(str(error).replace(f"{name}= ", f"{name} "))
+        yield name, in_words_of_a_file(error, name)
 
 
-def in_words_of_a_file(text: str) -> str:
+def in_words_of_a_file(error: BadArgument, name: str) -> Reason:
     """`write gemelo.mm(300)` is `write "300mm"` in a file."""
-    return re.sub(r"write gemelo\.(mm|deg)\(([^)]*)\)", r'write "\2\1"', text)
+    if error.reason.code != PLAIN:
+        return error.reason
+    text = str(error).replace(f"{name}= ", f"{name} ")
+    return plain(re.sub(r"write gemelo\.(mm|deg)\(([^)]*)\)", r'write "\2\1"', text))

@@ -44,7 +44,7 @@ def examples() -> dict[str, Reason]:
 def _names(text: str) -> dict[str, Value]:
     values: dict[str, Value] = {}
     for _, name, spec, _ in string.Formatter().parse(text):
-        if name and name not in ("causes", "remedies"):
+        if name and name not in ("causes", "lines", "remedies"):
             values.setdefault(name, 1 if spec and _is_number(spec) else name)
         if spec and "{" in spec:
             values |= dict.fromkeys((each for _, each, _, _ in string.Formatter().parse(spec) if each), "rad")

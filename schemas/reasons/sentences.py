@@ -59,10 +59,11 @@ class _Writer(string.Formatter):
 
     def sentence(self, reason: Explained) -> str:
         """With what would do behind it, where the template has no other place for that."""
-        causes = "; ".join(self.sentence(cause) for cause in reason.causes)
+        causes = [self.sentence(cause) for cause in reason.causes]
         remedies = self._either([self._filled(each, self._template(each.code), {}) for each in reason.remedies])
         found = self._template(reason.code)
-        text = self._filled(reason, found, {"causes": causes, "remedies": remedies})
+        within = {"causes": "; ".join(causes), "lines": "\n".join(causes), "remedies": remedies}
+        text = self._filled(reason, found, within)
         return text if not remedies or "{remedies}" in (found or "") else f"{text}; {remedies}"
 
     def _filled(self, what: Coded, found: str | None, within: Mapping[str, str]) -> str:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from gemelo import BadArgument
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.programs import Points, ProgramError
+from gemelo.schemas.reasons import because, remedy
 
 ROBOT = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 HERE = {"brazo_joint": 0.1, "antebrazo_joint": -0.2, "efector_joint": 0.05}
@@ -95,7 +96,7 @@ def test_what_can_be_no_name_is_refused(name: str, tmp_path: Path) -> None:
         ({"brazo_joint": 0.1}, "has no value for joint antebrazo_joint, efector_joint: a point has all joints"),
         ({**HERE, "codo": 0.1}, 'rm1 has no joint "codo"'),
         ({**HERE, "brazo_joint": float("nan")}, 'joint "brazo_joint" is nan: it must be finite'),
-        ({**HERE, "brazo_joint": 30.0}, 'joint "brazo_joint" = 30 rad is beyond its limits, -2.95 to 2.95 rad'),
+        ({**HERE, "brazo_joint": 30.0}, "= 30.0000 rad is beyond its limits, -2.9500 rad to 2.9500 rad"),
     ],
 )
 def test_a_point_where_the_arm_cannot_be_is_refused(joints: dict[str, float], said: str, tmp_path: Path) -> None:
@@ -159,13 +160,15 @@ def test_all_mistakes_of_a_file_of_points_are_told_at_once_with_their_lines(tmp_
     (tmp_path / "rm1.points.toml").write_text(WRONG)
     with pytest.raises(ProgramError) as told:
         Points.load(tmp_path, ROBOT)
-    assert [(mistake.line, mistake.what.split(":")[0]) for mistake in told.value.mistakes] == [
-        (1, "version = 3"),
-        (2, "these are points of 'rm2', and the robot is 'rm1'"),
-        (3, 'unknown key "pints"; did you mean "points"?'),
-        (5, 'point "a" has no value for joint efector_joint'),
-        (7, 'point "b"'),
-        (8, 'point "c" has no joints, as joints = {brazo_joint = 0.5}'),
-        (12, 'point "d"'),
-        (14, "the point's name 'e\\x01' has the control character '\\x01' in it"),
+    assert [(mistake.line, mistake.what) for mistake in told.value.mistakes] == [
+        (1, because("file.version.other", value="3", known=1)),
+        (2, because("point.robot.other", robot="rm2", present="rm1")),
+        (3, because("file.key.unknown", remedy("did_you_mean", name="points"), key="pints")),
+        (5, because("point.joint.missing", point="a", joints=("efector_joint",))),
+        (7, because("point.joint.number", point="b", joint="brazo_joint", value="nan")),
+        (8, because("point.joint.none", point="c", example="{brazo_joint = 0.5}")),
+        (12, because("point.picture.place", point="d", value="'../../etc/passwd'")),
+        (14, because("program.name.control", kind="point", name="e\x01", character="\x01")),
     ]
+    assert told.value.reason.code == "file.mistakes"
+    assert str(told.value).splitlines() == [str(mistake) for mistake in told.value.mistakes]

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo import BadArgument, Error
+from gemelo import BadArgument
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.toml_lines import toml_lines
 from gemelo.programs import (
@@ -41,8 +41,10 @@ from gemelo.programs import (
     read_program,
     words_of,
 )
-from gemelo.programs.reading import parse_program
-from gemelo.programs.steps import KINDS
+from gemelo.programs.mistakes import Mistake
+from gemelo.programs.reading import A_STEP, BY_KIND, parse_program
+from gemelo.programs.steps import GOALS, KINDS
+from gemelo.schemas.reasons import FrontEnd, Reason, Remedy, because, remedy, say
 from tests.table import table
 
 ROBOT = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
@@ -121,103 +123,270 @@ def test_lines_are_found_in_every_way_of_writing_toml() -> None:
     assert (lines["h", 0, "i"], lines["h", 1, "j", 0, "i"], lines["h", 1, "j", 0, "q", "z"]) == (11, 15, 17)
 
 
+def near(name: str) -> Remedy:
+    return remedy("did_you_mean", name=name)
+
+
+def known(*names: str) -> Remedy:
+    return remedy("known_are", names=names)
+
+
 HEAD = "version = 1\n"
 ONE = 'version = 1\nsteps = [\n  {do = "go", state = "ready"},\n  %s,\n]\n'
-MISTAKES = [
-    ("version = 2\n", 1, "version = 2: this gemelo reads version = 1"),
-    ("steps = []\n", 0, "no version is given"),
-    ("version = true\n", 1, "version = True"),
-    (HEAD + "steps = [\n", 2, "this is not TOML: "),
-    (HEAD + "steps = [{do = }]\n", 2, "this is not TOML: Invalid value (column 16)"),
-    (HEAD + "steps = " + "[" * 5000 + "]" * 5000, 0, "nested far too deep"),
-    (HEAD + "stesp = []\n", 2, 'unknown key "stesp"; did you mean "steps"?'),
-    (HEAD + "steps = 3\n", 2, "steps = 3 is no list of steps"),
-    (HEAD + "robot = 3\n", 2, "robot = 3 is not a text in quotes"),
-    (HEAD + 'robot = "rm2"\n', 2, 'it is for robot "rm2", and this one is "rm1"'),
-    (ONE % "7", 4, "7 is no step"),
-    (ONE % '{state = "ready"}', 4, "a step says what it does: do = one of go, line, arc"),
-    (ONE % '{do = "goo", state = "ready"}', 4, 'there is no step "goo"; did you mean "go"?'),
-    (ONE % "{do = 3}", 4, "do = 3 is not one of"),
-    (ONE % '{do = "go", stat = "ready"}', 4, 'go has no key "stat"; did you mean "state"?'),
-    (ONE % '{do = "go"}', 4, "a motion goes to one of point, state, joints, position, offset: none is given"),
-    (ONE % '{do = "go", state = "ready", point = "x"}', 4, "not point and state at once"),
-    (ONE % '{do = "go", state = "redy"}', 4, 'rm1 has no named state "redy"; did you mean "ready"?'),
-    (ONE % '{do = "go", point = "above box"}', 4, 'no point "above box" of rm1; did you mean "above the box"?'),
-    (ONE % '{do = "go", point = "a\\u0000b"}', 4, 'no point "a\0b" of rm1'),
+MISTAKES: list[tuple[str, int, Reason | str]] = [  # by its reason; by words of the API where it has no code
+    ("version = 2\n", 1, because("file.version.other", value="2", known=1)),
+    ("steps = []\n", 0, because("file.version.none", known=1)),
+    ("version = true\n", 1, because("file.version.other", value="True", known=1)),
+    (HEAD + "steps = [\n", 2, because("file.toml.end", problem="Invalid value")),
+    (HEAD + "steps = [{do = }]\n", 2, because("file.toml.syntax", problem="Invalid value", column=16)),
+    (HEAD + "steps = " + "[" * 5000 + "]" * 5000, 0, because("file.toml.nested")),
+    (HEAD + "stesp = []\n", 2, because("file.key.unknown", near("steps"), key="stesp")),
+    (HEAD + "steps = 3\n", 2, because("program.steps.kind", value="3", example='[{do = "go", state = "ready"}]')),
+    (HEAD + "robot = 3\n", 2, because("program.value.kind", key="robot", value="3", expected="expected.text")),
+    (HEAD + 'robot = "rm2"\n', 2, because("program.robot.other", robot="rm2", present="rm1")),
+    (ONE % "7", 4, because("program.step.kind", value="7", example=A_STEP)),
+    (ONE % '{state = "ready"}', 4, because("program.step.no_kind", known=tuple(BY_KIND))),
+    (ONE % '{do = "goo", state = "ready"}', 4, because("program.step.unknown", near("go"), step="goo")),
+    (ONE % "{do = 3}", 4, because("program.step.kind_of_kind", value="3", known=tuple(BY_KIND))),
+    (ONE % '{do = "go", stat = "ready"}', 4, because("program.step.key", near("state"), step="go", key="stat")),
+    (ONE % '{do = "go"}', 4, because("program.goal.none", known=GOALS)),
+    (
+        ONE % '{do = "go", state = "ready", point = "x"}',
+        4,
+        because("program.goal.several", known=GOALS, given=("point", "state")),
+    ),
+    (ONE % '{do = "go", state = "redy"}', 4, because("program.state.unknown", near("ready"), robot="rm1", name="redy")),
+    (
+        ONE % '{do = "go", point = "above box"}',
+        4,
+        because("point.unknown", near("above the box"), point="above box", robot="rm1"),
+    ),
+    (
+        ONE % '{do = "go", point = "a\\u0000b"}',
+        4,
+        because("point.unknown", known("above the box"), point="a\x00b", robot="rm1"),
+    ),
     (ONE % '{do = "go", joints = {brazo = 1}}', 4, 'rm1 has no joint "brazo"; did you mean "brazo_joint"?'),
     (ONE % '{do = "go", joints = {brazo_joint = 30}}', 4, 'if it is in degrees, write "30deg"'),
     (
         ONE % '{do = "go", joints = {brazo_joint = "200deg"}}',
         4,
-        "= 3.49066 rad is beyond its limits, -2.95 to 2.95 rad",
+        because(
+            "program.joint.limits", joint="brazo_joint", value=3.490658503988659, lower=-2.95, upper=2.95, unit="rad"
+        ),
     ),
-    (ONE % '{do = "go", joints = {brazo_joint = nan}}', 4, 'joint "brazo_joint" is nan: it must be finite'),
-    (ONE % '{do = "go", joints = [1, 2, 3]}', 4, "joints = [1, 2, 3] is not numbers by joint"),
+    (
+        ONE % '{do = "go", joints = {brazo_joint = nan}}',
+        4,
+        because("program.joint.not_finite", joint="brazo_joint", value="nan"),
+    ),
+    (
+        ONE % '{do = "go", joints = [1, 2, 3]}',
+        4,
+        because(
+            "program.value.kind_and_unit",
+            key="joints",
+            value="[1, 2, 3]",
+            expected="expected.by_joint",
+            unit="rad or m",
+        ),
+    ),
     (ONE % '{do = "go", position = [300, 0, 100]}', 4, 'position has 300 m: if it is in millimetres, write "300mm"'),
-    (ONE % '{do = "go", position = [0.3, 0.1]}', 4, "position = [0.3, 0.1] is not three numbers"),
+    (
+        ONE % '{do = "go", position = [0.3, 0.1]}',
+        4,
+        because("program.value.kind_and_unit", key="position", value="[0.3, 0.1]", expected="expected.three", unit="m"),
+    ),
     (ONE % '{do = "go", position = [0.3, inf, 0.1]}', 4, "position[1] is inf: it must be finite"),
-    (ONE % '{do = "go", position = [0.3, "5kg", 0.1]}', 4, "'5kg' has none of the units m, cm, mm"),
+    (
+        ONE % '{do = "go", position = [0.3, "5kg", 0.1]}',
+        4,
+        because(
+            "program.value.no_unit",
+            because("program.value.unit", value="'5kg'", known=("m", "cm", "mm")),
+            key="position",
+            value="[0.3, '5kg', 0.1]",
+            expected="expected.three",
+            unit="m",
+        ),
+    ),
     (ONE % '{do = "go", position = [0.3, 0, 0.1], orientation = [0, 0, 0, 2]}', 4, "a quaternion of length 2.0000"),
     (ONE % '{do = "go", position = [0.3, 0, 0.1], rpy = [90, 0, 0]}', 4, 'write "90deg"'),
-    (ONE % '{do = "go", state = "ready", rpy = [0, 0, 0]}', 4, "give position too"),
-    (ONE % '{do = "go", state = "ready", blend = 20}', 4, 'blend = 20 m is not 0 to 1 m: if it is in mm, write "20mm"'),
-    (ONE % '{do = "go", state = "ready", blend = true}', 4, "blend = True is not a number, in m or with its unit"),
-    (ONE % '{do = "line", offset = [0, 0, 0.1], frame = "efector"}', 4, 'did you mean "efector_link"?'),
-    (ONE % '{do = "line", state = "ready", tool_speed = 50}', 4, 'if it is in mm, write "50mm/s"'),
-    (ONE % '{do = "arc", position = [0.3, 0, 0.1]}', 4, "an arc goes by one of through and center"),
-    (ONE % '{do = "arc", state = "ready", through = [0, 0.2, 0]}', 4, "an arc is the tool's"),
-    (ONE % '{do = "output", name = "avanza", on = true}', 4, 'rm1 has no output "avanza"; did you mean "avanzar"?'),
-    (ONE % '{do = "output", name = "avanzar"}', 4, 'output needs "on": true or false'),
-    (ONE % '{do = "output", name = "avanzar", on = "yes"}', 4, "on = 'yes' is not true or false"),
-    (ONE % '{do = "grip", to = "shut"}', 4, 'to = \'shut\' is not "open", "close" or a length'),
+    (ONE % '{do = "go", state = "ready", rpy = [0, 0, 0]}', 4, because("program.turn.position", key="rpy")),
+    (
+        ONE % '{do = "go", state = "ready", blend = 20}',
+        4,
+        because(
+            "program.value.range",
+            remedy("write_millimetres", text="20mm"),
+            key="blend",
+            value=20.0,
+            least=0.0,
+            most=1.0,
+            unit="m",
+        ),
+    ),
+    (
+        ONE % '{do = "go", state = "ready", blend = true}',
+        4,
+        because("program.value.kind_and_unit", key="blend", value="True", expected="expected.number", unit="m"),
+    ),
+    (
+        ONE % '{do = "line", offset = [0, 0, 0.1], frame = "efector"}',
+        4,
+        because("program.link.unknown", near("efector_link"), robot="rm1", name="efector"),
+    ),
+    (
+        ONE % '{do = "line", state = "ready", tool_speed = 50}',
+        4,
+        because(
+            "program.value.range",
+            remedy("write_millimetres", text="50mm/s"),
+            key="tool_speed",
+            value=50.0,
+            least=0.0,
+            most=5.0,
+            unit="m/s",
+        ),
+    ),
+    (ONE % '{do = "arc", position = [0.3, 0, 0.1]}', 4, because("program.arc.by")),
+    (ONE % '{do = "arc", state = "ready", through = [0, 0.2, 0]}', 4, because("program.arc.goal")),
+    (
+        ONE % '{do = "output", name = "avanza", on = true}',
+        4,
+        because("program.output.unknown", near("avanzar"), robot="rm1", name="avanza"),
+    ),
+    (
+        ONE % '{do = "output", name = "avanzar"}',
+        4,
+        because("program.step.needs", step="output", key="on", expected="expected.boolean"),
+    ),
+    (
+        ONE % '{do = "output", name = "avanzar", on = "yes"}',
+        4,
+        because("program.value.kind", key="on", value="'yes'", expected="expected.boolean"),
+    ),
+    (
+        ONE % '{do = "grip", to = "shut"}',
+        4,
+        because(
+            "program.value.no_unit",
+            because("program.value.unit", value="'shut'", known=("m", "cm", "mm")),
+            key="to",
+            value="'shut'",
+            expected="expected.opening",
+            unit="m",
+        ),
+    ),
     (ONE % '{do = "grip", to = "90mm"}', 4, "grip(0.09) is not 0 to 0.05 m between the jaws"),
     (ONE % '{do = "grip", to = 25}', 4, "25 mm is 0.025"),
     (ONE % '{do = "grip", to = nan}', 4, "finite"),
-    (ONE % '{do = "grip"}', 4, 'grip needs "to"'),
-    (ONE % '{do = "wait", time = nan}', 4, "time is nan: it must be finite"),
-    (ONE % '{do = "wait", time = -1}', 4, "time = -1 s is not 0 to 86400 s"),
-    (ONE % '{do = "wait", time = 1e300}', 4, "time = 1e+300 s is not 0 to 86400 s"),
-    (ONE % '{do = "wait_for", sensor = "ultr", above = 3}', 4, 'rm1 has no sensor "ultr"; did you mean "ultra"?'),
-    (ONE % '{do = "wait_for", sensor = "ultra"}', 4, "one of above and below"),
+    (
+        ONE % '{do = "grip"}',
+        4,
+        because("program.step.needs_with_unit", step="grip", key="to", expected="expected.opening", unit="m"),
+    ),
+    (ONE % '{do = "wait", time = nan}', 4, because("program.value.not_finite", key="time", value="nan")),
+    (
+        ONE % '{do = "wait", time = -1}',
+        4,
+        because("program.value.range", key="time", value=-1.0, least=0.0, most=86400.0, unit="s"),
+    ),
+    (
+        ONE % '{do = "wait", time = 1e300}',
+        4,
+        because("program.value.range", key="time", value=1e300, least=0.0, most=86400.0, unit="s"),
+    ),
+    (
+        ONE % '{do = "wait_for", sensor = "ultr", above = 3}',
+        4,
+        because("program.sensor.unknown", near("ultra"), robot="rm1", name="ultr"),
+    ),
+    (ONE % '{do = "wait_for", sensor = "ultra"}', 4, because("program.wait_for.bound")),
     (
         ONE % '{do = "speed", share = 50}',
         4,
-        'share = 50 is not a share in per cent, as "50%": write it in per cent: "50%"',
+        because(
+            "program.value.no_share",
+            because("program.value.percent", text="50%"),
+            key="share",
+            value="50",
+            expected="expected.share",
+        ),
     ),
-    (ONE % '{do = "speed", share = "0%"}', 4, "share = 0% is not above 0%"),
-    (ONE % '{do = "speed", share = "150%"}', 4, "share = 150% is not above 0% and at most 100%"),
-    (ONE % '{do = "attach", object = "cup", link = "hand"}', 4, 'rm1 has no link "hand"'),
-    (ONE % '{do = "repeat", count = 0, steps = [{do = "wait", time = 1}]}', 4, "count = 0 is not 1 to"),
-    (ONE % '{do = "repeat", count = 2.5, steps = []}', 4, "count = 2.5 is not a whole number"),
-    (ONE % '{do = "repeat", count = 2, steps = []}', 4, "a repeat needs steps"),
-    (ONE % ('{do = "repeat", count = 2, steps = [' * 12 + "]}" * 12), 4, "repeats are nested more than 8 deep"),
-    (ONE % '{do = "call", program = "nobody"}', 4, 'no program "nobody"'),
-    (ONE % '{do = "call", program = "../x"}', 4, "has / in it: it becomes the name of a file"),
-    (ONE % '{do = "call", program = "a\\u0000"}', 4, "has the control character '\\x00' in it"),
-    (ONE % '{do = "call", program = "me"}', 4, 'this would never end: "me" calls "me"'),
-    (HEAD + "steps = [" + '{do = "wait", time = 1},' * 2001 + "]", 2, "a program has at most 2000 steps"),
+    (ONE % '{do = "speed", share = "0%"}', 4, because("program.speed.share", value=0.0)),
+    (ONE % '{do = "speed", share = "150%"}', 4, because("program.speed.share", value=1.5)),
+    (
+        ONE % '{do = "attach", object = "cup", link = "hand"}',
+        4,
+        because(
+            "program.link.unknown",
+            known("antebrazo_link", "base_link", "brazo_link", "efector_link"),
+            robot="rm1",
+            name="hand",
+        ),
+    ),
+    (
+        ONE % '{do = "repeat", count = 0, steps = [{do = "wait", time = 1}]}',
+        4,
+        because("program.repeat.count", value=0, limit=1000000),
+    ),
+    (
+        ONE % '{do = "repeat", count = 2.5, steps = []}',
+        4,
+        because("program.value.kind", key="count", value="2.5", expected="expected.integer"),
+    ),
+    (ONE % '{do = "repeat", count = 2, steps = []}', 4, because("program.repeat.empty")),
+    (ONE % ('{do = "repeat", count = 2, steps = [' * 12 + "]}" * 12), 4, because("program.repeat.nested", limit=8)),
+    (ONE % '{do = "call", program = "nobody"}', 4, because("program.unknown", known("me"), program="nobody")),
+    (ONE % '{do = "call", program = "../x"}', 4, because("program.name.characters", name="../x", characters="/")),
+    (
+        ONE % '{do = "call", program = "a\\u0000"}',
+        4,
+        because("program.name.control", kind="program", name="a\x00", character="\x00"),
+    ),
+    (ONE % '{do = "call", program = "me"}', 4, because("program.calls.endless", programs=("me", "me"))),
+    (HEAD + "steps = [" + '{do = "wait", time = 1},' * 2001 + "]", 2, because("program.steps.many", limit=2000)),
 ]
 
 
-@table(("text", "line", "said"), MISTAKES, ids=[said[:50] for _, _, said in MISTAKES])
-def test_a_mistake_is_told_with_file_line_and_remedy(text: str, line: int, said: str, tmp_path: Path) -> None:
+def is_for(mistake: Mistake, why: Reason | str) -> bool:
+    return mistake.what == why if isinstance(why, Reason) else why in str(mistake.what)
+
+
+@table(("text", "line", "why"), MISTAKES, ids=[str(why)[:50] for _, _, why in MISTAKES])
+def test_a_mistake_is_reported_with_file_line_and_reason(
+    text: str, line: int, why: Reason | str, tmp_path: Path
+) -> None:
     file = tmp_path / "me.toml"
     file.write_text(text)
     found = find_mistakes_in_file(file, ROBOT, POINTS, Programs(tmp_path))
-    told = [mistake for mistake in found if said in mistake.what]
+    told = [mistake for mistake in found if is_for(mistake, why)]
     assert told, found
     assert told[0].line == line
     assert str(told[0]).startswith(f"{file}, line {line}: " if line else f"{file}: ")
 
 
+def test_a_mistake_is_a_sentence_in_each_language_with_the_names_as_the_file_has_them(tmp_path: Path) -> None:
+    file = tmp_path / "me.toml"
+    file.write_text(ONE % '{do = "go", joints = {brazo_joint = "200deg"}}')
+    [mistake] = find_mistakes_in_file(file, ROBOT, POINTS, Programs(tmp_path))
+    assert str(mistake) == (
+        f'{file}, line 4: step 2: joint "brazo_joint" = 3.4907 rad is beyond its limits, -2.9500 rad to 2.9500 rad'
+    )
+    assert say(mistake.reason, "es", FrontEnd.PAGE) == (
+        f"{file}, línea 4, paso 2: brazo_joint = 200.0° está más allá de sus límites, -169.0° a 169.0°"
+    )
+
+
 def test_all_mistakes_of_a_file_are_told_at_once(tmp_path: Path) -> None:
-    wrong = [(text, said) for text, line, said in MISTAKES if line == 4]
+    wrong = [(text, why) for text, line, why in MISTAKES if line == 4]
     rows = [text.splitlines()[3] for text, _ in wrong]
     file = tmp_path / "me.toml"
     file.write_text(HEAD + "steps = [\n" + "\n".join(rows) + "\n]\n")
     found = find_mistakes_in_file(file, ROBOT, POINTS, Programs(tmp_path))
-    for row, (_, said) in enumerate(wrong, start=3):
-        assert any(mistake.line == row and said in mistake.what for mistake in found), (row, said)
+    for row, (_, why) in enumerate(wrong, start=3):
+        assert any(mistake.line == row and is_for(mistake, why) for mistake in found), (row, why)
     assert [mistake.line for mistake in found] == sorted(mistake.line for mistake in found)
 
 
@@ -227,7 +396,7 @@ def test_calls_in_a_circle_are_refused_by_name(tmp_path: Path) -> None:
     programs = Programs(tmp_path)
     [mistake] = find_mistakes(programs["one"], ROBOT, POINTS, programs)
     assert str(mistake).startswith(f"{tmp_path / 'three.toml'}, line 4: step 1: ")
-    assert '"two" calls "three" calls "two"' in mistake.what
+    assert mistake.what == because("program.calls.endless", programs=("two", "three", "two"))
 
 
 def test_calls_that_are_too_deep_are_refused(tmp_path: Path) -> None:
@@ -235,7 +404,7 @@ def test_calls_that_are_too_deep_are_refused(tmp_path: Path) -> None:
         Program(f"p{number}", (Call(program=f"p{number + 1}"),)).save(tmp_path)
     programs = Programs(tmp_path)
     [mistake] = find_mistakes(programs["p0"], ROBOT, POINTS, programs)
-    assert "calls are more than 8 deep: p0, p1" in mistake.what
+    assert mistake.what == because("program.calls.nested", programs=tuple(f"p{number}" for number in range(9)), limit=8)
 
 
 def test_the_mistakes_of_a_called_program_are_told_with_its_own_file(tmp_path: Path) -> None:
@@ -284,7 +453,7 @@ def test_files_whose_names_or_contents_are_no_programs_leave_the_others_as_they_
     programs = Programs(tmp_path)
     assert list(programs) == ["a", "e"]
     [mistake] = find_mistakes_in_file(programs.file("e"), ROBOT, POINTS, programs)
-    assert str(mistake).startswith(f"{tmp_path / 'e.toml'}: is no UTF-8 text")
+    assert mistake.what.code == "file.encoding.byte"
 
 
 def test_a_folder_that_can_be_none_is_refused(tmp_path: Path) -> None:
@@ -297,11 +466,13 @@ def test_a_folder_that_can_be_none_is_refused(tmp_path: Path) -> None:
 
 def test_a_file_that_is_no_text_or_far_too_large_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(Error, match="is no UTF-8 text"):
+    with pytest.raises(ProgramError) as caught:
         read_program(tmp_path / "a.toml")
+    assert caught.value.mistakes[0].what == because("file.encoding.other", remedy("save_as_utf8"), encoding="UTF-16")
     (tmp_path / "b.toml").write_bytes(b"#" * 1_000_001)
-    with pytest.raises(Error, match="1000001 bytes"):
+    with pytest.raises(ProgramError) as caught:
         read_program(tmp_path / "b.toml")
+    assert caught.value.mistakes[0].what == because("file.size", size=1_000_001, limit=1_000_000)
 
 
 def test_a_file_that_is_saved_again_keeps_its_place(tmp_path: Path) -> None:

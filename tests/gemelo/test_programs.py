@@ -39,6 +39,7 @@ from gemelo.programs import (
 )
 from gemelo.programs.steps import AnyStep
 from gemelo.schemas.device import DeviceMode, DeviceState
+from gemelo.schemas.reasons import because
 from tests.gemelo.test_docstrings import OPTIONS
 from tests.simulated import is_moving, make_ready, rests
 
@@ -211,6 +212,7 @@ def test_a_stop_decelerates_and_nothing_begins_again_by_itself(cell: Cell) -> No
     run.stop()
     state = run.wait(60.0)
     assert state.status is RunStatus.STOPPED
+    assert state.why == because("program.run.stopped_in_round", step="1.2", round="1", text="go state='ready'")
     assert state.message == "stopped in step 1.2, round 1 (go state='ready')"
     assert rests(cell.arm, 0.2)
     with pytest.raises(gemelo.Error, match="is stopped, not paused"):
@@ -274,8 +276,12 @@ def test_a_leg_that_cannot_be_is_found_by_the_check_and_by_the_run_at_its_step(c
     )
     check = check_program(cell.arm, Program("job", steps), cell.points, cell.programs)
     assert {leg.path for leg in check.legs if not leg.ok} == {(1, 0), (1, 1), (2,)}
-    assert "step 2.1 (go state='left'): refused" in check.refusals[0]
-    assert "step 3 (go position=(0.7, 0, 0.1)): refused (reach)" in check.refusals[-1]
+    first, last = check.refusals[0], check.refusals[-1]
+    assert (first.code, first.values) == ("program.step.failed", {"step": "2.1", "text": "go state='left'"})
+    assert (last.code, last.values) == ("program.step.failed", {"step": "3", "text": "go position=(0.7, 0, 0.1)"})
+    refusals = [leg.refusal for leg in check.legs if leg.refusal is not None]
+    assert [reason.causes for reason in check.refusals] == [(refusal.reason,) for refusal in refusals]
+    assert refusals[-1].check == "reach"
     run = cell.run(*steps)
     run.start()
     state = run.wait(LONGEST)
@@ -311,4 +317,7 @@ def test_a_sensor_is_waited_for_and_its_time_runs_out(cell: Cell) -> None:
     assert run.wait(60.0).status is RunStatus.DONE
     again = cell.run(WaitFor(sensor="ultra", below=1.0, timeout=0.3))
     again.start()
-    assert again.wait(10.0).message.endswith("not below 1, after 0.3 s")
+    why = again.wait(10.0).why
+    assert why is not None
+    limits = {"sensor": "ultra", "value": pytest.approx(3.0, abs=0.01), "limit": 1.0, "time": 0.3}
+    assert [(cause.code, cause.values) for cause in why.causes] == [("program.sensor.not_below", limits)]

@@ -119,14 +119,11 @@ WITHIN_OTHERS = {  # parts of sentences, which are tested as a whole below
     "devices": '{} devices call themselves "{}": {}: {}',
     "not usable": "the device is {}",
     "heard": 'device "{}" has not been heard: {}',
-    "goals": "a motion goes to one of {}: {}",
     "gone": "{} for {} s: take control anew with `gemelo control take --force`",
     "seen": "{} is not seen by {}{}: is it in the image, lit, and not behind the arm? `gemelo camera view`",
     "picked": "{} is at {}: seen +-{} mm{}{}, {} s{}",
     "unseen": "{}; not seen afterwards: {}",
     "mesh": "if it is drawn in mm, give scale=0.001",
-    "expected": 'a share in per cent, as "50%"',
-    "expected list": "a list of steps",
     "configuration": "the device refused the configuration: {}{}",
 }
 NOT_ON_THE_PAGE = {  # of files, logs and clients that a page does not have, and arguments that only a script gives
@@ -145,7 +142,6 @@ NOT_ON_THE_PAGE = {  # of files, logs and clients that a page does not have, and
     "gemelo/api/robot_files.py": ("no router at",),
     "gemelo/api/planning.py": ("{} holds no plan",),
     "gemelo/programs/export.py": ("if __name__",),
-    "gemelo/programs/program.py": ('program "{}" was read from no file',),
     "gemelo/api/scene.py": ("attach=True needs frame=",),
     "gemelo/api/session.py": ("this connection belongs to process", "this waits for messages"),
     "gemelo/api/simulation.py": ("motors: ", "press(", "start", 'there is no "{}" to press', "wire="),
@@ -277,13 +273,11 @@ BEYOND = 'joint "a": 3.2000 rad is beyond the upper limit 2.9497 rad; stay withi
          "form nor begin with solid", "«x»: el archivo no sirve. No es un archivo STL (17 bytes)."),
         ('the emergency stop of device "x" was pressed: run `gemelo reset`, `gemelo device arm`, then `gemelo home` or '
          "`gemelo reference`", "Se pulsó la parada de emergencia del equipo «x»"),
-        ("a motion goes to one of point, state: none is given", "Falta adónde va"),
         ('device "x" has not been heard: is it switched on, does it use the same broker, and does the broker\'s ACL '
          "let it write?", "Aún no se oye al equipo «x»"),
         ('the clock of device "x" is not known yet: try again in a second', "Aún no se conoce el reloj del equipo «x»"),
         ("cup: it is seen 2 times: take the others away, or give each a tag of its own", "cup: se ve 2 veces"),
         ('"leg.stl" would be 60 m long: if it is drawn in mm, give scale=0.001', "elija mm"),
-        ('no point "a" of rm1; did you mean "b"?', "rm1 no tiene un punto «a». ¿Quiso decir «b»?"),
         ("aborted after 2.10 s: the device holds because it lost the gateway's heartbeat; then stopped by a device "
          "command (DISARM)", "Luego: Lo detuvo una orden al equipo (apagar los motores)."),
         ("homing refused: the device is in HOMING: wait, or arm.stop()", "«buscando el origen»"),

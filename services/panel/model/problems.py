@@ -51,9 +51,11 @@ def problem_of(error: Exception) -> Problem:
             error.subject, error.value, error.limit, reason=error.reason, code=error.code,
         )  # fmt: skip
     if isinstance(error, gemelo.Aborted):
-        return Problem(str(error), error.status.name.lower(), is_refusal=False, code=error.code)
+        return Problem(
+            str(error), error.status.name.lower(), is_refusal=False, code=error.code, reason=error.reason
+        )  # fmt: skip
     if isinstance(error, gemelo.Error):
-        return Problem(str(error), "lost" if isinstance(error, gemelo.Lost) else "argument")
+        return Problem(str(error), "lost" if isinstance(error, gemelo.Lost) else "argument", reason=error.reason)
     return Problem(f"{type(error).__name__}: {error}", "defect")
 
 

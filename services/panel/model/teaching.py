@@ -23,6 +23,7 @@ from gemelo.programs import (
     check_program,
     programs_folder,
 )
+from gemelo.schemas.reasons import because
 
 NEW = "program_1"
 
@@ -89,14 +90,14 @@ class Teaching:
     def new(self, name: str) -> None:
         """An empty one, which no file has yet."""
         if name in self.programs:
-            raise gemelo.BadArgument(f'there is a program "{name}": open it, or take another name')
+            raise gemelo.BadArgument(because("program.exists.open", program=name))
         self.edit(Program(name, ()), is_saved=False)
 
     def save(self, name: str) -> None:
         """Writes it, under its own or another name."""
         with self._lock:
             if name != self.program.name and name in self.programs:
-                raise gemelo.BadArgument(f'there is a program "{name}": remove it first, or take another name')
+                raise gemelo.BadArgument(because("program.exists", program=name))
             program = replace(self.program, name=name)
             program.save(self.programs.folder)
             self.edit(program, is_saved=True, keep_check=True)
@@ -148,7 +149,7 @@ class Teaching:
         stops = self._stops
         with self._lock:
             if self.is_running:
-                raise gemelo.Error(f'program "{self.program.name}" runs already')
+                raise gemelo.Error(because("program.run.already", program=self.program.name))
             run = ProgramRun(
                 self._arm, self.program, self.points, self.programs, on_change=lambda state: self.changed()
             )
@@ -182,7 +183,7 @@ class Teaching:
 
     def _require_run(self) -> ProgramRun:
         if self.run is None or self.run.state.status.is_over:
-            raise gemelo.Error("no program runs")
+            raise gemelo.Error(because("program.run.none"))
         return self.run
 
     def _edit_steps(self, steps: tuple[AnyStep, ...]) -> None:
@@ -192,7 +193,7 @@ class Teaching:
         """Another program in the place of the open one; `is_saved` says if its file is like it."""
         with self._lock:
             if self.is_running:
-                raise gemelo.Error(f'program "{self.program.name}" runs: stop it before it is changed')
+                raise gemelo.Error(because("program.run.no_change", program=self.program.name))
             self.program, self.is_saved = program, is_saved
             if not keep_check:
                 self.check = None

@@ -319,4 +319,19 @@ _HINTS: dict[str, str] = {
     "{reason}; none is known": "{reason} No hay ninguno.",
 }
 
-WORK: dict[str, str] = _SCENE | _THINGS | _ASKED | _SILENT | _HINTS
+# Files and values that arguments of the API give
+_ARGUMENTS: dict[str, str] = {
+    '{robot} has no joint "{name}"': "{robot} no tiene una articulación «{name}».",
+    '{robot} has no link "{name}"': "{robot} no tiene un eslabón «{name}».",
+    '{robot} has no {kind} "{name}"': "{robot} no tiene {kind} «{name}».",
+    "say how the tool is turned once, not by {names}": "Diga una sola vez cómo se gira la herramienta, no con {names}.",
+    "{name} is {value}: it must be finite": "{name} es {value}: debe ser un número.",
+    'joint "{joint}" is {value}: it must be finite': "{joint} es {value}: debe ser un número.",
+    "{path} cannot be written: it is there already, and is no file": "{path} no se puede escribir: ya existe, y no es "
+    "un archivo.",
+    "{path} cannot be written: {error}": "{path} no se puede escribir ({error}).",
+    "{path} cannot be read: {error}": "{path} no se puede leer ({error}).",
+    "{reason}; {more}": "{reason} {more}",
+}
+
+WORK: dict[str, str] = _ARGUMENTS | _SCENE | _THINGS | _ASKED | _SILENT | _HINTS

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from msgspec.structs import replace
+
 from gemelo.schemas.actions import GoalStatusCode
-from gemelo.schemas.reasons import PLAIN, FrontEnd, say
+from gemelo.schemas.reasons import PLAIN, FrontEnd, plain, say
+from gemelo.schemas.reasons import Reason as Explained
 from gemelo.services.panel.model.availability import Reason
 from gemelo.services.panel.model.problems import Problem
 from gemelo.services.panel.words.en import ENGLISH
@@ -12,13 +15,12 @@ from gemelo.services.panel.words.es import SPANISH
 from gemelo.services.panel.words.es_device import FAULTS, GOAL_CODES, VALUES
 from gemelo.services.panel.words.es_gateway import GATEWAY
 from gemelo.services.panel.words.es_goals import GOALS
-from gemelo.services.panel.words.es_programs import PROGRAMS
 from gemelo.services.panel.words.es_refusals import REFUSALS
 from gemelo.services.panel.words.es_work import WORK
 from gemelo.services.panel.words.refusals import Joints, key_of, place_of, sentence_of
 from gemelo.services.panel.words.sentences import Language, Sentences
 
-SPANISH_SENTENCES = Sentences(GATEWAY | GOALS | FAULTS | PROGRAMS | WORK, VALUES)
+SPANISH_SENTENCES = Sentences(GATEWAY | GOALS | FAULTS | WORK, VALUES)
 LANGUAGES = {  # by the first part of a browser's language; the first one is that of all other browsers
     "en": Language("English", ENGLISH, ENGLISH_REFUSALS),
     "es": Language("Español", SPANISH, REFUSALS, SPANISH_SENTENCES, GOAL_CODES),
@@ -64,6 +66,15 @@ class Words:
             known = template if place is None else f"{self(place[0], **place[1])} {template}"
         return heading, known or self._told(problem)
 
+    def why(self, reason: Explained) -> str:
+        """The sentence of a reason; of causes that have no code, what `said` makes of them."""
+        return as_sentence(say(self._of_known(reason), self.language, FrontEnd.PAGE))
+
+    def _of_known(self, reason: Explained) -> Explained:
+        if reason.code == PLAIN:
+            return plain(self.said(str(reason)))
+        return replace(reason, causes=tuple(self._of_known(cause) for cause in reason.causes))
+
     def said(self, text: str) -> str:
         """What another part says, line by line; a line that this language does not have is left as it is."""
         return "\n".join(self._of.sentences.of(line) or self._with_buttons(line) for line in text.split("\n"))
@@ -82,7 +93,7 @@ class Words:
     def _told(self, problem: Problem) -> str:
         """By the sentence; where that is not known, by the code, with the sentence as it came."""
         if problem.reason is not None and problem.reason.code != PLAIN:
-            return as_sentence(say(problem.reason, self.language, FrontEnd.PAGE))
+            return self.why(problem.reason)
         of = self._of.sentences.of
         known = of(problem.text) or of(str(problem.reason or ""))
         about = self._of.codes.get(problem.code)

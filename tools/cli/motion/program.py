@@ -191,7 +191,7 @@ def _verdict(check: ProgramCheck) -> str:
     note = f"\n{check.note}" if check.note else ""
     if check.ok:
         return f"{check.program}: it can run, {check.duration:.2f} s{note}"
-    return "\n".join([f"{check.program}: it cannot run", *map(str, check.mistakes), *check.refusals]) + note
+    return "\n".join([f"{check.program}: it cannot run", *map(str, check.mistakes), *map(str, check.refusals)]) + note
 
 
 def _check_fields(check: ProgramCheck) -> dict[str, object]:

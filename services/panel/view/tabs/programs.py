@@ -111,14 +111,17 @@ class ProgramsTab:
         if state.failure is not None:
             text = words.problem(problem_of(state.failure))[1]
             return words("at_step", step=step, text=text) if step else text
-        return words("in_step", step=step) if state.status is RunStatus.STOPPED and step else words.said(state.message)
+        if state.status is RunStatus.STOPPED and step:
+            return words("in_step", step=step)
+        return words.why(state.why) if state.why is not None else ""
 
     def _check_text(self, check: ProgramCheck | None) -> str:
         if check is None:
             return ""
         words = self._kit.words
-        notes = dict.fromkeys(filter(None, (*(leg.note for leg in check.legs), check.note)))
-        told = [words.said(str(mistake)) for mistake in check.mistakes]
+        notes = [note for leg in check.legs for note in leg.notes]
+        notes += [check.left_out] if check.left_out is not None else []
+        told = [words.why(mistake.reason) for mistake in check.mistakes]
         for leg in check.legs:
             if leg.refusal is not None:
                 text = words.problem(problem_of(leg.refusal))[1]
@@ -126,7 +129,7 @@ class ProgramsTab:
         if check.ok:
             told.append(words("check_ok", duration=f"{check.duration:.1f}"))
         said = box("<br>".join(map(esc, told)), "#2f9e44" if check.ok else "#e03131")
-        return said + note("<br>".join(esc(words.said(each)) for each in notes))
+        return said + note("<br>".join(dict.fromkeys(esc(words.why(each)) for each in notes)))
 
     def _list_text(self, state: RunState | None) -> str:
         teaching = self._teaching
