@@ -11,9 +11,10 @@ from gemelo.api.arguments import Target
 from gemelo.api.errors import BadArgument
 from gemelo.api.parts import Parts
 from gemelo.api.units import Pose
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
 from gemelo.schemas.joints import JointState
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import (
     DEVICE_STATUS,
     GRIPPER_STATE,
@@ -418,7 +419,7 @@ class Arm:
         'SUCCEEDED'
         """
         if (through is None) == (center is None):
-            raise BadArgument("an arc goes by one of through= and center=")
+            raise BadArgument(because("argument.arc", choices=("through", "center")))
         target = api.targets.as_target(goal)
         if isinstance(to, Pose):
             target["pose"] = to
@@ -454,7 +455,7 @@ class Arm:
         'SUCCEEDED'
         """
         if not waypoints:
-            raise BadArgument("a path needs at least one point")
+            raise BadArgument(because("argument.path.no_point"))
         target.update(_goal_of(waypoints[-1]))
         if len(waypoints) > 1:
             target["via"] = tuple(waypoints[:-1])
@@ -483,7 +484,7 @@ class Arm:
         if request is None:
             request = api.targets.request_of(self.description, target, self._parts.frames.look_up)
         elif target:
-            raise BadArgument(f"plan a request, or say where to: not both, as {next(iter(target))}= does")
+            raise BadArgument(because("argument.goal.request", given=next(iter(target))))
         with api.control.named_where_another_moves(self._parts.control, self.name):
             return api.planning.make_plan(self._session, request, target, on_progress)
 
@@ -532,7 +533,7 @@ class Arm:
         ('SUCCEEDED', 'SUCCEEDED')
         """
         if (plan is None) == (not target):
-            raise BadArgument("start a plan, or say where to: not both, not none")
+            raise BadArgument(because("argument.goal.plan"))
         if target and after is not None and "from_joints" not in target:
             target["from_joints"] = after.plan.end
         if target and after is None:
@@ -603,7 +604,7 @@ class Arm:
         if command is None:
             command = api.jog.jog_command(self.description, joints, twist, frame)
         elif joints is not None or twist is not None or frame:
-            raise BadArgument("jog by a command, or by joints= or twist=: not both")
+            raise BadArgument(because("argument.jog.command", others=("joints", "twist")))
         self._parts.require_motion()
         if duration is None:
             return self._parts.jogging.say(command)
@@ -702,8 +703,7 @@ class Arm:
         >>> arm.speed(1.0)
         """
         if not 0.0 <= share <= 1.0:
-            hint = f": {share:g} per cent is {share / 100.0:g}" if 1.0 < share <= 100.0 else ""
-            raise BadArgument(f"speed({share:g}) is not in [0, 1], a share of the planned speed{hint}")
+            raise BadArgument(because("argument.speed", *api.targets.per_cent(share), value=share))
         self.device.command(SpeedCommand(scale=float(share)))
 
     def output(self, name: str, on: bool) -> None:
@@ -714,7 +714,7 @@ class Arm:
         """
         known = [output.name for output in self.description.outputs]
         if name not in known:
-            raise BadArgument(f'{self.name} has no output "{name}"{suggestion(name, known)}')
+            raise BadArgument(because("argument.output.unknown", nearest(name, known), robot=self.name, name=name))
         self.device.command(OutputCommand(output=name, on=on), f"output {name}")
 
     # What it sees
@@ -794,7 +794,7 @@ class Arm:
                 self.description, goal, self._parts.frames.look_up, near, solutions, touching
             )
         elif goal or near is not None or solutions != 1 or touching:
-            raise BadArgument("ask with a request, or say where to: not both")
+            raise BadArgument(because("argument.goal.request", given=next(iter(goal))))
         return api.planning.find_configurations(self._session, request, goal)
 
     def fk(self, joints: Joints | None = None) -> Pose:

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from gemelo.api.arm import Arm
-from gemelo.api.errors import Error, Lost
+from gemelo.api.errors import Error, Lost, reason_of
 from gemelo.api.robot_files import Robot, find_robot, require_router
 from gemelo.api.session import Session, open_node
 from gemelo.libraries.runtime.deployment import is_loopback, load_deployment
@@ -61,7 +61,7 @@ def robots(deployment: str | Path | Deployment | None = None) -> tuple[str, ...]
         try:
             deployment = load_started() if deployment is None else load_deployment(Path(deployment))
         except (ValueError, OSError) as error:
-            raise Error(str(error)) from error
+            raise Error(reason_of(error)) from error
     return robots_on(deployment.router, GATEWAY)
 
 

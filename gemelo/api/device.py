@@ -8,7 +8,7 @@ from gemelo.api.errors import BadArgument, Lost, Refused
 from gemelo.api.homing import joint_name
 from gemelo.api.session import PATIENCE, Session
 from gemelo.api.targets import number
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import (
     ArmCommand,
@@ -30,6 +30,7 @@ from gemelo.schemas.device import (
 )
 from gemelo.schemas.device_faults import fault_text
 from gemelo.schemas.device_link import offline_text
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURATION,
@@ -181,7 +182,7 @@ class Device:
         """
         kinds = [kind.value for kind in InjectKind]
         if what not in kinds:
-            raise BadArgument(f'there is no "{what}" to inject{suggestion(what, kinds)}')
+            raise BadArgument(because("argument.inject.unknown", nearest(what, kinds), name=what))
         self._require_target(InjectKind(what), target)
         if self.status.online and not self.status.virtual:
             raise Refused(f"{self.status.device} is a real device: only a virtual one takes this", check="virtual")
@@ -230,9 +231,9 @@ class Device:
             InjectKind.SENSOR: [each.name for each in arm.sensors],
         }.get(kind)
         if known is None and target:
-            raise BadArgument(f'"{kind}" is done to the whole device, not to "{target}"')
+            raise BadArgument(because("argument.inject.whole_device", kind=kind.value, target=target))
         if known is not None and target not in known:
-            raise BadArgument(f'"{kind}" needs a target; there is no "{target}"{suggestion(target, known)}')
+            raise BadArgument(because("argument.inject.target", nearest(target, known), kind=kind.value, target=target))
 
 
 def fault_of(arm: ArmDescription, state: DeviceState) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from gemelo.api.arguments import Target
 from gemelo.schemas.actions import GoalStatusCode
@@ -20,6 +20,12 @@ if TYPE_CHECKING:
 def as_reason(text: Reason | str) -> Reason:
     """A sentence without a code is a reason too."""
     return text if isinstance(text, Reason) else plain(text)
+
+
+def reason_of(error: Exception) -> Reason:
+    """Why, as another part's error says it."""
+    found = getattr(error, "reason", None)
+    return found if isinstance(found, Reason) else plain(str(error))
 
 
 class Error(ReasonedError):
@@ -41,16 +47,6 @@ class Error(ReasonedError):
         return say(self.message, front_end=FrontEnd.SCRIPT)
 
 
-class ArgumentRange(NamedTuple):
-    """An argument whose `value` is out of its range; all in `unit`, "" for a number without one."""
-
-    argument: str
-    value: float
-    least: float  # 0: what is above it
-    most: float
-    unit: str
-
-
 class BadArgument(Error, ValueError):
     """An argument that cannot be meant: unknown, contradictory, not finite, or in another unit. Nothing was asked.
 
@@ -60,11 +56,6 @@ class BadArgument(Error, ValueError):
     ...     print(error)
     joint "brazo_joint": 30 rad is beyond its limits, ... rad: if it is in degrees, write gemelo.deg(30)
     """
-
-    def __init__(self, reason: Reason | str, remedy: str = "", out_of: ArgumentRange | None = None) -> None:
-        super().__init__(f"{reason}: {remedy}" if remedy else reason, reason)
-        self.out_of = out_of  # the range, where the argument is out of one
-        self.remedy = remedy  # what to write instead, which `reason` does not say; empty where that says it
 
 
 class Refused(Error):

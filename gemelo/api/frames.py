@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from gemelo.api.errors import BadArgument, Lost
+from gemelo.api.errors import BadArgument, Lost, reason_of
 from gemelo.api.session import PATIENCE, Session
 from gemelo.api.units import Pose, pose_from
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.frames.frame_buffer import FrameBuffer, FrameError
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import FRAMES, STATIC_FRAMES
 
 
@@ -30,8 +31,8 @@ class Frames:
         except FrameError as error:
             for name in (target, source):
                 if name not in (*known, *self._buffer.frames):
-                    raise BadArgument(f'there is no frame "{name}"{suggestion(name, known)}') from error
-            raise Lost(str(error)) from error
+                    raise BadArgument(because("argument.frame.unknown", nearest(name, known), name=name)) from error
+            raise Lost(reason_of(error)) from error
 
     def _is_there(self, target: str, source: str) -> bool:
         try:

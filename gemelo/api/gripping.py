@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from gemelo.api.arguments import Grip
-from gemelo.api.errors import Aborted, BadArgument, Canceled, Interrupted, Lost, Refused
+from gemelo.api.errors import Aborted, BadArgument, Canceled, Interrupted, Lost, Refused, reason_of
 from gemelo.api.motion import check_of
 from gemelo.api.scene import Scene
 from gemelo.api.session import Session
@@ -19,7 +19,7 @@ from gemelo.schemas.device import InjectKind, InjectRequest
 from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
 from gemelo.schemas.grippers.gripper import PulseDrive
 from gemelo.schemas.grippers.kinds import Gripper
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.scene import SceneGrip, SceneRelease
 from gemelo.schemas.topics import DEVICE_INJECT, DEVICE_STATUS, GRIPPER_COMMAND, GRIPPER_STATE
 
@@ -142,9 +142,9 @@ class Gripping:
             said = because("refused.by", error.reason, server=client.action.server)
             raise Refused(said, check=check, code=error.code, reason=error.reason) from error
         except runtime.RequestRefused as error:
-            raise Refused(str(error)) from error
+            raise Refused(reason_of(error)) from error
         except (runtime.NoAnswer, runtime.BusError) as error:
-            raise Lost(str(error)) from error
+            raise Lost(reason_of(error)) from error
         handle.on_end = self._session.notify
         return handle
 
@@ -179,10 +179,12 @@ def opening_of(gripper: Gripper, to: Grip) -> float:
     """[m] that "open", "close" or a length means; raises `BadArgument`."""
     if isinstance(to, str):
         if to not in (OPEN, CLOSE):
-            raise BadArgument(f'grip("{to}") is neither "open" nor "close": write one of them, or an opening in m')
+            raise BadArgument(because("argument.grip.word", value=to))
         return gripper.open if to == OPEN else gripper.closed
     position = number("grip", to)
     if not gripper.closed <= position <= gripper.open:
-        hint = f": {to:g} mm is {to / 1000.0:g}" if gripper.open < position <= 1000.0 * gripper.open else ""
-        raise BadArgument(f"grip({to:g}) is not {gripper.closed:g} to {gripper.open:g} m between the jaws{hint}")
+        is_other = gripper.open < position <= 1000.0 * gripper.open
+        hint = (remedy("millimetres_are", value=position, metres=position / 1000.0),) if is_other else ()
+        limits = {"least": gripper.closed, "most": gripper.open}
+        raise BadArgument(because("argument.grip.range", *hint, value=position, **limits))
     return position

@@ -6,10 +6,10 @@ import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 
-from gemelo.api.errors import Aborted, BadArgument, Interrupted, Refused
+from gemelo.api.errors import Aborted, Interrupted, Refused
 from gemelo.api.homing_report import HOME, OFF, TO, WAITS, HomingProgress, HomingReport
 from gemelo.api.session import Session
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.api.targets import require_joint
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device import DeviceCommand, DeviceEvent, DeviceMode, DeviceState, HomeCommand, StopKind
 from gemelo.schemas.device_faults import fault_text
@@ -121,8 +121,7 @@ def homing_joints(arm: ArmDescription, names: Iterable[str]) -> list[Joint]:
     """The joints to home: those named, or all that have a switch; raises `BadArgument` or `Refused`."""
     asked = []
     for name in names:
-        if name not in arm.joint_names:
-            raise BadArgument(f'{arm.name} has no joint "{name}"{suggestion(name, arm.joint_names)}')
+        require_joint(arm, name)
         asked.append(arm.joint(name))
     without = [joint.name for joint in asked if joint.drive.homing is None]
     if without:

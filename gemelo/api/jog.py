@@ -10,11 +10,12 @@ from msgspec.structs import replace
 from gemelo.api.arguments import Joints, Vector
 from gemelo.api.errors import BadArgument, Interrupted, Lost, Refused
 from gemelo.api.session import Session
-from gemelo.api.targets import joint_state, named_joints, vector
+from gemelo.api.targets import joint_state, named_joints, require_within, vector
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceEvent
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.planning import JogCommand, JogStatus
+from gemelo.schemas.reasons import Remedy, because, remedy
 from gemelo.schemas.topics import DEVICE_EVENTS, JOG, JOG_STATUS, JOINT_STATES, JOINT_TARGETS
 
 PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
@@ -118,7 +119,7 @@ class Streaming:
         silent."""
         arm = self._session.description
         state = joint_state(arm, joints, "stream")
-        _require_within(arm, dict(zip(state.name, state.position, strict=True)))
+        require_within(arm, dict(zip(state.name, state.position, strict=True)))
         self._session.latest(DEVICE_EVENTS, self._on_event)
         node = self._session.node
         now = self._session.clock.monotonic()
@@ -154,38 +155,40 @@ def jog_command(arm: ArmDescription, joints: Joints | None, twist: Vector | None
     `joints`: speeds [rad/s] or [m/s]; `twist`: (3,) [m/s] or (6,) [m/s] and [rad/s], along the axes of `frame`.
     """
     if (joints is None) == (twist is None):
-        raise BadArgument("jog by one of joints= (speeds by name) and twist= (speed of the tool)")
+        raise BadArgument(because("argument.jog.which", joints="joints", twist="twist"))
     if joints is not None:
         speeds = named_joints(arm, joints, "joints")
         for name, speed in speeds.items():
-            _require_speed(f'joint "{name}"', speed, arm.joint(name).unit, arm.joint(name).velocity)
+            _require_joint_speed(arm, name, speed)
         return JogCommand(name=tuple(speeds), velocity=tuple(speeds.values()))
     values = tuple(twist or ())
     if len(values) not in (3, 6):
-        raise BadArgument(f"twist= takes 3 numbers (m/s) or 6 (m/s and rad/s), not {len(values)}")
-    values = vector("twist", values, len(values), "m/s, rad/s")
+        raise BadArgument(because("argument.jog.twist", argument="twist", count=len(values)))
+    values = vector("twist", values, len(values), "twist")
     for index, value in enumerate(values):
-        _require_speed("twist", value, *(("m", FASTEST) if index < 3 else ("rad", FASTEST_TURN)))
+        unit, most = ("m", FASTEST) if index < 3 else ("rad", FASTEST_TURN)
+        if hint := _other_unit(value, unit, most):
+            raise BadArgument(
+                because("argument.jog.fast_tool", hint, argument="twist", value=value, unit=unit, most=most)
+            )
     if frame not in ("", arm.base_frame, arm.tool_frame):
-        raise BadArgument(f'frame="{frame}": a twist is along the axes of {arm.base_frame} or {arm.tool_frame}')
+        raise BadArgument(
+            because("argument.jog.frame", argument="frame", frame=frame, base=arm.base_frame, tool=arm.tool_frame)
+        )
     in_tool = arm.tool_frame if frame == arm.tool_frame else ""
     return JogCommand(linear=values[:3], angular=values[3:], frame=in_tool)
 
 
-def _require_speed(owner: str, value: float, unit: str, most: float) -> None:
-    """Refuses a speed that is more than twice `most` as it stands, and not so in degrees or millimetres."""
-    helper = "deg" if unit == "rad" else "mm"
-    factor = math.radians(1.0) if unit == "rad" else 0.001
-    if abs(value) > 2.0 * most and abs(value) * factor <= 2.0 * most:
-        hint = f"if it is in {helper}/s, write gemelo.{helper}({value:g})"
-        raise BadArgument(f"{owner}: {value:g} {unit}/s is far beyond {most:.3g} {unit}/s: {hint}")
+def _require_joint_speed(arm: ArmDescription, name: str, value: float) -> None:
+    unit, most = arm.joint(name).unit, arm.joint(name).velocity
+    if hint := _other_unit(value, unit, most):
+        raise BadArgument(because("argument.jog.fast", hint, joint=name, value=value, unit=unit, most=most))
 
 
-def _require_within(arm: ArmDescription, values: dict[str, float]) -> None:
-    for name, value in values.items():
-        joint = arm.joint(name)
-        if not joint.is_within(value):
-            raise BadArgument(
-                f'joint "{name}": {value:g} {joint.unit} is beyond its limits, {joint.lower:.4g} to {joint.upper:.4g}; '
-                f"nearest that can: {joint.clamp(value):.4g}"
-            )
+def _other_unit(value: float, unit: str, most: float) -> Remedy | None:
+    """Of a speed that is more than twice `most` as it stands, and not so in degrees or millimetres."""
+    factor, helper = (
+        (math.radians(1.0), "in_degrees_per_second") if unit == "rad" else (0.001, "in_millimetres_per_second")
+    )
+    is_other = abs(value) > 2.0 * most and abs(value) * factor <= 2.0 * most
+    return remedy(helper, value=value) if is_other else None

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from gemelo.api.errors import BadArgument, Refused
 from gemelo.api.session import Session
 from gemelo.schemas.ledger import StepLedger, VerifiedBy
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import STEP_LEDGER
 
 
@@ -83,7 +84,7 @@ class Requirement:
     def require(self, level: float) -> None:
         """Refuses at once, and from now on before every motion, below `level`, a share; 0 requires nothing any more."""
         if not 0.0 <= level <= 1.0:
-            raise BadArgument(f"confidence={level:g} is no probability: it is 0 to 1, as 0.95")
+            raise BadArgument(because("argument.confidence", value=level))
         self.level = level
         self.check()
 

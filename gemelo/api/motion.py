@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from gemelo.api.errors import Aborted, Canceled, Error, Interrupted, Lost, Refused
+from gemelo.api.errors import Aborted, Canceled, Error, Interrupted, Lost, Refused, reason_of
 from gemelo.api.planning import Plan, words_of
 from gemelo.api.session import Session
 from gemelo.libraries.runtime import errors as runtime
@@ -195,9 +195,9 @@ class Motion:
             said = because("refused.by", error.reason, server=client.action.server)
             raise Refused(said, check=check, code=error.code, reason=error.reason) from error
         except runtime.RequestRefused as error:
-            raise Refused(str(error)) from error
+            raise Refused(reason_of(error)) from error
         except (runtime.NoAnswer, runtime.BusError) as error:
-            raise Lost(str(error)) from error
+            raise Lost(reason_of(error)) from error
         except KeyboardInterrupt:
             raise Interrupted("stopped by Ctrl-C as the motion began: it is cancelled") from None
         self._handle.on_end = self._session.notify

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from gemelo.api.arguments import Grip
-from gemelo.api.errors import Aborted, BadArgument, Canceled, Lost, Refused
+from gemelo.api.errors import Aborted, BadArgument, Canceled, Lost, Refused, reason_of
 from gemelo.api.grasping import grasp_point, lift_above, looking_down, turn_between, yaw_of
 from gemelo.api.gripping import Gripped
 from gemelo.api.motion import Motion
@@ -177,7 +177,7 @@ def named(arm: MovingArm, eyes: Eyes, name: str, to: str) -> tuple[Thing, Place,
     try:
         return cell.thing(name), cell.place(to), gripper
     except DescriptionError as error:
-        raise BadArgument(str(error)) from error
+        raise BadArgument(reason_of(error)) from error
 
 
 def _way_to(arm: MovingArm, thing: Thing, seen: Seen, tool: Point, gripper: Gripper) -> Approach:

@@ -9,14 +9,15 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from gemelo.api.errors import BadArgument, Error, Lost
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.api.errors import BadArgument, Error, Lost, reason_of
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.model import description as descriptions
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.runtime.deployment import CONFIG, load_deployment, project_root, when_silent
 from gemelo.libraries.runtime.running import find_deployment, folder_of
 from gemelo.libraries.runtime.started import deployment_of_arm
 from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.reasons import because
 
 LOOK_TIMEOUT = 1.0  # [s] of one look for the router
 
@@ -52,7 +53,7 @@ def load_robot(robot: str = "", *, deployment: str | Path | None = None) -> Robo
             found = replace(found, robot=str(_folder(robot)))
         return Robot(found, descriptions.load_arm(project_root() / found.robot))
     except (ValueError, OSError) as error:
-        raise error if isinstance(error, Error) else Error(str(error)) from error
+        raise error if isinstance(error, Error) else Error(reason_of(error)) from error
 
 
 def find_robot(robot: str = "", *, deployment: str | Path | None = None, ask: bool = True) -> Robot:
@@ -67,7 +68,7 @@ def find_robot(robot: str = "", *, deployment: str | Path | None = None, ask: bo
         found = find_deployment(robot, environ, ask=ask)
         description = descriptions.load_arm(project_root() / found.robot)
     except (ValueError, OSError) as error:
-        raise Error(str(error)) from error
+        raise Error(reason_of(error)) from error
     if robot and description.name != robot:
         _folder(robot)
     return Robot(found, description)
@@ -87,4 +88,4 @@ def _folder(robot: str) -> Path:
     if (folder := folder_of(robot)) is not None:
         return folder
     known = sorted(path.parent.name for path in (project_root() / "urdf").glob("*/robot.toml"))
-    raise BadArgument(f'there is no arm "{robot}"{suggestion(robot, known)}')
+    raise BadArgument(because("argument.robot.unknown", nearest(robot, known), name=robot))

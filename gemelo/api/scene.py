@@ -13,6 +13,7 @@ from gemelo.api.scene_files import load_mesh, read_scene, write_scene
 from gemelo.api.session import PATIENCE, Session
 from gemelo.api.targets import number, point, quaternion, vector
 from gemelo.schemas.frames import Transform
+from gemelo.schemas.reasons import because
 from gemelo.schemas.scene import (
     AllowedPair,
     BoxShape,
@@ -353,7 +354,7 @@ class Scene:
         padding: float,
     ) -> None:
         if attach and not frame:
-            raise BadArgument("attach=True needs frame=, the link that carries the object")
+            raise BadArgument(because("argument.attach", needed="frame"))
         item = SceneObject(
             name=name,
             shape=shape,

@@ -10,12 +10,12 @@ from gemelo.api.errors import BadArgument, Error
 from gemelo.api.targets import number
 from gemelo.api.whole_files import write_whole
 from gemelo.libraries.runtime.deployment import project_root
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.scene import MeshShape, PlanningScene
 from gemelo.schemas.text_file import read_text
 
 LARGEST_MESH = 10.0  # [m]; what is larger was drawn in mm
 LARGEST_UNSAID = 3.0  # [m] of a mesh for which no scale is given: larger than what such arms reach
-OTHER_UNITS = "in mm, cm or inches, give scale=0.001, 0.01 or 0.0254; if it is so large, scale=1"
 
 
 def load_mesh(path: str | Path, scale: float | None = None) -> MeshShape:
@@ -29,11 +29,11 @@ def load_mesh(path: str | Path, scale: float | None = None) -> MeshShape:
     """
     file = Path(path)
     if not file.is_file():
-        raise BadArgument(f'there is no file "{path}"')
+        raise BadArgument(because("argument.mesh.no_file", path=str(path)))
     try:
         content = file.read_bytes()
     except OSError as error:
-        raise BadArgument(f'"{path}" cannot be read: {error.strerror}') from error
+        raise BadArgument(because("argument.mesh.unreadable", path=str(path), error=str(error.strerror))) from error
     _require_size(file, content, None if scale is None else number("scale", scale))
     metres = 1.0 if scale is None else scale
     inside = file.resolve()
@@ -52,9 +52,9 @@ def _require_size(path: Path, content: bytes, scale: float | None) -> None:
         return
     longest = (1.0 if scale is None else scale) * float((vertices.max(axis=0) - vertices.min(axis=0)).max())
     if longest > LARGEST_MESH:
-        raise BadArgument(f'"{path}" would be {longest:.4g} m long', "if it is drawn in mm, give scale=0.001")
+        raise BadArgument(because("argument.mesh.long", remedy("scale_of_millimetres"), path=str(path), size=longest))
     if scale is None and longest > LARGEST_UNSAID:
-        raise BadArgument(f'"{path}" would be {longest:.4g} m long', OTHER_UNITS)
+        raise BadArgument(because("argument.mesh.long", remedy("scale_of_its_unit"), path=str(path), size=longest))
 
 
 def write_scene(scene: PlanningScene, path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-from gemelo.api.errors import BadArgument, Error, Refused
+from gemelo.api.errors import BadArgument, Error, Refused, reason_of
 from gemelo.api.scene import Scene
 from gemelo.api.session import Session
 from gemelo.api.units import Point, Pose
@@ -19,6 +19,7 @@ from gemelo.libraries.runtime.topics import Subscription
 from gemelo.schemas.camera import CameraCondition, CameraStatus
 from gemelo.schemas.cell import CellTexts, TagThing, Thing
 from gemelo.schemas.detections import Detection, Detections
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.system import Empty
 from gemelo.schemas.topics import CAMERA, CELL, JOINT_STATES, camera_detections, camera_status
 
@@ -75,7 +76,7 @@ class Eyes:
                 return load_cell(Path(path), arm)
             return cell_of(self._read_cell(), arm, is_here=False)
         except DescriptionError as error:
-            raise Error(str(error)) from error
+            raise Error(reason_of(error)) from error
 
     def _read_cell(self) -> CellTexts:
         """What the twin's process `camera` has published of its cell; raises `Refused` where it has none."""
@@ -95,7 +96,7 @@ class Eyes:
         cell = self.cell()
         known = [each.name for each in (*cell.things, *cell.places)]
         if name and name not in known:
-            raise BadArgument(f'{cell.path} has no thing or place "{name}": it has {", ".join(known) or "none"}')
+            raise BadArgument(_unknown_thing(cell.path, name, known))
         cameras = cell.camera_names if not camera else (_known_camera(cell, camera),)
         if not cameras:
             raise Refused(f"{cell.path} has no [[camera]]", check="camera")
@@ -252,6 +253,12 @@ def _trouble(item: Detection, camera: str, sigma: float) -> str:
     return ""
 
 
+def _unknown_thing(path: str | Path, name: str, known: Sequence[str]) -> Reason:
+    if not known:
+        return because("argument.thing.none", path=str(path), name=name)
+    return because("argument.thing.unknown", path=str(path), name=name, names=tuple(known))
+
+
 def _moving() -> Refused:
     return Refused("the arm moves: images of it are blurred; wait until it stands", check="moving")
 
@@ -282,4 +289,4 @@ def _known_camera(cell: Cell, name: str) -> str:
     try:
         return cell.camera(name).name
     except DescriptionError as error:
-        raise BadArgument(str(error)) from error
+        raise BadArgument(reason_of(error)) from error

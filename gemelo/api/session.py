@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from itertools import count
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from gemelo.api.errors import Error, Lost, Refused
+from gemelo.api.errors import Error, Lost, Refused, reason_of
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.runtime import errors as runtime
 from gemelo.libraries.runtime.node import Node
@@ -200,9 +200,9 @@ def _as_own_errors() -> Iterator[None]:
     try:
         yield
     except runtime.RequestRefused as error:
-        raise Refused(str(error)) from error
+        raise Refused(reason_of(error)) from error
     except (runtime.NoAnswer, runtime.BusError) as error:
-        raise Lost(str(error)) from error
+        raise Lost(reason_of(error)) from error
 
 
 def _node_name() -> str:

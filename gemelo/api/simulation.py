@@ -22,13 +22,14 @@ from msgspec.structs import replace
 
 from gemelo.api.arguments import Joints
 from gemelo.api.arm import Arm
-from gemelo.api.errors import BadArgument, Error
+from gemelo.api.errors import BadArgument, Error, reason_of
 from gemelo.api.robot_files import Robot, load_robot
 from gemelo.api.session import Session
-from gemelo.api.targets import named_joints
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.api.targets import named_joints, require_joint, require_within
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.libraries.runtime.node import Node
+from gemelo.schemas.reasons import because
 from gemelo.schemas.robot import Motor
 from gemelo.schemas.simulation import WireConditions
 
@@ -55,6 +56,7 @@ BUTTONS: dict[str, tuple[str, float | None]] = {
     "freeze": ("freeze", None),
     "drift": ("drift", None),
 }
+MOST_TORQUE = 10.0  # share of a motor's own
 PRESSED = 0.05  # [s] after which the gateway knows what was pressed: the board says it within two states
 HELD = {"on": 1.0, "off": 0.0, "auto": -1.0}  # of a switch
 
@@ -77,7 +79,7 @@ class Simulation:
         try:
             self._clock: VirtualClock = import_module(f"{ROOM}.virtual_clock").VirtualClock(seed, time_scale)
         except ValueError as error:
-            raise BadArgument(str(error)) from error
+            raise BadArgument(because("argument.time_scale", value=str(time_scale))) from error
         self._folder = tempfile.TemporaryDirectory(prefix="gemelo-simulation-")
         self._twins: list[Twin] = []
         self.arms: list[SimulatedArm] = []
@@ -161,9 +163,9 @@ class Simulation:
         try:
             twin: Twin = room.Twin(self._clock, arm, deployment, folder, **options)
         except room.NotReady as error:
-            raise Error(str(error)) from error
+            raise Error(reason_of(error)) from error
         except room.MissingPart as error:
-            raise Error(str(error)) from error
+            raise Error(reason_of(error)) from error
         return twin
 
 
@@ -252,18 +254,18 @@ class SimulatedWorld:
         25
         """
         if what not in BUTTONS:
-            raise BadArgument(f'there is no "{what}" to press{suggestion(what, BUTTONS)}')
+            raise BadArgument(because("argument.press.unknown", nearest(what, BUTTONS), name=what))
         kind, value = BUTTONS[what]
         rest = list(words)
         if value is None:
             if not rest:
-                raise BadArgument(f'press("{what}", ...): its value is missing')
+                raise BadArgument(because("argument.press.no_value", name=what))
             last = rest.pop()
             if isinstance(last, str) and last not in HELD:
-                raise BadArgument(f'press("{what}", ...): {last!r} is no number, nor one of {", ".join(HELD)}')
+                raise BadArgument(because("argument.press.value", name=what, value=repr(last), words=tuple(HELD)))
             value = HELD[last] if isinstance(last, str) else last
         if len(rest) > 1 or any(not isinstance(each, str) for each in rest):
-            raise BadArgument(f'press("{what}", ...): one name and one value at most, not {words!r}')
+            raise BadArgument(because("argument.press.too_many", name=what, given=repr(words)))
         self._arm.device.inject(kind, str(rest[0]) if rest else "", value)
         self.sleep(PRESSED)
 
@@ -386,25 +388,18 @@ def _start(arm: ArmDescription, start: str | Joints | None) -> tuple[Mapping[str
         states = arm.named_states
         if start not in states:
             known = [*states, UNREFERENCED]
-            raise BadArgument(f'start="{start}": {arm.name} has no such named state{suggestion(start, known)}')
+            raise BadArgument(because("argument.start.unknown", nearest(start, known), name=start, robot=arm.name))
         values = {name: value for name, value in zip(arm.joint_names, states[start], strict=True) if value is not None}
     else:
         values = named_joints(arm, start, "start")
-    for name, value in values.items():
-        joint = arm.joint(name)
-        if not joint.is_within(joint.rounded(value)):
-            raise BadArgument(
-                f'start: joint "{name}": {value:g} {joint.unit} is beyond its limits, {joint.lower:.4g} to '
-                f"{joint.upper:.4g}; nearest that can: {joint.clamp(value):.4g}"
-            )
+    require_within(arm, values, rounded=True)
     return values, True
 
 
 def _motors(arm: ArmDescription, changed: Motors) -> tuple[Motor, ...]:
     """One motor for each joint; raises `BadArgument` for a joint that there is not, or without figures of its motor."""
     for name in changed:
-        if name not in arm.joint_names:
-            raise BadArgument(f'motors: {arm.name} has no joint "{name}"{suggestion(name, arm.joint_names)}')
+        require_joint(arm, name)
     return tuple(_motor(joint, changed.get(joint.name, 1.0)) for joint in arm.joints)
 
 
@@ -415,12 +410,9 @@ def _motor(joint: Joint, changed: float | Motor) -> Motor:
     if share == 1.0:
         return motor
     if motor.pull_out is None:
-        raise BadArgument(
-            f'motors: joint "{joint.name}" has no [joint.motor.pull_out] in robot.toml, so nothing is known of its '
-            "torque: give a Motor instead of a share"
-        )
-    if not 0.0 <= share <= 10.0:
-        raise BadArgument(f'motors: joint "{joint.name}": {share:g} is no share of its torque: 0 to 10')
+        raise BadArgument(because("argument.motors.no_curve", joint=joint.name))
+    if not 0.0 <= share <= MOST_TORQUE:
+        raise BadArgument(because("argument.motors.share", joint=joint.name, value=share, most=MOST_TORQUE))
     torque = tuple(share * each for each in motor.pull_out.torque)
     return replace(motor, pull_out=replace(motor.pull_out, torque=torque))
 
@@ -431,4 +423,5 @@ def _wire(wire: Wire | None) -> WireConditions:
     try:
         return msgspec.convert(dict(wire or {}), WireConditions)
     except msgspec.ValidationError as error:
-        raise BadArgument(f"wire={dict(wire or {})}: {error}: it takes delay [s], jitter [s] and loss") from error
+        given = str(dict(wire or {}))
+        raise BadArgument(because("argument.wire", wire=given, error=str(error))) from error

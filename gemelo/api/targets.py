@@ -12,9 +12,9 @@ from gemelo.api.arguments import Joints as Joints
 from gemelo.api.arguments import Target as Target
 from gemelo.api.arguments import ToolGoal
 from gemelo.api.arguments import Waypoint as Waypoint
-from gemelo.api.errors import ArgumentRange, BadArgument
+from gemelo.api.errors import BadArgument
 from gemelo.api.units import Pose
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState
@@ -34,6 +34,7 @@ from gemelo.schemas.planning import (
     Timing,
     WaypointGoal,
 )
+from gemelo.schemas.reasons import Remedy, because, remedy
 from gemelo.schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
 
 LookUp = Callable[[str, str], Pose]  # (target, source): where the frame `source` is in `target` now
@@ -42,6 +43,7 @@ LARGEST = 10.0  # [m] from the base; what is farther was meant in mm
 FASTEST = 5.0  # [m/s] of the tool; what is faster was meant in mm/s
 LONGEST_PLAN = 3600.0  # [s]
 ALLOWED, ALLOWED_OF_A_POINT, MOST_ALLOWED = 5.0, 0.01, 120.0  # [s] for a plan, and for each point that it passes
+GOALS = ("named", "joints", "position", "pose", "offset")  # arguments that say where to
 FULL = 6  # joints that an arm has at least if it can turn its tool as it likes
 
 
@@ -52,7 +54,7 @@ def as_target(goal: ToolGoal) -> Target:
 
 def not_connected(_target: str, _source: str) -> Pose:
     """The `LookUp` where no arm is connected; raises `BadArgument`."""
-    raise BadArgument("offset= begins where the tool is now, which only a connected arm knows: give position=")
+    raise BadArgument(because("argument.offset.not_connected", argument="offset", needed="position"))
 
 
 def request_of(arm: ArmDescription, target: Target, look_up: LookUp) -> PlanRequest:
@@ -99,12 +101,13 @@ def ik_request(
 
 def goal_of(arm: ArmDescription, target: Target, look_up: LookUp) -> PoseGoal | JointGoal | NamedGoal:
     """The one goal among the arguments."""
-    given = [name for name in ("named", "joints", "position", "pose", "offset") if name in target]
-    if len(given) != 1:
-        said = f"not both {' and '.join(given)}" if given else "none is given"
-        raise BadArgument(f"say where to by one of named=, joints=, position=, pose= and offset=: {said}")
+    given = tuple(name for name in GOALS if name in target)
+    if not given:
+        raise BadArgument(because("argument.goal.none", goals=GOALS))
+    if len(given) > 1:
+        raise BadArgument(because("argument.goal.several", goals=GOALS, given=given))
     if given[0] in ("named", "joints"):
-        _refuse_with(target, f"{given[0]}=", (*ToolGoal.__annotations__, "through", "center"))
+        _refuse_with(target, given[0], (*ToolGoal.__annotations__, "through", "center"))
     if "named" in target:
         return named_goal(arm, target["named"])
     if "joints" in target:
@@ -116,7 +119,7 @@ def goal_of(arm: ArmDescription, target: Target, look_up: LookUp) -> PoseGoal | 
 def named_goal(arm: ArmDescription, name: str) -> NamedGoal:
     """A named state of the SRDF; raises `BadArgument` with the nearest name."""
     if name not in arm.state_names:
-        raise BadArgument(f'no named state "{name}"{suggestion(name, arm.state_names)}')
+        raise BadArgument(because("argument.named.unknown", nearest(name, arm.state_names), name=name))
     return NamedGoal(name=name)
 
 
@@ -131,73 +134,100 @@ def joint_state(arm: ArmDescription, joints: Joints, owner: str) -> JointState:
 def named_joints(arm: ArmDescription, joints: Joints, owner: str) -> dict[str, float]:
     """Finite numbers [rad] or [m] by the names of the arm's joints; raises `BadArgument`."""
     if not isinstance(joints, Mapping):
-        values = vector(owner, joints, len(arm.joints), "one for every joint")
+        values = vector(owner, joints, len(arm.joints), "every_joint")
         return dict(zip(arm.joint_names, values, strict=True))
     if not joints:
-        raise BadArgument(f'{owner}= names no joint: write it as {{"{arm.joint_names[0]}": gemelo.deg(30)}}')
+        raise BadArgument(because("argument.joints.none", argument=owner, joint=arm.joint_names[0]))
     for name in joints:
-        if name not in arm.joint_names:
-            raise BadArgument(f'{arm.name} has no joint "{name}"{suggestion(str(name), arm.joint_names)}')
-    return {name: number(f'joint "{name}"', value) for name, value in joints.items()}
+        require_joint(arm, name)
+    return {name: joint_number(name, value) for name, value in joints.items()}
+
+
+def require_joint(arm: ArmDescription, name: str) -> None:
+    """Raises `BadArgument` with the nearest name where the arm has no such joint."""
+    if name not in arm.joint_names:
+        hint = nearest(str(name), arm.joint_names)
+        raise BadArgument(because("argument.joint.unknown", hint, robot=arm.name, joint=str(name)))
+
+
+def joint_number(joint: str, value: float) -> float:
+    """`value` as a finite number, in the joint's unit; raises `BadArgument`."""
+    found = _as_float(value)
+    if found is None:
+        raise BadArgument(because("argument.joint.not_a_number", joint=joint, value=repr(value)))
+    if not math.isfinite(found):
+        raise BadArgument(because("argument.joint.not_finite", joint=joint, value=str(found)))
+    return found
 
 
 def number(owner: str, value: float) -> float:
     """`value` as a finite number, in the unit of its owner; raises `BadArgument`."""
-    try:
-        found = float(value)
-    except (TypeError, ValueError):
-        raise BadArgument(f"{owner}: {value!r} is not a number") from None
+    found = _as_float(value)
+    if found is None:
+        raise BadArgument(because("argument.not_a_number", argument=owner, value=repr(value)))
     if not math.isfinite(found):
-        raise BadArgument(f"{owner} is {found}: it must be finite")
+        raise BadArgument(because("argument.not_finite", argument=owner, value=str(found)))
     return found
 
 
-def vector(owner: str, values: Iterable[float], size: int, what: str) -> tuple[float, ...]:
+def _as_float(value: object) -> float | None:
+    """None for what is no number."""
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return None
+
+
+def vector(owner: str, values: Iterable[float], size: int, meaning: str) -> tuple[float, ...]:
     """`values` as `size` finite numbers, in the unit of their owner; raises `BadArgument`."""
+
+    def wrong(given: str) -> BadArgument:
+        return BadArgument(because("argument.numbers", argument=owner, count=size, meaning=meaning, given=given))
+
     try:
         found = tuple(values)
     except TypeError:
-        raise BadArgument(f"{owner}= takes {size} numbers ({what}), not {values!r}") from None
+        raise wrong(repr(values)) from None
     if len(found) != size:
-        raise BadArgument(f"{owner}= takes {size} numbers ({what}), not {len(found)}")
+        raise wrong(str(len(found)))
     return tuple(number(f"{owner}[{index}]", value) for index, value in enumerate(found))
 
 
 def point(owner: str, values: Iterable[float]) -> tuple[float, float, float]:
     """A point (x, y, z) [m] that is not in another unit; raises `BadArgument`."""
-    x, y, z = vector(owner, values, 3, "x, y, z in m")
+    x, y, z = vector(owner, values, 3, "xyz")
     largest = max((x, y, z), key=abs)
     if abs(largest) > LARGEST:
-        raise BadArgument(f"{owner}= has {largest:g} m: if it is in millimetres, write gemelo.mm({largest:g})")
+        hint = remedy("in_millimetres", value=largest)
+        raise BadArgument(because("argument.point.far", hint, argument=owner, value=largest))
     return x, y, z
 
 
 def quaternion(owner: str, values: Iterable[float]) -> tuple[float, float, float, float]:
     """A unit quaternion (x, y, z, w); raises `BadArgument`."""
-    x, y, z, w = vector(owner, values, 4, "a unit quaternion x, y, z, w")
+    x, y, z, w = vector(owner, values, 4, "unit_quaternion")
     length = math.sqrt(x * x + y * y + z * z + w * w)
     if abs(length - 1.0) > 1e-3:
-        raise BadArgument(f"{owner}= is a quaternion of length {length:.4f}, not 1")
+        raise BadArgument(because("argument.quaternion.length", argument=owner, length=length))
     return x / length, y / length, z / length, w / length
 
 
 def turned(owner: str, values: Iterable[float]) -> tuple[float, float, float, float]:
     """Roll, pitch, yaw [rad] as a quaternion; raises `BadArgument`."""
-    angles = vector(owner, values, 3, "roll, pitch, yaw in rad")
+    angles = vector(owner, values, 3, "roll_pitch_yaw")
     largest = max(angles, key=abs)
     if abs(largest) > math.tau:
-        raise BadArgument(
-            f"{owner}= has {largest:g} rad, more than a turn: if it is in degrees, write gemelo.deg({largest:g})"
-        )
+        hint = remedy("in_degrees", value=largest)
+        raise BadArgument(because("argument.turn.large", hint, argument=owner, value=largest))
     return from_rpy(*angles)
 
 
 def _pose_goal(arm: ArmDescription, target: Target, look_up: LookUp) -> PoseGoal:
-    turns = [name for name in ("orientation", "rpy", "pose", "along") if name in target]
+    turns = tuple(name for name in ("orientation", "rpy", "pose", "along") if name in target)
     if len(turns) > 1:
-        raise BadArgument(f"say how the tool is turned once, not by {'= and '.join(turns)}=")
+        raise BadArgument(because("argument.turn.several", given=turns))
     if "axis" in target and "along" not in target:
-        raise BadArgument("axis= is an axis of the tool: say with along= in which direction it is to point")
+        raise BadArgument(because("argument.axis.alone", argument="axis", needed="along"))
     if "offset" in target:
         return _offset_goal(arm, target, look_up)
     pose = target.get("pose")
@@ -220,10 +250,10 @@ def _axes(target: Target) -> dict[str, tuple[float, ...]]:
     """The directions among the arguments, each (3,)."""
     axes = {}
     if "along" in target:
-        axes["direction"] = vector("along", target["along"], 3, "a direction")
-        axes["tool_axis"] = vector("axis", target.get("axis", (0.0, 0.0, 1.0)), 3, "an axis of the tool")
+        axes["direction"] = vector("along", target["along"], 3, "direction")
+        axes["tool_axis"] = vector("axis", target.get("axis", (0.0, 0.0, 1.0)), 3, "tool_axis")
     if "free_axis" in target:
-        axes["free_axis"] = vector("free_axis", target["free_axis"], 3, "an axis of the tool")
+        axes["free_axis"] = vector("free_axis", target["free_axis"], 3, "tool_axis")
     return axes
 
 
@@ -238,7 +268,7 @@ def _offset_goal(arm: ArmDescription, target: Target, look_up: LookUp) -> PoseGo
         if key in target:
             goal[key] = target[key]
     if "along" in target or "orientation" in target or "rpy" in target:
-        raise BadArgument("offset= leaves the tool turned as it is: give position= to turn it")
+        raise BadArgument(because("argument.offset.turned", argument="offset", needed="position"))
     if len(arm.joints) >= FULL:
         goal["orientation"] = now.orientation
     else:
@@ -249,9 +279,10 @@ def _offset_goal(arm: ArmDescription, target: Target, look_up: LookUp) -> PoseGo
 def _by_way_of(goal: PoseGoal | JointGoal | NamedGoal, arm: ArmDescription, target: Target) -> Goal:
     """By the points of via=; positions among them are turned as the goal is."""
     if "via" not in target:
-        _refuse_with(target, "a goal without via=", ("blend",))
+        if _is_given(target, "blend"):
+            raise BadArgument(because("argument.not_with.without", argument="blend", needed="via"))
         return goal
-    _refuse_with(target, "via=", ("through", "center"))
+    _refuse_with(target, "via", ("through", "center"))
     like = goal if isinstance(goal, PoseGoal) else PoseGoal()
     points = tuple(_waypoint(each, arm, like) for each in target["via"])
     blend = target.get("blend", 0.0)
@@ -273,20 +304,23 @@ def _waypoint(given: Waypoint, arm: ArmDescription, like: PoseGoal) -> PoseGoal 
 
 def _motion_of(target: Target) -> Motion:
     """The motion among the arguments."""
-    given = [name for name in ("line", "ptp", "through", "center") if target.get(name)]
+    given = tuple(name for name in ("line", "ptp", "through", "center") if target.get(name))
     if len(given) > 1:
-        raise BadArgument(f"one path at a time, not {' and '.join(given)}")
+        raise BadArgument(because("argument.path.several", given=given))
     kind = given[0] if given else "free"
-    of_tool = ("tool_speed", "tool_acceleration", "least_fraction", "max_step", "jump")
     if kind in ("free", "ptp"):
-        _refuse_with(target, f"a {kind} motion (only line=True, through= and center=)", of_tool)
+        for name in ("tool_speed", "tool_acceleration", "least_fraction", "max_step", "jump"):
+            if _is_given(target, name):
+                others = ("line", "through", "center")
+                raise BadArgument(because("argument.not_with.motion", argument=name, kind=kind, others=others))
     if kind != "free":
-        _refuse_with(target, f"{kind}=", ("planner", "seed", "attempts"))
+        _refuse_with(target, kind, ("planner", "seed", "attempts"))
     if kind == "free":
         attempts = target.get("attempts", 1)
         if not 1 <= attempts <= MOST_ATTEMPTS:
-            out_of = ArgumentRange("attempts", attempts, 1, MOST_ATTEMPTS, "")
-            raise BadArgument(f"attempts={attempts} is not from 1 to {MOST_ATTEMPTS}", out_of=out_of)
+            raise BadArgument(
+                because("argument.count", argument="attempts", value=attempts, least=1, most=MOST_ATTEMPTS)
+            )
         return FreeMotion(planner_id=target.get("planner", ""), seed=target.get("seed", 0), attempts=attempts)
     if kind == "ptp":
         return PointToPoint()
@@ -318,27 +352,30 @@ def _require_known(target: Target | ToolGoal, kind: type) -> None:
     known = {name for base in (ToolGoal, kind) for name in base.__annotations__}
     for name in target:
         if name not in known:
-            raise BadArgument(f'there is no argument "{name}"{suggestion(name, known)}')
+            raise BadArgument(because("argument.unknown", nearest(name, known), argument=name))
 
 
-def _refuse_with(target: Target, what: str, names: Iterable[str]) -> None:
+def _refuse_with(target: Target, other: str, names: Iterable[str]) -> None:
     for name in names:
-        if name in target and target[name] is not None:  # type: ignore[literal-required]
-            raise BadArgument(f"{name}= does not go with {what}")
+        if _is_given(target, name):
+            raise BadArgument(because("argument.not_with", argument=name, other=other))
+
+
+def _is_given(target: Target, name: str) -> bool:
+    return target.get(name) is not None
 
 
 def _link(arm: ArmDescription, name: str) -> str:
     if name and name not in arm.model.link_names:
-        raise BadArgument(f'{arm.name} has no link "{name}"{suggestion(name, arm.model.link_names)}')
+        hint = nearest(name, arm.model.link_names)
+        raise BadArgument(because("argument.link.unknown", hint, robot=arm.name, link=name))
     return name
 
 
 def _share(name: str, value: float) -> float:
     found = number(name, value)
     if not 0.0 < found <= 1.0:
-        hint = f": {found:g} per cent is {found / 100.0:g}" if 1.0 < found <= 100.0 else ""
-        out_of = ArgumentRange(name, found, 0.0, 1.0, "share")
-        raise BadArgument(f"{name}={found:g} is not in (0, 1], a share of the joints' limits{hint}", out_of=out_of)
+        raise BadArgument(because("argument.share", *per_cent(found), argument=name, value=found))
     return found
 
 
@@ -348,31 +385,30 @@ def _clearance(target: Target) -> float | None:
         return None
     found = number("clearance", target["clearance"])
     if not LEAST_CLEARANCE <= found <= MOST_CLEARANCE:
-        hint = f": if it is in millimetres, write gemelo.mm({found:g})" if found > MOST_CLEARANCE else ""
+        hint = (remedy("in_millimetres", value=found),) if found > MOST_CLEARANCE else ()
         raise BadArgument(
-            f"clearance={found:g} m is not from {LEAST_CLEARANCE:g} to {MOST_CLEARANCE:g} m{hint}",
-            out_of=ArgumentRange("clearance", found, LEAST_CLEARANCE, MOST_CLEARANCE, "m"),
-        )
+            because(
+                "argument.range", *hint,
+                argument="clearance", value=found, least=LEAST_CLEARANCE, most=MOST_CLEARANCE, unit="m",
+            )
+        )  # fmt: skip
     return found
 
 
 def _positive(name: str, value: float, unit: str, most: float) -> float:
     found = number(name, value)
-    out_of = ArgumentRange(name, found, 0.0, most, unit)
     if not found > 0.0:
-        raise BadArgument(f"{name}={found:g} is not above 0", out_of=out_of)
+        raise BadArgument(because("argument.not_positive", argument=name, value=found, unit=unit))
     if found > most:
-        hint = f": if it is in millimetres, write gemelo.mm({found:g})" if unit.startswith("m") else ""
-        raise BadArgument(f"{name}={found:g} {unit} is more than {most:g}{hint}", out_of=out_of)
+        hint = (remedy("in_millimetres", value=found),) if unit.startswith("m") else ()
+        raise BadArgument(because("argument.too_much", *hint, argument=name, value=found, most=most, unit=unit))
     return found
 
 
 def _require_unit(arm: ArmDescription, name: str, value: float) -> None:
     """Refuses what is out of the limits as it stands, and within them in degrees or millimetres."""
     joint = arm.joint(name)
-    factor, unit, helper = (
-        (math.radians(1.0), "degrees", "deg") if joint.unit == "rad" else (0.001, "millimetres", "mm")
-    )
+    factor, helper = (math.radians(1.0), "in_degrees") if joint.unit == "rad" else (0.001, "in_millimetres")
     lower, upper = (joint.lower, joint.upper) if math.isfinite(joint.lower) else (-math.tau, math.tau)
     if (
         not lower <= value <= upper
@@ -380,6 +416,26 @@ def _require_unit(arm: ArmDescription, name: str, value: float) -> None:
         and abs(value) >= 2.0 * max(abs(lower), abs(upper))
     ):
         raise BadArgument(
-            f'joint "{name}": {value:g} {joint.unit} is beyond its limits, {lower:.4g} to {upper:.4g} {joint.unit}: '
-            f"if it is in {unit}, write gemelo.{helper}({value:g})"
-        )
+            because(
+                "argument.joint.other_unit", remedy(helper, value=value),
+                joint=name, value=value, unit=joint.unit, lower=lower, upper=upper,
+            )
+        )  # fmt: skip
+
+
+def require_within(arm: ArmDescription, values: Mapping[str, float], *, rounded: bool = False) -> None:
+    """Raises `BadArgument` for a joint value [rad] or [m] beyond its limits; `rounded` to the joint's steps before."""
+    for name, value in values.items():
+        joint = arm.joint(name)
+        if not joint.is_within(joint.rounded(value) if rounded else value):
+            raise BadArgument(
+                because(
+                    "argument.joint.beyond", joint=name, value=value, unit=joint.unit,
+                    lower=joint.lower, upper=joint.upper, nearest=joint.clamp(value),
+                )
+            )  # fmt: skip
+
+
+def per_cent(value: float) -> tuple[Remedy, ...]:
+    """The hint for a share that is written in per cent."""
+    return (remedy("percent_is", value=value, share=value / 100.0),) if 1.0 < value <= 100.0 else ()

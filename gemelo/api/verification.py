@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from gemelo.api.errors import BadArgument, Refused
+from gemelo.api.errors import Refused
 from gemelo.api.ledger import Ledger
 from gemelo.api.moving_arm import MovingArm
 from gemelo.api.planning import Plan
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.api.targets import require_joint
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device_config import InputRole
 from gemelo.schemas.ledger import VerifiedBy
@@ -72,8 +72,7 @@ def trip_of(arm: ArmDescription, names: Iterable[str], referenced: Sequence[bool
     """How each joint can be verified from `at` [rad] or [m]; raises `BadArgument`, or `Refused` where none can."""
     trip, known = Trip(), dict(zip(arm.joint_names, referenced, strict=False))
     for name in tuple(names) or arm.joint_names:
-        if name not in arm.joint_names:
-            raise BadArgument(f'{arm.name} has no joint "{name}"{suggestion(name, arm.joint_names)}')
+        require_joint(arm, name)
         joint = arm.joint(name)
         if joint.drive.homing is None:
             trip.without_switch.append(name)

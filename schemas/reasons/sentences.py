@@ -49,12 +49,12 @@ def say(reason: Explained, language: str = ENGLISH, front_end: FrontEnd = FrontE
 class _Writer(string.Formatter):
     """Puts values into the templates of one language and one front end.
 
-    What stands behind a value's colon is its unit, or how it is worded: `word`, one that the catalogue translates, and
-    `names`, each in the language's quotation marks.
+    What stands behind a value's colon is its unit, or how it is worded: `word`, one that the catalogue translates,
+    `names`, each in the language's quotation marks, and `argument`, a name of one or of several as the front end has it.
     """
 
     def __init__(self, language: str, front_end: FrontEnd) -> None:
-        self._language, self._context = language, front_end.value
+        self._language, self._front_end, self._context = language, front_end, front_end.value
         self._units = in_display_units if front_end is FrontEnd.PAGE else in_si_units
 
     def sentence(self, reason: Explained) -> str:
@@ -79,6 +79,8 @@ class _Writer(string.Formatter):
         """One value as it is written."""
         if format_spec == "names":
             return ", ".join(self._word("quoted").format(name=name) for name in _each(value))
+        if format_spec == "argument":
+            return self._all_of([self._argument(name) for name in _each(value)])
         if isinstance(value, str):
             return self._word(value) if format_spec == "word" else value
         if isinstance(value, tuple):
@@ -93,6 +95,20 @@ class _Writer(string.Formatter):
 
     def _word(self, word: str) -> str:
         return self._template(f"word.{word}") or word
+
+    def _argument(self, name: str) -> str:
+        """Of a script, the option that does the same, or a word of the page."""
+        match self._front_end:
+            case FrontEnd.SCRIPT:
+                return f"{name}="
+            case FrontEnd.COMMAND:
+                return self._template(f"word.option.{name}") or f"--{name.replace('_', '-')}"
+            case FrontEnd.PAGE:
+                return self._template(f"word.argument.{name}") or name
+
+    def _all_of(self, names: Sequence[str]) -> str:
+        """Several, the last one after the word for and."""
+        return f" {self._word('and')} ".join(", ".join(part) for part in (names[:-1], names[-1:]) if part)
 
     def _either(self, remedies: Sequence[str]) -> str:
         """Several ways to mend it."""

@@ -28,7 +28,19 @@ def _hundred(value: float) -> float:
     return 100.0 * value
 
 
+def _typed(name: str, factor: float = 1.0) -> Written:
+    """As a person types it: 25mm, 30deg, 50%."""
+    return lambda value, _: f"{factor * value:g}{name}"
+
+
 _SAME: dict[str, Written] = {
+    "typed ": _typed(""),
+    "typed s": _typed("s"),
+    "typed m": _typed("mm", 1000.0),
+    "typed m/s": _typed("mm/s", 1000.0),
+    "typed m/s^2": _typed("mm/s2", 1000.0),
+    "typed rad or m": _typed("deg", degrees(1.0)),
+    "typed share": _typed("%", 100.0),
     "s": _unit("s", 3),
     "%": _unit("%", 0, _hundred),
     "steps": _unit("steps", 0),

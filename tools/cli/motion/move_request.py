@@ -1,17 +1,20 @@
-"""Options as arguments of `gemelo`, which makes the planner's request of them and knows what goes together."""
+"""Options as arguments of `gemelo`, which makes the planner's request of them and knows what goes together.
+
+A refusal names the option, by `word.option.*` of the catalogue where that is called otherwise than its argument.
+"""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, TypeVar
 
 from gemelo.api.arguments import Target, ToolGoal
-from gemelo.api.errors import ArgumentRange, BadArgument
+from gemelo.api.errors import BadArgument
 from gemelo.api.targets import ik_request, not_connected, request_of
 from gemelo.schemas.planning import IkRequest, PlanRequest
-from gemelo.tools.cli.common.errors import in_commands, usage
-from gemelo.tools.cli.common.units import DEGREE, MILLIMETRE, parse_joints
+from gemelo.schemas.reasons import because
+from gemelo.tools.cli.common.errors import usage
+from gemelo.tools.cli.common.units import parse_joints
 from gemelo.tools.cli.parser import Options
 
 if TYPE_CHECKING:
@@ -26,22 +29,18 @@ OF_MOVE = {  # by argument, its option where that is called otherwise
 OF_IK = OF_MOVE | {"position_tolerance": "tolerance", "orientation_tolerance": "turn_tolerance"}
 ARGUMENTS = (*ToolGoal.__annotations__, *Target.__annotations__)
 GOALS = ("to", "joints", "named")
-SHOWN = {  # by the unit of an argument, the one that a person reads and its factor
-    "m": ("mm", 1.0 / MILLIMETRE), "m/s": ("mm/s", 1.0 / MILLIMETRE), "m/s^2": ("mm/s2", 1.0 / MILLIMETRE),
-    "rad or m": ("deg", 1.0 / DEGREE), "share": ("%", 100.0), "s": ("s", 1.0), "": ("", 1.0),
-}  # fmt: skip
 
 
 def request_from(options: Options, arm: ArmDescription) -> PlanRequest:
     """The request of `gemelo move`; raises `CommandError` naming options that do not go together."""
-    return _asked(lambda: request_of(arm, Target(**given(options, arm, OF_MOVE)), not_connected), OF_MOVE)  # type: ignore[typeddict-item]
+    return _asked(lambda: request_of(arm, Target(**given(options, arm, OF_MOVE)), not_connected))  # type: ignore[typeddict-item]
 
 
 def ik_request_from(options: Options, arm: ArmDescription) -> IkRequest:
     """The request of `gemelo ik`; raises `CommandError` naming the option."""
     near = parse_joints(options.near, arm.joints) or None
     goal = ToolGoal(**given(options, arm, OF_IK))  # type: ignore[typeddict-item]
-    return _asked(lambda: ik_request(arm, goal, not_connected, near, options.solutions, options.touching), OF_IK)
+    return _asked(lambda: ik_request(arm, goal, not_connected, near, options.solutions, options.touching))
 
 
 def given(options: Options, arm: ArmDescription, spelled: Mapping[str, str]) -> dict[str, object]:
@@ -57,30 +56,14 @@ def require_alone(options: Options) -> None:
     names = [OF_MOVE.get(name, name) for name in ARGUMENTS]
     for name in (*names, "plan_only"):
         if name not in GOALS and _is_given(getattr(options, name, None)):
-            raise usage(f"{_option(name)} does not go with --execute: the plan has its own path and speed")
+            raise usage(because("cli.move.execute_alone", option=_option(name)))
 
 
-def _asked(request: Callable[[], Request], spelled: Mapping[str, str]) -> Request:
+def _asked(request: Callable[[], Request]) -> Request:
     try:
         return request()
     except BadArgument as error:
-        raise usage(in_options(error, spelled)) from error
-
-
-def in_options(error: BadArgument, spelled: Mapping[str, str]) -> str:
-    """What is wrong with an argument, said of its option in the units that people write."""
-    options = {name: _option(spelled.get(name, name)) for name in ARGUMENTS}
-    if error.out_of is not None:
-        return _range_text(error.out_of, options[error.out_of.argument])
-    return re.sub(r"\b([a-z_]+)=(?:True)?", lambda found: options.get(found[1], found[0]), in_commands(str(error)))
-
-
-def _range_text(out_of: ArgumentRange, option: str) -> str:
-    unit, factor = SHOWN[out_of.unit]
-    value, least, most = (f"{factor * each:g}{unit}" for each in (out_of.value, out_of.least, out_of.most))
-    if out_of.least > 0.0:
-        return f"{option} {value} is not from {least} to {most}"
-    return f"{option} {value} is not above 0" if out_of.value <= 0.0 else f"{option} {value} is more than {most}"
+        raise usage(error) from error
 
 
 def _is_given(value: object) -> bool:

@@ -58,8 +58,7 @@ def _mesh_of(path: str, scale: float | None) -> MeshShape:
     try:
         return gemelo.load_mesh(path, scale)
     except gemelo.BadArgument as error:
-        remedy = f": {error.remedy.replace('scale=', '--scale ')}" if error.remedy else ""
-        raise usage(f"{error.reason}{remedy}") from error
+        raise usage(error) from error
 
 
 def pose_of(at: Sequence[str], rpy: Sequence[str]) -> Transform:
