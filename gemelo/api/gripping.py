@@ -183,7 +183,7 @@ def opening_of(gripper: Gripper, to: Grip) -> float:
         return gripper.open if to == OPEN else gripper.closed
     position = number("grip", to)
     if not gripper.closed <= position <= gripper.open:
-        is_other = gripper.open < position <= 1000.0 * gripper.open
+        is_other = 1.0 <= position <= 1000.0 * gripper.open
         hint = (remedy("millimetres_are", value=position, metres=position / 1000.0),) if is_other else ()
         limits = {"least": gripper.closed, "most": gripper.open}
         raise BadArgument(because("argument.grip.range", *hint, value=position, **limits))

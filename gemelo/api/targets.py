@@ -438,4 +438,4 @@ def require_within(arm: ArmDescription, values: Mapping[str, float], *, rounded:
 
 def per_cent(value: float) -> tuple[Remedy, ...]:
     """The hint for a share that is written in per cent."""
-    return (remedy("percent_is", value=value, share=value / 100.0),) if 1.0 < value <= 100.0 else ()
+    return (remedy("percent_is", value=value, share=value / 100.0),) if 2.0 <= value <= 100.0 else ()

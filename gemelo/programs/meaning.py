@@ -16,7 +16,7 @@ from gemelo.programs.points import Point
 from gemelo.programs.program import Program
 from gemelo.programs.reading import parse_program, value_mistakes
 from gemelo.programs.steps import AnyStep, Attach, Call, Grip, MotionStep, Output, Pick, WaitFor
-from gemelo.programs.values import DEEPEST, Wrong, in_words_of_a_file
+from gemelo.programs.values import DEEPEST, Wrong
 from gemelo.schemas.reasons import because
 
 PointsByName = Mapping[str, Point]
@@ -105,7 +105,7 @@ class _Search:
         try:
             opening_of(gripper, step.to)
         except BadArgument as error:
-            yield "to", in_words_of_a_file(error, "to")
+            yield "to", error.reason
 
     def _motion(self, step: MotionStep) -> Iterator[Wrong]:
         if step.point and step.point not in self._points:
@@ -122,7 +122,7 @@ class _Search:
         try:
             joint_state(self._robot, joints, "joints")
         except BadArgument as error:
-            yield "joints", in_words_of_a_file(error, "joints")
+            yield "joints", error.reason
             return
         for name, value in joints.items():
             joint = self._robot.joint(name)

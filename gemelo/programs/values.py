@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterator
 from functools import partial
 
 from gemelo.api.errors import BadArgument
 from gemelo.api.targets import FASTEST, point, quaternion, turned, vector
 from gemelo.programs.steps import Arc, Line, MotionStep, Repeat, Speed, Step, Wait, WaitFor, goal_of
-from gemelo.schemas.reasons import PLAIN, Reason, because, plain, remedy
+from gemelo.schemas.reasons import Reason, because, remedy
 
 Wrong = tuple[str, Reason]  # the key, and what is wrong with it
 
@@ -122,12 +121,4 @@ def _tried(name: str, check: Callable[[], object]) -> Iterator[Wrong]:
     try:
         check()
     except BadArgument as error:
-        yield name, in_words_of_a_file(error, name)
-
-
-def in_words_of_a_file(error: BadArgument, name: str) -> Reason:
-    """`write gemelo.mm(300)` is `write "300mm"` in a file."""
-    if error.reason.code != PLAIN:
-        return error.reason
-    text = str(error).replace(f"{name}= ", f"{name} ")
-    return plain(re.sub(r"write gemelo\.(mm|deg)\(([^)]*)\)", r'write "\2\1"', text))
+        yield name, error.reason

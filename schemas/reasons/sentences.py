@@ -12,6 +12,7 @@ from gemelo.schemas.reasons.catalogue import ENGLISH, template
 from gemelo.schemas.reasons.units import in_display_units, in_si_units
 
 Value = bool | int | float | str | tuple[str, ...]  # SI units; names of joints, links, objects and hosts as they are
+FILE = "file."  # begins the codes of what is wrong in a file
 PLAIN = "plain"  # the code of a sentence that has none of its own
 
 
@@ -39,6 +40,7 @@ class FrontEnd(Enum):
     COMMAND = "command"  # `gemelo home`
     SCRIPT = "script"  # arm.home()
     PAGE = "page"  # press Home
+    FILE = "file"  # what is to be written in the file that is wrong
 
 
 def say(reason: Explained, language: str = ENGLISH, front_end: FrontEnd = FrontEnd.COMMAND) -> str:
@@ -50,7 +52,7 @@ class _Writer(string.Formatter):
     """Puts values into the templates of one language and one front end.
 
     What stands behind a value's colon is its unit, or how it is worded: `word`, one that the catalogue translates,
-    `names`, each in the language's quotation marks, and `argument`, a name of one or of several as the front end has it.
+    `names`, each in the quotation marks of the language, and `argument`, of which each front end has a name of its own.
     """
 
     def __init__(self, language: str, front_end: FrontEnd) -> None:
@@ -59,7 +61,8 @@ class _Writer(string.Formatter):
 
     def sentence(self, reason: Explained) -> str:
         """With what would do behind it, where the template has no other place for that."""
-        causes = [self.sentence(cause) for cause in reason.causes]
+        writer = self._of_file if reason.code.startswith(FILE) else self
+        causes = [writer.sentence(cause) for cause in reason.causes]
         remedies = self._either([self._filled(each, self._template(each.code), {}) for each in reason.remedies])
         found = self._template(reason.code)
         within = {"causes": "; ".join(causes), "lines": "\n".join(causes), "remedies": remedies}
@@ -96,6 +99,11 @@ class _Writer(string.Formatter):
     def _word(self, word: str) -> str:
         return self._template(f"word.{word}") or word
 
+    @property
+    def _of_file(self) -> _Writer:
+        """For what is wrong in a file: the page has forms for it, others write into the file."""
+        return self if self._front_end is FrontEnd.PAGE else _writer(self._language, FrontEnd.FILE)
+
     def _argument(self, name: str) -> str:
         """Of a script, the option that does the same, or a word of the page."""
         match self._front_end:
@@ -105,6 +113,8 @@ class _Writer(string.Formatter):
                 return self._template(f"word.option.{name}") or f"--{name.replace('_', '-')}"
             case FrontEnd.PAGE:
                 return self._template(f"word.argument.{name}") or name
+            case FrontEnd.FILE:
+                return name
 
     def _all_of(self, names: Sequence[str]) -> str:
         """Several, the last one after the word for and."""

@@ -62,7 +62,7 @@ def test_what_cannot_be_understood_ends_with_two(words):
 
 @pytest.mark.parametrize(
     ("share", "said"),
-    [("0%", "0% is not above 0"), ("-10%", "-10% is not above 0"), ("101%", "101% is more than 100%")],
+    [("0%", "0% is not above 0"), ("-10%", "-10% is not above 0"), ("101%", "101% is not above 0% and at most 100%")],
 )
 def test_a_speed_outside_its_range_is_refused(share, said):
     with pytest.raises(CommandError, match=f"--speed {said}"):

@@ -29,6 +29,7 @@ from gemelo.schemas.planning import (
     Timing,
     WaypointGoal,
 )
+from gemelo.schemas.reasons import FrontEnd, Reason, because, remedy, say
 from tests.table import table
 
 HERE = gemelo.Pose((0.2, 0.1, 0.15), (1.0, 0.0, 0.0, 0.0))
@@ -40,8 +41,8 @@ def request(arm: ArmDescription, **target: Any) -> PlanRequest:
 
 BAD = [
     ({}, "none is given"),
-    ({"named": "ready", "position": (0.2, 0.1, 0.1)}, "not both named and position"),
-    ({"joints": {"brazo_joint": 0.1}, "position": (0.2, 0.1, 0.1)}, "not both joints and position"),
+    ({"named": "ready", "position": (0.2, 0.1, 0.1)}, "not both named= and position="),
+    ({"joints": {"brazo_joint": 0.1}, "position": (0.2, 0.1, 0.1)}, "not both joints= and position="),
     ({"postion": (0.2, 0.1, 0.1)}, 'no argument "postion"; did you mean "position"?'),
     ({"named": "redy"}, 'no named state "redy"; did you mean "ready"?'),
     ({"joints": {"brazo": 0.1}}, 'rm1 has no joint "brazo"; did you mean "brazo_joint"?'),
@@ -61,17 +62,17 @@ BAD = [
     ({"position": (0.2, 0.1, 0.1), "rpy": (0, 0, 0), "along": (0, 0, 1)}, "not by rpy= and along="),
     ({"position": (0.2, 0.1, 0.1), "axis": (0, 0, 1)}, "say with along="),
     ({"named": "ready", "frame": "base_link"}, "frame= does not go with named"),
-    ({"named": "ready", "speed": 50}, "not in (0, 1], a share of the joints' limits: 50 per cent is 0.5"),
+    ({"named": "ready", "speed": 50}, "not in (0, 1], a share of the joints' limits; 50 per cent is 0.5"),
     ({"named": "ready", "speed": 0}, "speed=0 is not in (0, 1]"),
     ({"named": "ready", "acceleration": -1}, "acceleration=-1 is not in (0, 1]"),
     ({"named": "ready", "allowed_time": 0}, "allowed_time=0 is not above 0"),
-    ({"named": "ready", "clearance": 4}, "clearance=4 m is not from 0.0005 to 0.05 m: if it is in millimetres, write"),
+    ({"named": "ready", "clearance": 4}, "clearance=4 m is not from 0.0005 to 0.05 m; if it is in millimetres, write"),
     ({"named": "ready", "clearance": 0.0004}, "clearance=0.0004 m is not from 0.0005 to 0.05 m"),
     ({"named": "ready", "attempts": 0}, "attempts=0 is not from 1 to 1000"),
     ({"named": "ready", "ptp": True, "attempts": 3}, "attempts= does not go with ptp="),
     ({"named": "ready", "blend": 0.01}, "blend= does not go with a goal without via="),
     ({"named": "ready", "tool_speed": 0.1}, "tool_speed= does not go with a free motion"),
-    ({"named": "ready", "ptp": True, "line": True}, "one path at a time, not line and ptp"),
+    ({"named": "ready", "ptp": True, "line": True}, "one path at a time, not line= and ptp="),
     ({"position": (0.2, 0.1, 0.1), "line": True, "tool_speed": 30}, "write gemelo.mm(30)"),
     ({"position": (0.2, 0.1, 0.1), "line": True, "seed": 3}, "seed= does not go with line="),
     ({"position": (0.2, 0.1, 0.1), "line": True, "least_fraction": 1.5}, "least_fraction=1.5  is more than 1"),
@@ -89,6 +90,7 @@ def test_an_argument_that_cannot_be_meant_is_refused_with_the_remedy(
     with pytest.raises(gemelo.BadArgument) as refusal:
         request(rm1, **target)
     assert said in str(refusal.value)
+    assert refusal.value.reason.code.startswith("argument.")
 
 
 def test_arguments_become_the_goal_that_they_name(rm1: ArmDescription) -> None:
@@ -158,6 +160,51 @@ def test_a_jog_that_cannot_be_meant_is_refused(
     with pytest.raises(gemelo.BadArgument) as refusal:
         ask(rm1)
     assert said in str(refusal.value)
+    assert refusal.value.reason.code.startswith("argument.")
+
+
+MEANT: list[tuple[dict[str, Any], Reason]] = [
+    ({"named": "redy"}, because("argument.named.unknown", remedy("did_you_mean", name="ready"), name="redy")),
+    (
+        {"position": (0.25, 0.1, 120.0)},
+        because("argument.point.far", remedy("in_millimetres", value=120.0), argument="position", value=120.0),
+    ),
+    (
+        {"named": "ready", "speed": 50},
+        because("argument.share", remedy("percent_is", value=50.0, share=0.5), argument="speed", value=50.0),
+    ),
+    (
+        {"position": (0.2, 0.1, 0.1), "line": True, "max_step": 0.0},
+        because("argument.not_positive", argument="max_step", value=0.0, unit="m"),
+    ),
+    ({"named": "ready", "rpy": (0, 0, 0)}, because("argument.not_with", argument="rpy", other="named")),
+]
+
+
+@table(("target", "reason"), MEANT, ids=[reason.code for _, reason in MEANT])
+def test_a_refused_argument_is_data(rm1: ArmDescription, target: dict[str, Any], reason: Reason) -> None:
+    with pytest.raises(gemelo.BadArgument) as refusal:
+        request(rm1, **target)
+    assert refusal.value.reason == reason
+
+
+POINT_IN_MM = because("argument.point.far", remedy("in_millimetres", value=120.0), argument="position", value=120.0)
+
+
+@table(
+    ("language", "front_end", "said"),
+    [
+        ("en", FrontEnd.SCRIPT, "position= has 120 m: if it is in millimetres, write gemelo.mm(120)"),
+        ("en", FrontEnd.COMMAND, "--to has 120 m: if it is in millimetres, write 120mm"),
+        ("en", FrontEnd.FILE, 'position has 120 m: if it is in millimetres, write "120mm"'),
+        ("es", FrontEnd.COMMAND, "--to tiene 120 m, que es demasiado: si está en milímetros, escriba 120mm"),
+        ("es", FrontEnd.PAGE, "La posición tiene 120 m, que es demasiado: si está en milímetros, escriba 120mm"),
+    ],
+)
+def test_an_argument_is_named_as_the_reader_has_it(language: str, front_end: FrontEnd, said: str) -> None:
+    assert say(POINT_IN_MM, language, front_end) == said
+    in_a_file = because("file.line", POINT_IN_MM, file="tour.toml", line=4)
+    assert ('write "120mm"' in say(in_a_file, "en", front_end)) is (front_end is not FrontEnd.PAGE)
 
 
 @given(value=st.floats(allow_nan=True, allow_infinity=True))

@@ -167,7 +167,19 @@ MISTAKES: list[tuple[str, int, Reason | str]] = [  # by its reason; by words of 
         because("point.unknown", known("above the box"), point="a\x00b", robot="rm1"),
     ),
     (ONE % '{do = "go", joints = {brazo = 1}}', 4, 'rm1 has no joint "brazo"; did you mean "brazo_joint"?'),
-    (ONE % '{do = "go", joints = {brazo_joint = 30}}', 4, 'if it is in degrees, write "30deg"'),
+    (
+        ONE % '{do = "go", joints = {brazo_joint = 30}}',
+        4,
+        because(
+            "argument.joint.other_unit",
+            remedy("in_degrees", value=30.0),
+            joint="brazo_joint",
+            value=30.0,
+            unit="rad",
+            lower=-2.95,
+            upper=2.95,
+        ),
+    ),
     (
         ONE % '{do = "go", joints = {brazo_joint = "200deg"}}',
         4,
@@ -191,7 +203,11 @@ MISTAKES: list[tuple[str, int, Reason | str]] = [  # by its reason; by words of 
             unit="rad or m",
         ),
     ),
-    (ONE % '{do = "go", position = [300, 0, 100]}', 4, 'position has 300 m: if it is in millimetres, write "300mm"'),
+    (
+        ONE % '{do = "go", position = [300, 0, 100]}',
+        4,
+        because("argument.point.far", remedy("in_millimetres", value=300.0), argument="position", value=300.0),
+    ),
     (
         ONE % '{do = "go", position = [0.3, 0.1]}',
         4,
@@ -211,7 +227,11 @@ MISTAKES: list[tuple[str, int, Reason | str]] = [  # by its reason; by words of 
         ),
     ),
     (ONE % '{do = "go", position = [0.3, 0, 0.1], orientation = [0, 0, 0, 2]}', 4, "a quaternion of length 2.0000"),
-    (ONE % '{do = "go", position = [0.3, 0, 0.1], rpy = [90, 0, 0]}', 4, 'write "90deg"'),
+    (
+        ONE % '{do = "go", position = [0.3, 0, 0.1], rpy = [90, 0, 0]}',
+        4,
+        because("argument.turn.large", remedy("in_degrees", value=90.0), argument="rpy", value=90.0),
+    ),
     (ONE % '{do = "go", state = "ready", rpy = [0, 0, 0]}', 4, because("program.turn.position", key="rpy")),
     (
         ONE % '{do = "go", state = "ready", blend = 20}',
@@ -278,7 +298,7 @@ MISTAKES: list[tuple[str, int, Reason | str]] = [  # by its reason; by words of 
             unit="m",
         ),
     ),
-    (ONE % '{do = "grip", to = "90mm"}', 4, "grip(0.09) is not 0 to 0.05 m between the jaws"),
+    (ONE % '{do = "grip", to = "90mm"}', 4, because("argument.grip.range", value=0.09, least=0.0, most=0.05)),
     (ONE % '{do = "grip", to = 25}', 4, "25 mm is 0.025"),
     (ONE % '{do = "grip", to = nan}', 4, "finite"),
     (

@@ -123,7 +123,6 @@ WITHIN_OTHERS = {  # parts of sentences, which are tested as a whole below
     "seen": "{} is not seen by {}{}: is it in the image, lit, and not behind the arm? `gemelo camera view`",
     "picked": "{} is at {}: seen +-{} mm{}{}, {} s{}",
     "unseen": "{}; not seen afterwards: {}",
-    "mesh": "if it is drawn in mm, give scale=0.001",
     "configuration": "the device refused the configuration: {}{}",
 }
 NOT_ON_THE_PAGE = {  # of files, logs and clients that a page does not have, and arguments that only a script gives
@@ -132,24 +131,13 @@ NOT_ON_THE_PAGE = {  # of files, logs and clients that a page does not have, and
     "services/stepper_gateway/device/state_checks.py": ("a state that ",),
     "services/stepper_gateway/device/echoes.py": ("too many measurements", "no link to the device", "its longest pass"),
     "services/planner/jog/jog_command.py": ("a jog command ", "a twist is given in"),
-    "gemelo/api/arm.py": ("an arc goes by", "a path needs", "start a plan", "plan a request", "jog by a", "ask with a"),
     "gemelo/api/connection.py": ("no {} of {} at the router",),
     "gemelo/api/control_file.py": ("{} belongs to user", "{}: {}: name another file in"),
-    "gemelo/api/device.py": ('"{}" is done to the whole device',),
-    "gemelo/api/jog.py": ("jog by one of", "twist= takes", 'frame="{}": a twist', "{}: {} {}/s is far beyond"),
-    "gemelo/api/ledger.py": ("confidence={}",),
     "gemelo/api/motion.py": ("{} in {} s{}, final error",),
     "gemelo/api/robot_files.py": ("no router at",),
     "gemelo/api/planning.py": ("{} holds no plan",),
     "gemelo/programs/export.py": ("if __name__",),
-    "gemelo/api/scene.py": ("attach=True needs frame=",),
     "gemelo/api/session.py": ("this connection belongs to process", "this waits for messages"),
-    "gemelo/api/simulation.py": ("motors: ", "press(", "start", 'there is no "{}" to press', "wire="),
-    "gemelo/api/targets.py": (
-        "{}= names no joint", "say where to by one of",
-        "{}= is a quaternion", "{}= has {} rad", "axis= is an axis", "offset= leaves", "offset= begins",
-        "one path at a time", "{}= does not go with",
-    ),
 }  # fmt: skip
 
 
@@ -277,7 +265,6 @@ BEYOND = 'joint "a": 3.2000 rad is beyond the upper limit 2.9497 rad; stay withi
          "let it write?", "Aún no se oye al equipo «x»"),
         ('the clock of device "x" is not known yet: try again in a second', "Aún no se conoce el reloj del equipo «x»"),
         ("cup: it is seen 2 times: take the others away, or give each a tag of its own", "cup: se ve 2 veces"),
-        ('"leg.stl" would be 60 m long: if it is drawn in mm, give scale=0.001', "elija mm"),
         ("aborted after 2.10 s: the device holds because it lost the gateway's heartbeat; then stopped by a device "
          "command (DISARM)", "Luego: Lo detuvo una orden al equipo (apagar los motores)."),
         ("homing refused: the device is in HOMING: wait, or arm.stop()", "«buscando el origen»"),

@@ -83,13 +83,6 @@ _SCENE: dict[str, str] = {
     "the file's content": "«{name}»: la ruta «{path}» lleva a otra parte.",
     'object "{name}": there is no mesh "{path}" in {folders}': "«{name}»: no hay una malla «{path}» en {folders}.",
     'object "{name}": mesh {path} cannot be read: {error}': "«{name}»: la malla {path} no se puede leer ({error}).",
-    '"{path}" would be {size} m long: if it is drawn in mm, give scale=0.001': "«{path}» mediría {size} m: si está "
-    "dibujado en mm, elija mm.",
-    '"{path}" would be {size} m long: in mm, cm or inches, give scale=0.001, 0.01 or 0.0254; if it is so large, '
-    "scale=1": "«{path}» mediría {size} m: elija su unidad.",
-    '"{path}" would be {size} m long': "«{path}» mediría {size} m.",
-    'there is no file "{path}"': "No hay un archivo «{path}».",
-    '"{path}" cannot be read: {error}': "«{path}» no se puede leer ({error}).",
     "{path} holds no scene: {error}": "{path} no tiene una escena ({error}).",
     '"{path}": {reason}': "{reason}",
     "it holds no triangle": "La malla no tiene ningún triángulo.",
@@ -113,8 +106,6 @@ _THINGS: dict[str, str] = {
         "make "
         "up."
     ),
-    '{path} has no thing or place "{name}": it has {names}': "{path} no tiene una cosa ni un lugar «{name}»; tiene "
-    "{names}.",
     "{path} has no [[camera]]": "{path} no tiene [[camera]].",
     "{word} is not seen by {cameras}, and nothing else: is it in the image, lit, and not behind the arm? `gemelo "
     "camera "
@@ -222,35 +213,6 @@ _ASKED: dict[str, str] = {
     "singularity (manipulability at {share} % of where slowing begins)": "El brazo está casi estirado, o con dos ejes "
     "alineados (singularidad).",
     "speed limit of {joint} ({limit})": "{joint} no va más rápido que {limit}.",
-    'joint "{joint}": {value} is beyond its limits, {limits}: if it is in {unit}, write gemelo.{helper}({number})': (
-        "{joint}: {value} está más allá de sus límites, {limits}."
-    ),
-    'joint "{joint}": {value} is beyond its limits, {limits}; nearest that can: {nearest}': "{joint}: {value} está más "
-    "allá de sus límites, {limits}; lo más cercano es {nearest}.",
-    'joint "{joint}": {value} is far beyond {most}: if it is in {unit}, write gemelo.{helper}({number})': "{joint}: "
-    "{value} pasa mucho de {most}.",
-    "twist: {value} is far beyond {most}: if it is in {unit}, write gemelo.{helper}({number})": "Herramienta: {value} "
-    "pasa mucho de {most}.",
-    'no named state "{name}"': "No hay una posición con nombre «{name}».",
-    'there is no frame "{name}"': "No hay un marco «{name}».",
-    "{owner}: {value} is not a number": "{owner}: {value} no es un número.",
-    "{owner}= has {value} m: if it is in millimetres, write gemelo.mm({value})": "{owner}: {value} m es demasiado; se "
-    "da "
-    "en metros.",
-    "speed({value}) is not in [0, 1], a share of the planned speed": "La velocidad va de 0 a 100 %, no {value}.",
-    "speed({value}) is not in [0, 1], a share of the planned speed: {cent} per cent is {share}": "La velocidad va de "
-    "0 a "
-    "100 %, no {value}.",
-    "{name}={value} is not in (0, 1], a share of the joints' limits": "{name} va de más de 0 a 1, no {value}.",
-    "{name}={value} is not in (0, 1], a share of the joints' limits: {cent} per cent is {share}": "{name} va de más "
-    "de 0 "
-    "a 1, no {value}.",
-    "attempts={value} is not from 1 to {most}": "Los intentos van de 1 a {most}, no {value}.",
-    "clearance={value} m is not from {least} to {most} m": "Lo que queda libre va de {least} a {most} m, no {value} m.",
-    "{name}={value} is not above 0": "{name} debe ser más de 0, no {value}.",
-    "{name}={value} is more than {most}": "{name} es {value}, más de {most}.",
-    '"{kind}" needs a target; there is no "{name}"': "«{kind}» necesita un nombre; «{name}» no lo hay.",
-    'there is no "{name}" to inject': "No hay «{name}».",
     "cancelled when the plan was just made: nothing moves": "Se canceló: nada se mueve.",
     "{reason}: nothing moves": "{reason} Nada se mueve.",
     "the plan was cancelled": "El plan fue cancelado.",
