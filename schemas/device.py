@@ -53,6 +53,10 @@ class DeviceStatus(Message, frozen=True, kw_only=True):
     speaks: bool = False  # its states arrive, also where it cannot be used
     deaf_since: int = 0  # [ns] UNIX time since when it speaks and does not hear; 0: it hears
     warning: str = ""  # what a person has to mend though it is online: two planners, another program on its topics
+    heap_free: int = 0  # [bytes] of the board's memory that is free; 0 where it does not say
+    heap_least: int = 0  # [bytes] the least that was free since its start
+    stack_least: int = 0  # [bytes] the least that was left of a task's stack
+    stack_task: str = ""  # whose stack that was
 
 
 class DeviceState(Message, frozen=True, kw_only=True):

@@ -10,6 +10,13 @@ namespace {
 constexpr size_t kStateHeadSize = 60;  // [bytes] standard: PROTOCOL.md
 constexpr size_t kStateServoSize = 4;  // [bytes] standard: PROTOCOL.md
 
+void add(JsonWriter* json, const MemoryReport& memory) {
+    json->field("heap_free", static_cast<uint64_t>(memory.heap_free));
+    json->field("heap_least", static_cast<uint64_t>(memory.heap_least));
+    json->field("stack_least", static_cast<uint64_t>(memory.stack_least));
+    json->field("stack_task", memory.task);
+}
+
 }  // namespace
 
 void Reporter::send(Output output, uint8_t* bytes, size_t size) const {
@@ -114,6 +121,7 @@ void Reporter::status(const StatusReport& report) const {
     json.field("config_crc32", static_cast<uint64_t>(report.config->crc32));
     json.field("virtual", report.is_virtual);
     if (report.slot[0] != 0) json.field("slot", report.slot);
+    if (sink_.memory != nullptr) add(&json, sink_.memory());
     const size_t size = json.close();
     sink_.put(sink_.context, Output::Status, json.bytes(), size);
 }

@@ -17,6 +17,13 @@ enum class Output : uint8_t { TrajAck, CmdAck, SyncReply, State, Event, Status, 
 
 constexpr uint8_t kFlagArmed = 1;
 
+// What is left of a board's memory, and what was left of it at the least since its start [bytes].
+struct MemoryReport {
+    uint32_t heap_free, heap_least;
+    uint32_t stack_least;  // of the task that has come closest to its end
+    const char* task;      // the name of that one
+};
+
 // Takes every output at once; the bytes are valid during the call only.
 struct Sink {
     void* context = nullptr;
@@ -27,6 +34,8 @@ struct Sink {
     ConfigFault (*check)(void* context, const DeviceConfig& config) = nullptr;
     // Takes a new firmware; may be null.
     const FirmwareSlot* firmware = nullptr;
+    // How much memory is left; may be null.
+    MemoryReport (*memory)() = nullptr;
 };
 
 struct Acknowledgement {

@@ -13,6 +13,7 @@ from gemelo.libraries.runtime.serial_frames import JsonFrame, json_frame, packet
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.device import board_doctor
 from gemelo.tools.cli.device.board_doctor import MeasuredArrivals, diagnose
+from gemelo.tools.cli.device.provision import BoardStatus
 from gemelo.tools.cli.main import run
 
 ROM = b"ets Jul 29 2019 12:21:46\r\n\r\nrst:0x1 (POWERON_RESET),boot:0x13 (SPI_FAST_FLASH_BOOT)\r\n"
@@ -43,14 +44,29 @@ SAID = {
 def test_the_cause_is_told_from_what_is_heard(name):
     data, cause = SAID[name]
     at_wrong_rate = bytes(byte | 128 for byte in data)  # text is not read as text there
-    finding = diagnose([MeasuredArrivals(921_600, at_wrong_rate[:400], False), MeasuredArrivals(115_200, data, False)])
+    finding = diagnose([MeasuredArrivals(921_600, at_wrong_rate[:400], None), MeasuredArrivals(115_200, data, None)])
     assert cause in finding.cause
     assert finding.remedy
     assert not finding.is_well
 
 
 def test_a_board_that_is_well_is_said_to_be():
-    assert diagnose([MeasuredArrivals(921_600, b"", True)]).is_well
+    assert diagnose([MeasuredArrivals(921_600, b"", BoardStatus(device="rm1"))]).is_well
+
+
+@pytest.mark.parametrize(
+    ("heap", "stack", "said"),
+    [
+        (40_200, 812, ""),
+        (9_000, 812, "the board's memory was down to 9000 bytes"),
+        (40_200, 120, "the stack of the board's task wire was down to 120 bytes"),
+    ],
+)
+def test_a_board_whose_memory_runs_out_is_not_well(heap, stack, said):
+    status = BoardStatus(device="rm1", heap_free=71_000, heap_least=heap, stack_least=stack, stack_task="wire")
+    finding = diagnose([MeasuredArrivals(921_600, b"", status)])
+    assert finding.is_well == (said == "")
+    assert said in finding.remedy
 
 
 @pytest.fixture
@@ -71,7 +87,8 @@ def port(request):
     os.close(master)
 
 
-STATUS = packet(json_frame(JsonFrame.STATUS, msgspec.json.encode({"online": True, "device": "rm1"})))
+MEMORY = {"heap_free": 71000, "heap_least": 40200, "stack_least": 812, "stack_task": "wire"}
+STATUS = packet(json_frame(JsonFrame.STATUS, msgspec.json.encode({"online": True, "device": "rm1", **MEMORY})))
 
 
 @pytest.mark.parametrize("port", [ROM + b"invalid header: 0xffffffff\r\n\x1b[31m"], indirect=True)

@@ -125,6 +125,19 @@ def test_the_status_is_one_screen(session, rm1_device, capsys):
     assert rows["antebrazo_joint"] == ["antebrazo_joint", "NO", "-50", "0.0", "limit_q2", "released"]
 
 
+def test_the_status_shows_the_memory_of_a_board_that_says_it(session, rm1_device, capsys):
+    device_status.status(session, as_json=False)
+    assert "memory" not in capsys.readouterr().out
+    rm1_device.status = msgspec.structs.replace(
+        rm1_device.status, heap_free=71_000, heap_least=9_000, stack_least=812, stack_task="wire"
+    )
+    rm1_device.tell()
+    device_status.status(session, as_json=False)
+    text = capsys.readouterr().out
+    assert "memory   71000 bytes free, 9000 at the least since its start; the stack of wire had 812 left" in text
+    assert "mend     the board's memory was down to 9000 bytes" in text
+
+
 def test_the_status_names_fault_joint_and_remedy(session, rm1_device, capsys):
     rm1_device.set(mode=DeviceMode.FAULT, fault=int(DeviceFault.LIMIT_SWITCH), fault_joint="q2")
     device_status.status(session, as_json=False)

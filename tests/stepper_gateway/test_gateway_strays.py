@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
@@ -10,7 +11,7 @@ from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.libraries.runtime.serial_frames import packet
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode
-from gemelo.schemas.topics import JOINT_STATES
+from gemelo.schemas.topics import DEVICE_STATUS, JOINT_STATES
 from gemelo.services.stepper_gateway.links.frames import (
     Ack,
     Code,
@@ -136,6 +137,16 @@ def test_a_device_says_its_status_over_its_serial_line_too() -> None:
     device.take_serial()
     device.receive_serial(packet(encode(CommandFrame(boot_id=77, cmd_id=1, expires_us=NEVER, cmd=STATUS))))
     assert b"reset_cause" in device.take_serial()
+
+
+def test_what_a_board_says_of_its_memory_goes_along_in_its_status() -> None:
+    rig = VirtualArm().ready()
+    said = {"online": True, "device": "rm1", "boot_id": rig.device.boot_id, "firmware": "1.0.0"}
+    memory = {"heap_free": 71000, "heap_least": 40200, "stack_least": 812, "stack_task": "wire"}
+    rig.receive(Kind.STATUS, msgspec.json.encode(said | memory))
+    rig.run(0.5)
+    status = rig.messages(DEVICE_STATUS)[-1]
+    assert {name: getattr(status, name) for name in memory} == memory
 
 
 def test_an_empty_status_is_counted_and_changes_nothing() -> None:

@@ -146,4 +146,8 @@ class StatusFacts(NamedTuple):
             speaks=self.speaks,
             deaf_since=self.deaf_since,
             warning=self.warning,
+            heap_free=report.heap_free,
+            heap_least=report.heap_least,
+            stack_least=report.stack_least,
+            stack_task=report.stack_task,
         )

@@ -39,6 +39,10 @@ class StatusReport(Report, frozen=True, kw_only=True):
     virtual: bool = False
     open_loop: bool = False  # it does not say what it has executed
     place: str = ""  # where a virtual device runs
+    heap_free: Word = 0  # [bytes] of its memory, as all below; 0 where the board does not say
+    heap_least: Word = 0
+    stack_least: Word = 0
+    stack_task: str = ""
 
 
 class EventReport(Report, frozen=True, kw_only=True):

@@ -8,7 +8,9 @@ from typing import NamedTuple
 
 from gemelo.libraries.runtime.serial_frames import JsonFrame, PacketDecoder, packet, parse_json_frame, sync_frame
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
-from gemelo.tools.cli.device.provision import BAUD, BoardLine, open_line
+from gemelo.tools.cli.common.language import sentence
+from gemelo.tools.cli.device.board_memory import memory_left, memory_low
+from gemelo.tools.cli.device.provision import BAUD, BoardLine, BoardStatus, decoded, open_line
 from gemelo.tools.cli.parser import Options, Parser, positive_integer
 
 BOOT_BAUD = 115_200  # of the chip's own boot loader, which is in ROM
@@ -25,7 +27,7 @@ class MeasuredArrivals(NamedTuple):
 
     baud: int
     data: bytes
-    status: bool  # gemelo's firmware has said who it is
+    status: BoardStatus | None  # of gemelo's firmware
 
 
 class BoardDiagnosis(NamedTuple):
@@ -67,10 +69,12 @@ def run(options: Options) -> ExitCode:
         print(f"listening to {options.serial} at {baud} baud for {LISTENING:g} s ...", flush=True)
         with open_line(options.serial, baud) as line:
             heard.append(listen(line, baud, LISTENING))
-        if heard[-1].status:
+        if heard[-1].status is not None:
             break
     for line_of_text in lines_of(heard):
         print(f"  it says: {line_of_text}")
+    if (status := heard[-1].status) is not None and (left := memory_left(status)) is not None:
+        print(f"  memory: {sentence(left)}")
     finding = diagnose(heard)
     if finding.is_well:
         print(f"{finding.cause}: {finding.remedy}")
@@ -91,14 +95,16 @@ def listen(line: BoardLine, baud: int, seconds: float) -> MeasuredArrivals:
         for frame in packets.feed(piece):
             found = parse_json_frame(frame)
             if found is not None and found.kind is JsonFrame.STATUS:
-                return MeasuredArrivals(baud, bytes(data), True)
-    return MeasuredArrivals(baud, bytes(data), False)
+                return MeasuredArrivals(baud, bytes(data), decoded(found.text, BoardStatus))
+    return MeasuredArrivals(baud, bytes(data), None)
 
 
 def diagnose(heard: list[MeasuredArrivals]) -> BoardDiagnosis:
     """The likely cause of what was heard at each rate, and the remedy."""
     for each in heard:
-        if each.status:
+        if each.status is not None:
+            if (low := memory_low(each.status)) is not None:
+                return BoardDiagnosis("gemelo's firmware runs and answers", sentence(low))
             return BoardDiagnosis(
                 "gemelo's firmware runs and answers", "`gemelo device provision` tells it its networks", True
             )

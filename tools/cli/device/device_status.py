@@ -7,8 +7,10 @@ import msgspec
 from gemelo.schemas.device import DeviceMode, DeviceState, DeviceStatus
 from gemelo.schemas.device_link import offline_word, reason_text, state_round_trip_text
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
+from gemelo.tools.cli.device.board_memory import memory_left, memory_low
 from gemelo.tools.cli.device.device_snapshot import (
     OPEN_LOOP,
     DeviceJoint,
@@ -72,6 +74,8 @@ def text_of(view: DeviceSnapshot) -> str:
     """The snapshot as one screen of text."""
     lines = [f"device   {who_it_is(view.status, view.now)}", f"config   {view.configuration}"]
     lines += [f"mend     {view.status.warning}"] if view.status.warning else []
+    for heading, found in (("memory", memory_left(view.status)), ("mend", memory_low(view.status))):
+        lines += [f"{heading:<8} {sentence(found)}"] if found is not None else []
     if view.state is None:
         return "\n".join(lines)
     lines += [f"mode     {_mode(view)}", *_fault(view), f"drivers  {_drivers(view.state)}"]

@@ -128,10 +128,14 @@ class ProvisionAnswer(msgspec.Struct, frozen=True):
 
 
 class BoardStatus(msgspec.Struct, frozen=True):
-    """The fields of the JSON of `status` that are printed."""
+    """The fields of the JSON of `status` that are printed; memory in bytes."""
 
     device: str = ""
     firmware: str = ""
+    heap_free: int = 0
+    heap_least: int = 0
+    stack_least: int = 0
+    stack_task: str = ""
 
 
 class ConfigAnswer(msgspec.Struct, frozen=True):
@@ -180,7 +184,7 @@ class BoardExchange:
                 f"no answer in {patience:g} s: is it the right --serial port and --baud, and does gemelo's firmware "
                 "run there? `python -m serial.tools.list_ports` lists the ports"
             )
-        return _decoded(ack, ProvisionAnswer)
+        return decoded(ack, ProvisionAnswer)
 
     def configure(self, text: bytes, patience: float = PATIENCE) -> None:
         """Disarms the board and sends it the configuration.
@@ -192,7 +196,7 @@ class BoardExchange:
         ack = self._exchange(question, JsonFrame.CONFIG_ACK, patience, AGAIN)
         if ack is None:
             raise CommandError(f"the board does not answer its configuration in {patience:g} s")
-        answer = _decoded(ack, ConfigAnswer)
+        answer = decoded(ack, ConfigAnswer)
         if not answer.accepted:
             part = f"{answer.part}: " if answer.part else ""
             raise CommandError(f"the board refuses the configuration of robot.toml: {part}{answer.reason}")
@@ -200,7 +204,7 @@ class BoardExchange:
     def status(self, patience: float = TO_RESTART) -> BoardStatus | None:
         """The board's status after its restart; None if it says nothing for `patience` [s]."""
         status = self._exchange(packet(sync_frame(0)), JsonFrame.STATUS, patience, 1.0)
-        return None if status is None else _decoded(status, BoardStatus)
+        return None if status is None else decoded(status, BoardStatus)
 
     def _exchange(self, question: bytes, answer: JsonFrame, patience: float, again: float) -> bytes | None:
         deadline, next_try = time.monotonic() + patience, 0.0
@@ -214,13 +218,14 @@ class BoardExchange:
                 if found is None:
                     continue
                 if found.kind is JsonFrame.STATUS:
-                    self.newest_status = _decoded(found.text, BoardStatus)
+                    self.newest_status = decoded(found.text, BoardStatus)
                 if found.kind is answer:
                     return found.text
         return None
 
 
-def _decoded(text: bytes, kind: type[T]) -> T:
+def decoded(text: bytes, kind: type[T]) -> T:
+    """The JSON of a frame; raises `CommandError` where it is none of that kind."""
     try:
         return msgspec.json.decode(text, type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:

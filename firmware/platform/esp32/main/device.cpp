@@ -9,6 +9,7 @@
 #include "esp_system.h"
 #include "esp_task_wdt.h"
 #include "esp_timer.h"
+#include "memory.h"
 #include "phrase.h"
 #include "reset_cause.h"
 #include "sensors.h"
@@ -67,7 +68,7 @@ void Device::wake_up() {
     const Awakening awakening = wake(pose_memory, cause.is_warm, config_.crc32);
     Phrase(reset_cause_, sizeof reset_cause_).add(cause.text).add(awakening.was_moving ? " while moving" : "");
     machine_.begin(config_, Identity{boot_id_, reset_cause_, false, device_, ota_.label()},
-                   Sink{this, put, keep, check, ota_.slot()});
+                   Sink{this, put, keep, check, ota_.slot(), measured_memory});
     serial_.begin(machine_, boot_id_, other, this);
     tick_.begin(machine_.stepper(), xTaskGetCurrentTaskHandle());
     machine_.start(clock_us(), awakening.steps, awakening.is_referenced);

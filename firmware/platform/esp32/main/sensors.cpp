@@ -6,6 +6,7 @@
 #include "esp_err.h"
 #include "esp_timer.h"
 #include "factory_button.h"
+#include "memory.h"
 #include "pin_uses.h"
 #include "tasks.h"
 #include "this_chip.h"
@@ -15,6 +16,7 @@ namespace gemelo {
 namespace {
 
 constexpr uint32_t kRoundMs = 20;
+constexpr uint32_t kMemoryMs = 10000;  // as often as `status` is said
 
 // Few fields of a configuration that the slot's task may replace at any time.
 struct Job {
@@ -73,13 +75,18 @@ void run(void*) {
     voltmeter.begin();
     echo.begin(xTaskGetCurrentTaskHandle());
     FactoryButton button;
-    uint32_t waited_ms = 0;
+    uint32_t waited_ms = 0, memory_ms = kMemoryMs;
     for (;;) {
         vTaskDelay(pdMS_TO_TICKS(kRoundMs));
         const uint64_t now_us = static_cast<uint64_t>(esp_timer_get_time());
         if (button.is_held(is_button_pressed(), now_us))
             board.from_sensors.push(static_cast<uint8_t>(Inbound::FactoryReset), 0, now_us, nullptr, 0);
         waited_ms += kRoundMs;
+        memory_ms += kRoundMs;
+        if (memory_ms >= kMemoryMs) {
+            measure_memory();
+            memory_ms = 0;
+        }
         if (waited_ms < __atomic_load_n(&jobs.round_ms, __ATOMIC_RELAXED)) continue;
         waited_ms = 0;
         measure_all();

@@ -4,6 +4,7 @@
 #include "esp_err.h"
 #include "freertos/FreeRTOS.h"
 #include "freertos/task.h"
+#include "memory.h"
 #include "sdkconfig.h"
 
 namespace gemelo {
@@ -32,6 +33,7 @@ inline TaskHandle_t start_task(TaskFunction_t code, const char* name, uint32_t s
     TaskHandle_t task = nullptr;
     const BaseType_t result = xTaskCreatePinnedToCore(code, name, stack, nullptr, priority, &task, core);
     ESP_ERROR_CHECK(result == pdPASS ? ESP_OK : ESP_ERR_NO_MEM);
+    watch_stack(task, name);
     return task;
 }
 

@@ -15,6 +15,7 @@
 #include "driver/uart.h"
 #include "esp_adc/adc_cali_scheme.h"
 #include "esp_crt_bundle.h"
+#include "esp_heap_caps.h"
 #include "esp_netif.h"
 #include "esp_ota_ops.h"
 #include "esp_random.h"
@@ -190,6 +191,9 @@ BaseType_t xTaskCreatePinnedToCore(TaskFunction_t, const char*, uint32_t, void*,
 }
 TaskHandle_t xTaskGetCurrentTaskHandle(void) { return nullptr; }
 void vTaskDelay(TickType_t) {}
+UBaseType_t uxTaskGetStackHighWaterMark(TaskHandle_t task) { return fake::chip.stack_left[task]; }
+size_t heap_caps_get_free_size(uint32_t) { return fake::chip.heap_free; }
+size_t heap_caps_get_minimum_free_size(uint32_t) { return fake::chip.heap_least; }
 
 esp_err_t gptimer_new_timer(const gptimer_config_t*, gptimer_handle_t*) { return ESP_OK; }
 esp_err_t gptimer_register_event_callbacks(gptimer_handle_t, const gptimer_event_callbacks_t* callbacks,

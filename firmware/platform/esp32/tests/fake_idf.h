@@ -14,6 +14,7 @@
 #include "esp_event.h"
 #include "esp_ota_ops.h"
 #include "esp_system.h"
+#include "freertos/task.h"
 #include "mqtt_client.h"
 
 namespace fake {
@@ -49,6 +50,8 @@ struct Chip {
     std::map<std::string, std::string> nvs;
     uint32_t flash_writes = 0;
     Flash flash;
+    size_t heap_free = 0, heap_least = 0;
+    std::map<TaskHandle_t, uint32_t> stack_left;
     std::string tls_authority, tls_certificate, tls_key;  // of the transport; empty: it was given none
     std::vector<std::string> subscriptions;               // topic and QoS
     esp_mqtt_client_config_t mqtt{};

@@ -7,6 +7,7 @@
 
 #include "fake_idf.h"
 #include "frames.h"
+#include "memory.h"
 #include "running.h"
 #include "store.h"
 
@@ -44,6 +45,22 @@ TEST(Esp32Layer, ANewBoardIsConfiguredOverTheWireAndKeepsIt) {
     const uint64_t outputs = 1ull << kStep | 1ull << kDir | 1ull << kEnable | 1ull << kLamp;
     EXPECT_EQ(chip.is_output, outputs);
     EXPECT_TRUE(is_high(kEnable));  // the drivers are off: a new configuration wants a person
+}
+
+TEST(Esp32Layer, StatusSaysWhatIsLeftOfTheMemoryAndWhichStackCameClosestToItsEnd) {
+    chip.nvs.clear();
+    chip.heap_free = 71000;
+    chip.heap_least = 40200;
+    char slot = 0, wire = 0;
+    const auto slot_task = reinterpret_cast<TaskHandle_t>(&slot), wire_task = reinterpret_cast<TaskHandle_t>(&wire);
+    chip.stack_left = {{slot_task, 9000}, {wire_task, 812}};
+    watch_stack(slot_task, "slot");
+    watch_stack(wire_task, "wire");
+    measure_memory();
+    Running running(ESP_RST_POWERON);
+    EXPECT_TRUE(has(running.said(Output::Status),
+                    "\"heap_free\": 71000, \"heap_least\": 40200, "
+                    "\"stack_least\": 812, \"stack_task\": \"wire\""));
 }
 
 TEST(Esp32Layer, AConfigurationThatTheChipCannotServeIsRefusedByName) {

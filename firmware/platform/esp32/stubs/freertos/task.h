@@ -12,5 +12,6 @@ TaskHandle_t xTaskGetCurrentTaskHandle(void);
 void vTaskDelay(TickType_t ticks);
 BaseType_t xTaskNotifyGive(TaskHandle_t task);
 void vTaskNotifyGiveFromISR(TaskHandle_t task, BaseType_t* is_higher_priority_task_woken);
+UBaseType_t uxTaskGetStackHighWaterMark(TaskHandle_t task);
 uint32_t ulTaskNotifyTake(BaseType_t clear_count_on_exit, TickType_t ticks_to_wait);
 }
