@@ -141,10 +141,11 @@ def test_a_device_says_its_status_over_its_serial_line_too() -> None:
 
 def test_what_a_board_says_of_its_memory_goes_along_in_its_status() -> None:
     rig = VirtualArm().ready()
-    said = {"online": True, "device": "rm1", "boot_id": rig.device.boot_id, "firmware": "1.0.0"}
     memory = {"heap_free": 71000, "heap_least": 40200, "stack_least": 812, "stack_task": "wire"}
-    rig.receive(Kind.STATUS, msgspec.json.encode(said | memory))
-    rig.run(0.5)
+    rig.device.report_status()
+    said = next(frame.payload for frame in rig.device.take() if frame.kind == "status")
+    rig.receive(Kind.STATUS, msgspec.json.encode(msgspec.json.decode(said) | memory))
+    assert rig.run(3.0, lambda: bool(rig.messages(DEVICE_STATUS)) and rig.messages(DEVICE_STATUS)[-1].heap_free > 0)
     status = rig.messages(DEVICE_STATUS)[-1]
     assert {name: getattr(status, name) for name in memory} == memory
 

@@ -309,4 +309,4 @@ class DeviceSession:
 
 def _facts(status: StatusReport) -> StatusReport:
     """What a boot never changes, but for another configuration."""
-    return replace(status, referenced=False, armed=False)
+    return replace(status, referenced=False, armed=False, heap_free=0, heap_least=0, stack_least=0, stack_task="")

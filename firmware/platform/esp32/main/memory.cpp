@@ -1,4 +1,4 @@
-// What is left of the board's memory, measured by one task and read by another.
+// The memory that is left to the board, measured by one task and read by another.
 #include "memory.h"
 
 #include "esp_heap_caps.h"

@@ -1,4 +1,4 @@
-// What is left of the board's memory: its heap, and the stacks of our tasks.
+// The memory that is left to the board: its heap, and the stacks of our tasks.
 #pragma once
 
 #include "freertos/FreeRTOS.h"
