@@ -8,6 +8,7 @@ from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import Message, Vector, has_finite_sum
 from gemelo.schemas.motion import JointTrajectory
+from gemelo.schemas.reasons import Reason
 from gemelo.schemas.scene import Contact, SceneObject
 
 
@@ -146,6 +147,7 @@ class Refusal(Message, frozen=True, kw_only=True):
     nearest_free: Vector = ()  # [rad] or [m] of all joints, the nearest to a start that touches at which nothing does
     message: str = ""  # one sentence for a person
     remedy: str = ""
+    why: Reason | None = None  # both as data
 
 
 class StepMargin(Message, frozen=True, kw_only=True):
@@ -236,6 +238,7 @@ class PlanCancelResult(Message, frozen=True, kw_only=True):
 
     found: bool = False
     message: str = ""
+    why: Reason | None = None  # `message` as data
 
 
 class PlanPhase(StrEnum):
@@ -346,6 +349,7 @@ class JogLimit(Message, frozen=True, kw_only=True):
     value: float | None = None  # [rad] or [m] of the joint, [m] between the pair, share of the manipulability
     limit: float | None = None
     message: str = ""  # for a person
+    why: Reason | None = None  # the same as data
 
 
 class JogStatus(Message, frozen=True, kw_only=True):
@@ -359,6 +363,7 @@ class JogStatus(Message, frozen=True, kw_only=True):
     limits: tuple[JogLimit, ...] = ()
     client: str = ""  # the node that it is about, while somebody holds control; empty: everybody
     check: str = ""  # "control": somebody else holds it
+    why: Reason | None = None  # there is no jogging, as data; absent where `limits` say what slows it
 
 
 class JogTaken(Message, frozen=True, kw_only=True, tag="taken"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.message import Message, Vector
+from gemelo.schemas.reasons import Reason
 
 
 class BoxShape(Message, frozen=True, kw_only=True, tag="box"):
@@ -185,6 +186,7 @@ class SceneResponse(Message, frozen=True, kw_only=True):
     version: int = 0
     name: str = ""  # of SceneGrip and SceneRelease: the object; empty if there is none
     width: float = 0.0  # [m] of that object between the jaws
+    why: Reason | None = None  # `reason` as data
 
 
 class Contact(Message, frozen=True, kw_only=True):

@@ -39,6 +39,7 @@ from gemelo.schemas.planning import (
     StepMargin,
     ValidityRequest,
 )
+from gemelo.schemas.reasons import Reason, Remedy, because, plain, remedy
 from gemelo.schemas.scene import Contact
 from gemelo.schemas.text_file import NotUtf8, read_text
 from gemelo.schemas.topics import DEVICE_STATE, FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS, STATE_VALIDITY
@@ -246,10 +247,8 @@ def refused(
 ) -> Refused:
     """The refusal as an exception, with the nearest goal as arguments."""
     nearest = _nearest(arm, refusal, request, target)
-    about = f"refused ({refusal.check})" if refusal.check else "refused"
-    hint = f"nearest that can: {words_of(nearest)}" if nearest else refusal.remedy
     return Refused(
-        f"{about}: {refusal.message}{f'; {hint}' if hint else ''}",
+        whole_reason(refusal, remedy("nearest_that_can", arguments=words_of(nearest)) if nearest else None),
         check=refusal.check,
         subject=refusal.subject,
         value=refusal.value,
@@ -259,10 +258,21 @@ def refused(
         configuration=_by_joint(arm, refusal.configuration),
         nearest_free=_by_joint(arm, refusal.nearest_free),
         code=code,
-        reason=refusal.message,
+        reason=refusal.why or refusal.message,
         refusal=refusal,
         contacts=contacts,
     )
+
+
+def whole_reason(refusal: Refusal, nearest: Remedy | None) -> Reason:
+    """The refusal with its check before it, and `nearest`, as the reader would write it, in place of its remedies."""
+    why = refusal.why or plain(refusal.message)
+    would_do = why.remedies if refusal.why is not None or not refusal.remedy else (remedy("do", what=refusal.remedy),)
+    would_do = would_do if nearest is None else (nearest,)
+    cause = replace(why, remedies=())
+    if not refusal.check:
+        return because("refused.plan", cause, *would_do)
+    return because("refused.plan.check", cause, *would_do, check=refusal.check)
 
 
 def words_of(target: Mapping[str, object]) -> str:

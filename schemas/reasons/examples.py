@@ -52,6 +52,8 @@ def _names(text: str) -> dict[str, Value]:
 
 
 def _is_number(spec: str) -> bool:
-    return spec not in ("word", "names") and (
-        "{" in spec or spec.partition(".")[0] in in_si_units or spec[-1] in "defgn%"
+    return (
+        spec != "names"
+        and not spec.startswith("word")
+        and ("{" in spec or spec.partition(".")[0] in in_si_units or spec[-1] in "defgn%")
     )

@@ -43,8 +43,9 @@ class Reason(Message, frozen=True, kw_only=True):
 
 def _require_finite(values: dict[str, Value]) -> None:
     for name, value in values.items():
-        if type(value) is float and not isfinite(value):
-            raise ValueError(f"field `values.{name}` is {value}: it must be finite")
+        for each in value.values() if type(value) is dict else value if type(value) is tuple else (value,):
+            if type(each) is float and not isfinite(each):
+                raise ValueError(f"field `values.{name}` is {each}: it must be finite")
 
 
 def because(code: str, /, *parts: Reason | Remedy, **values: Value) -> Reason:

@@ -11,7 +11,8 @@ from typing import Any, Protocol
 from gemelo.schemas.reasons.catalogue import ENGLISH, template
 from gemelo.schemas.reasons.units import in_display_units, in_si_units
 
-Value = bool | int | float | str | tuple[str, ...]  # SI units; names of joints, links, objects and hosts as they are
+# SI units; names of joints, links, objects and hosts as they are; several numbers, or each by its joint's name
+Value = bool | int | float | str | tuple[str | float, ...] | dict[str, float]
 FILE = "file."  # begins the codes of what is wrong in a file
 PLAIN = "plain"  # the code of a sentence that has none of its own
 
@@ -48,26 +49,38 @@ def say(reason: Explained, language: str = ENGLISH, front_end: FrontEnd = FrontE
     return _writer(language, front_end).sentence(reason)
 
 
+def say_apart(reason: Explained, language: str = ENGLISH, front_end: FrontEnd = FrontEnd.COMMAND) -> tuple[str, str]:
+    """As `say`, the sentence without what would do, and that alone."""
+    writer = _writer(language, front_end)
+    return writer.sentence(reason, False), writer.remedies(reason)
+
+
 class _Writer(string.Formatter):
     """Puts values into the templates of one language and one front end.
 
     What stands behind a value's colon is its unit, or how it is worded: `word`, one that the catalogue translates,
     `names`, each in the quotation marks of the language, and `argument`, of which each front end has a name of its own.
+    Of several numbers each has the unit; of numbers by their joints' names each has its own, where the unit is a value
+    with as many. `word.phase` are words of that kind alone.
     """
 
     def __init__(self, language: str, front_end: FrontEnd) -> None:
         self._language, self._front_end, self._context = language, front_end, front_end.value
         self._units = in_display_units if front_end is FrontEnd.PAGE else in_si_units
 
-    def sentence(self, reason: Explained) -> str:
+    def sentence(self, reason: Explained, has_remedies: bool = True) -> str:
         """With what would do behind it, where the template has no other place for that."""
         writer = self._of_file if reason.code.startswith(FILE) else self
         causes = [writer.sentence(cause) for cause in reason.causes]
-        remedies = self._either([self._filled(each, self._template(each.code), {}) for each in reason.remedies])
+        remedies = self.remedies(reason) if has_remedies else ""
         found = self._template(reason.code)
         within = {"causes": "; ".join(causes), "lines": "\n".join(causes), "remedies": remedies}
         text = self._filled(reason, found, within)
         return text if not remedies or "{remedies}" in (found or "") else f"{text}; {remedies}"
+
+    def remedies(self, reason: Explained) -> str:
+        """What would do; empty where nothing is known."""
+        return self._either([self._filled(each, self._template(each.code), {}) for each in reason.remedies])
 
     def _filled(self, what: Coded, found: str | None, within: Mapping[str, str]) -> str:
         """A code that no catalogue has, as a newer program may send it, is given as it is, with its values."""
@@ -85,9 +98,14 @@ class _Writer(string.Formatter):
         if format_spec == "argument":
             return self._all_of([self._argument(name) for name in _each(value)])
         if isinstance(value, str):
-            return self._word(value) if format_spec == "word" else value
+            return self._worded(value, format_spec) if format_spec.startswith("word") else value
         if isinstance(value, tuple):
-            return ", ".join(value)
+            between = ", " if any(isinstance(each, str) for each in value) else " "
+            return between.join(self.format_field(each, format_spec) for each in value)
+        if isinstance(value, dict):
+            units = _of_each(format_spec.split(", "), len(value))
+            written = zip(value.items(), units, strict=True)
+            return ", ".join(f"{name} {self.format_field(each, unit)}" for (name, each), unit in written)
         unit, _, digits = format_spec.partition(".")
         if unit in self._units:
             return self._units[unit](float(value), int(digits) if digits else None)
@@ -95,6 +113,10 @@ class _Writer(string.Formatter):
 
     def _template(self, code: str) -> str | None:
         return template(code, self._language, self._context) or template(code, ENGLISH, self._context)
+
+    def _worded(self, value: str, spec: str) -> str:
+        """One of an enumeration: by `word` alone, or among those of a kind, as `word.phase`."""
+        return self._template(f"{spec}.{value}") or value
 
     def _word(self, word: str) -> str:
         return self._template(f"word.{word}") or word
@@ -122,11 +144,15 @@ class _Writer(string.Formatter):
 
     def _either(self, remedies: Sequence[str]) -> str:
         """Several ways to mend it."""
-        return f" {self._word('or')} ".join(", ".join(part) for part in (remedies[:-1], remedies[-1:]) if part)
+        return f", {self._word('or')} ".join(", ".join(part) for part in (remedies[:-1], remedies[-1:]) if part)
 
 
 def _each(value: Value) -> tuple[str, ...]:
-    return value if isinstance(value, tuple) else (str(value),)
+    return tuple(map(str, value)) if isinstance(value, tuple) else (str(value),)
+
+
+def _of_each(units: Sequence[str], count: int) -> Sequence[str]:
+    return units if len(units) == count else [units[0]] * count
 
 
 class _Values(dict[str, Any]):

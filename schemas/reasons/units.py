@@ -33,6 +33,11 @@ def _typed(name: str, factor: float = 1.0) -> Written:
     return lambda value, _: f"{factor * value:g}{name}"
 
 
+def _short(name: str, convert: Callable[[float], float]) -> Written:
+    """To four digits in all: a clearance and a turn are given in this unit, at a command too."""
+    return lambda value, wanted: f"{convert(value):.{wanted or 4}g}{name}"
+
+
 _SAME: dict[str, Written] = {
     "typed ": _typed(""),
     "typed s": _typed("s"),
@@ -41,6 +46,7 @@ _SAME: dict[str, Written] = {
     "typed m/s^2": _typed("mm/s2", 1000.0),
     "typed rad or m": _typed("deg", degrees(1.0)),
     "typed share": _typed("%", 100.0),
+    "mm": _short(" mm", _thousand),
     "s": _unit("s", 3),
     "%": _unit("%", 0, _hundred),
     "steps": _unit("steps", 0),
@@ -49,6 +55,7 @@ _SAME: dict[str, Written] = {
 }
 in_si_units: Mapping[str, Written] = {
     **_SAME,
+    "deg": _short(" deg", degrees),
     "rad": _unit("rad", 4),
     "m": _unit("m", 4),
     "rad/s": _unit("rad/s", 4),
@@ -58,6 +65,7 @@ in_si_units: Mapping[str, Written] = {
 }
 in_display_units: Mapping[str, Written] = {
     **_SAME,
+    "deg": _short("°", degrees),
     "rad": _in_display("°", 1, degrees),
     "m": _in_display("mm", 1, _thousand),
     "rad/s": _in_display("°/s", 1, degrees),

@@ -23,6 +23,7 @@ from gemelo.schemas.planning import (
     PlanResponse,
     WaypointGoal,
 )
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
 from gemelo.services.planner.cartesian.tool_motions import ToolMotions
 from gemelo.services.planner.collision.checker import CollisionChecker
@@ -257,8 +258,8 @@ class Planner:
         margin = self._start_margin(trajectory.points[0].positions, deadline)
         touching = self.checker.touching(sample(trajectory).positions, margin)
         if touching is not None:
-            where = "in the scene as it has become meanwhile"
-            raise self._collision_refusals.refusal(PlanCode.PLANNING_FAILED, where, touching, margin, (), "plan again")
+            code, where = PlanCode.PLANNING_FAILED, "plan.collision.meanwhile"
+            raise self._collision_refusals.refusal(code, where, touching, margin, (), (remedy("plan_again"),))
 
     def _limits(self, request: PlanRequest) -> JointLimits:
         for name in ("velocity_scaling", "acceleration_scaling"):
@@ -288,10 +289,12 @@ class Planner:
 def _require_known(request: PlanRequest) -> None:
     """Raises `PlanRefused` for what this planner cannot do."""
     if not 0.0 < request.allowed_time <= LONGEST:
-        message = f"allowed_time is {request.allowed_time:g} s: it must be above 0 and at most {LONGEST:g}"
-        raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, "allowed_time", message, "allow 1 s, which is the default")
+        would_do = remedy("default_time", time=1.0)
+        why = because("plan.allowed_time", would_do, value=request.allowed_time, most=LONGEST)
+        raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, "allowed_time", why)
     if isinstance(request.motion, FreeMotion):
         require_known(request.motion.planner_id)
         if not 1 <= request.motion.attempts <= MOST_ATTEMPTS:
-            message = f"attempts is {request.motion.attempts}: it must be from 1 to {MOST_ATTEMPTS}"
-            raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, "attempts", message, "ask for 1, which is the default")
+            would_do = remedy("default_attempts")
+            why = because("plan.attempts", would_do, value=request.motion.attempts, most=MOST_ATTEMPTS)
+            raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, "attempts", why)

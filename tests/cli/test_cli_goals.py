@@ -11,7 +11,7 @@ from gemelo.libraries.arm.model.description import load_arm
 from gemelo.schemas.device import ReferenceCommand
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
 from gemelo.schemas.planning import Goal, JointGoal, NamedGoal, PoseGoal, Refusal
-from gemelo.tools.cli.bus.request_text import as_typed, refusal_text
+from gemelo.tools.cli.bus.request_text import as_typed, refusal_reason
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.common.units import parse_joints
 from gemelo.tools.cli.device.device import reference_request
@@ -72,14 +72,14 @@ def test_a_speed_outside_its_range_is_refused(share, said):
 def test_a_refusal_says_why_and_what_would_do():
     goal = PoseGoal(position=(2.0, 0.0, 0.1))
     refusal = Refusal(check="reach", message="2.000 m is out of reach", nearest=(0.4, 0.0, 0.1), remedy="come nearer")
-    assert refusal_text(refusal, goal, ARM) == (
+    assert str(refusal_reason(refusal, goal, ARM)) == (
         "refused (reach): 2.000 m is out of reach; nearest that can: --to 0.4000 0.0000 0.1000"
     )
 
 
 def test_a_refusal_without_a_nearest_goal_has_its_remedy():
     refusal = Refusal(check="state", message="the arm's state is 3 s old", remedy="look at `gemelo state`")
-    text = refusal_text(refusal, NamedGoal(name="ready"), ARM)
+    text = str(refusal_reason(refusal, NamedGoal(name="ready"), ARM))
     assert text == "refused (state): the arm's state is 3 s old; look at `gemelo state`"
 
 

@@ -15,13 +15,11 @@ from tests.additions import ROOT, added, row_added, run_in
 PORTUGUESE = '''"""The page in Portuguese."""
 
 from gemelo.services.panel.words.en import ENGLISH
-from gemelo.services.panel.words.en_refusals import REFUSALS
 from gemelo.services.panel.words.sentences import Language, Sentences
 
 PORTUGUESE = Language(
     "Português",
     {**ENGLISH, "plan": "Planejar", "execute": "Executar", "mode_idle": "Em repouso"},
-    {**REFUSALS, "reach": "Esse ponto fica {value} fora do alcance da ferramenta."},
     Sentences({"a newer goal took over": "uma meta mais nova assumiu"}, {"mode": {"IDLE": "em repouso"}}),
 )
 '''
@@ -39,10 +37,9 @@ from tests.panel.memory_page import memory_page
 from tests.runtime.support import until
 
 words = Words(language_of("pt-BR"))
-problem = Problem("refused (reach): too far", check="reach", subject="tool", value=0.2, limit=0.5)
 at = because("goal.limit.position", joint="q1", value=1.0, limit=0.5, unit="rad", side="upper")
 rejected = words.problem(Problem("refused by stepper_gateway", reason=at))[1]
-written = [words("plan"), rejected, words.problem(problem)[1]]
+written = [words("plan"), rejected]
 written += [words.said("a newer goal took over"), words.said("not known")]
 with memory_page("rm1", Path(sys.argv[1])) as page:
     page.draw(3)
@@ -64,7 +61,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     words = "services/panel/words/words.py"
     spanish = next(line for line in (ROOT / words).read_text().splitlines() if line.startswith('    "es": '))
     table = row_added(words, after=spanish, row='    "pt": PORTUGUESE,')[words]
-    first = "from gemelo.services.panel.words.refusals import"
+    first = "from gemelo.services.panel.words.es_work import"
     table = table.replace(first, f"from gemelo.services.panel.words.pt import PORTUGUESE\n{first}")
     catalogue = "schemas/reasons/catalogue.py"  # a file of its own, which looks for languages beside it
     languages = "schemas/reasons/languages/"
@@ -85,7 +82,6 @@ def test_a_new_language_is_chosen_by_a_browser_and_by_a_person_and_says_what_it_
     done = run_in(project, str(tmp_path / "script.py"), str(tmp_path))
     assert done.returncode == 0, done.stderr
     *written, is_on_the_page = json.loads(done.stdout.splitlines()[-1])
-    refused = "Esse ponto fica 200.0 mm fora do alcance da ferramenta."
     rejected = "q1: 57.3° passa do limite de 28.6°."
-    assert written == ["Planejar", rejected, refused, "uma meta mais nova assumiu", "not known"]
+    assert written == ["Planejar", rejected, "uma meta mais nova assumiu", "not known"]
     assert is_on_the_page

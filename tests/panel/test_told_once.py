@@ -22,18 +22,18 @@ def test_a_refusal_that_the_page_tells_is_not_told_by_the_tab_again(tmp_path: Pa
         problem = problem_of(refused)
         operator.goal.goal = replace(operator.goal.goal, problem=problem, version=operator.goal.goal.version + 1)
         page.draw(2)
-        assert "would touch" in shown.move.problem.content
+        assert "there, a with b" in shown.move.problem.content
         assert shown.move.nearest.visible
         operator.tell(problem_of(farther))
         page.draw(2)
-        assert "34.3 mm" in shown.move.problem.content
+        assert "there, a with b" in shown.move.problem.content
         operator.tell(problem_of(planned))
         page.draw(2)
-        assert "would touch" in shown.problem.content
+        assert "at the goal, a with b" in shown.problem.content
         assert shown.nearest.visible
         assert shown.move.problem.content == ""
         assert not shown.move.nearest.visible
         operator.forget_problem()
         page.draw(2)
-        assert "would touch" in shown.move.problem.content
+        assert "there, a with b" in shown.move.problem.content
         assert shown.problem.content == ""

@@ -22,6 +22,7 @@ from gemelo.schemas.planning import (
     PoseGoal,
     ValidityRequest,
 )
+from gemelo.schemas.reasons import remedy
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
 from gemelo.services.planner.collision.clearance import CLEARANCE, usable_clearance
 from gemelo.services.planner.collision.world import World
@@ -74,8 +75,12 @@ def test_a_refused_goal_says_how_near_between_what_and_which_clearance_would_do(
     assert refusal.value == pytest.approx(GAP, abs=1e-5)
     assert refusal.limit == CLEARANCE
     assert "slab" in refusal.subject
-    assert "would be nearer than 4 mm: 1.5 mm apart" in refusal.message
-    assert "ask for a clearance of 1.4 mm" in refusal.remedy
+    assert refusal.why is not None
+    assert refusal.why.code == "plan.collision.goal"
+    assert refusal.why.causes[0].code == "plan.pair.apart"
+    assert refusal.why.causes[0].values["limit"] == CLEARANCE
+    assert refusal.why.causes[0].values["distance"] == pytest.approx(GAP, abs=1e-5)
+    assert remedy("smaller_clearance", clearance=0.0014) in refusal.why.remedies
     assert planner.plan(request(rm1, clearance=0.0014), None).code is PlanCode.SUCCESS
 
 
@@ -131,8 +136,9 @@ def test_a_clearance_that_cannot_be_kept_is_refused_with_its_value_and_range(
     assert refusal is not None
     assert response.code is PlanCode.INVALID_GOAL_CONSTRAINTS
     assert (refusal.subject, refusal.value) == ("clearance", asked)
-    assert f"{1000 * asked:g} mm" in refusal.message
-    assert "from 0.5 mm to 50 mm" in refusal.message
+    assert refusal.why is not None
+    assert refusal.why.code == "plan.clearance.range"
+    assert refusal.why.values == {"value": asked, "least": 0.0005, "most": 0.05}
 
 
 @pytest.mark.parametrize("asked", [0.0005, 0.05])
@@ -161,8 +167,9 @@ def test_a_line_that_comes_too_near_says_the_clearance_that_would_do(rm1: ArmDes
     assert refusal is not None
     assert refusal.value is not None
     assert refusal.value <= CLEARANCE + 0.0002
-    usable = float(refusal.remedy.split("a clearance of ")[1].split(" mm")[0])
-    assert planner.plan(msgspec.structs.replace(over, clearance=usable / 1000.0), None).code is PlanCode.SUCCESS
+    assert refusal.why is not None
+    usable = next(each.values["clearance"] for each in refusal.why.remedies if each.code == "smaller_clearance")
+    assert planner.plan(msgspec.structs.replace(over, clearance=usable), None).code is PlanCode.SUCCESS
 
 
 @pytest.mark.parametrize(

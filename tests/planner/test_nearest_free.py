@@ -111,7 +111,7 @@ def home_from(planner: Planner, configuration: Array) -> PlanRequest:
 
 def jogged_as_told(name: str, world: World, configuration: Array, remedy: str) -> Array:
     """Where the arm comes to rest, by the jog and the tracker that run on a real one."""
-    told = re.match(r"`gemelo jog --joint (.*) --for (\S+)` leads out; or ", remedy)
+    told = re.match(r"`gemelo jog --joint (.*) --for (\S+)` leads out, ", remedy)
     assert told, remedy
     jogged = Jogged(name, crowded=False)
     jogged.tracker = TargetTracker(Limits.of(jogged.arm.joints), PERIOD, Knot.at_rest(tuple(configuration.tolist())))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from gemelo.schemas.planning import (
     PoseGoal,
     Refusal,
 )
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.schemas.scene import BoxShape, PlanningScene, SceneObject
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
@@ -41,9 +43,17 @@ def refused(response: PlanResponse, code: PlanCode) -> Refusal:
     assert response.trajectory.points == ()
     assert response.refusal is not None
     assert response.refusal.check
+    assert response.refusal.why is not None
     assert response.refusal.message
     assert response.refusal.remedy
+    assert str(response.refusal.why) == f"{response.refusal.message}; {response.refusal.remedy}"
     return response.refusal
+
+
+def why_of(response: PlanResponse, code: PlanCode) -> Reason:
+    why = refused(response, code).why
+    assert why is not None
+    return why
 
 
 @table("scaling", [0.0, -1.0, 1.0001])
@@ -81,7 +91,7 @@ def test_an_unknown_frame_has_a_nearest_name(planner: Planner, home: JointState)
 def test_a_goal_just_beyond_a_limit_says_by_how_much(planner: Planner, home: JointState, beyond: float):
     goal = JointGoal(name=("brazo_joint",), position=(2.95 + beyond,))
     refusal = refused(planner.plan(PlanRequest(goal=goal), home), PlanCode.INVALID_GOAL_CONSTRAINTS)
-    assert f"rad is {beyond:.4g} rad above its upper limit of 2.95 rad" in refusal.message
+    assert f"rad is {beyond:.4g} rad beyond its upper limit of 2.95 rad" in refusal.message
     assert refusal.nearest == (2.95,)
 
 
@@ -121,9 +131,11 @@ def test_a_goal_that_says_too_little_or_two_things_is_refused(planner: Planner, 
 
 def test_an_orientation_is_refused_by_an_arm_that_cannot_choose_it(planner: Planner, home: JointState):
     goal = PoseGoal(position=(0.25, 0.15, 0.1), orientation=(0.0, 0.0, 0.0, 1.0))
-    refusal = refused(planner.plan(PlanRequest(goal=goal), home), PlanCode.INVALID_GOAL_CONSTRAINTS)
-    assert "rm1 cannot tilt its tool, and its yaw follows from the position: the goal is 180 deg" in refusal.message
-    assert refusal.remedy == "ask for the position, or for the position + yaw"
+    why = why_of(planner.plan(PlanRequest(goal=goal), home), PlanCode.INVALID_GOAL_CONSTRAINTS)
+    assert why.code == "plan.orientation.impossible"
+    assert why.values["missing"] == pytest.approx(math.pi)
+    assert why.causes == (because("plan.turns.no_tilt", robot="rm1"),)
+    assert why.remedies == (remedy("position_alone"), remedy("position_and_yaw"))
 
 
 @pytest.mark.parametrize(
@@ -144,7 +156,9 @@ def test_out_of_reach_names_the_axis_and_the_nearest_point(
 
 def test_a_joint_that_holds_the_tool_back_is_named(planner: Planner, home: JointState):
     response = planner.plan(PlanRequest(goal=PoseGoal(position=(0.25, 0.15, 0.3))), home)
-    assert "efector_joint at its upper limit of 0.2 m" in refused(response, PlanCode.NO_IK_SOLUTION).message
+    why = why_of(response, PlanCode.NO_IK_SOLUTION)
+    assert why.code == "plan.reach.held"
+    assert because("plan.held", joint="efector_joint", side="upper", limit=0.2, unit="m") in why.causes
 
 
 @examples(quick=15, full=60)
@@ -182,7 +196,11 @@ def test_a_way_through_itself_names_the_pair(planner: Planner, rm1: ArmDescripti
 def test_a_start_in_collision_is_not_planned_from(planner: Planner, rm1: ArmDescription):
     start = JointState(name=rm1.joint_names, position=(0.0, 2.9, 0.0))
     refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="home")), start), PlanCode.START_STATE_IN_COLLISION)
-    assert "base_link with efector_link" in refusal.message
+    assert refusal.why is not None
+    assert refusal.why.code == "plan.collision.start"
+    assert refusal.why.causes[0].code == "plan.pair.touch"
+    pairs = {(cause.values["first"], cause.values["second"]) for cause in refusal.why.causes}
+    assert ("base_link", "efector_link") in pairs
 
 
 def test_an_arm_that_touches_what_it_carries_is_told_what_to_do(rm1: ArmDescription, home: JointState):
@@ -192,14 +210,16 @@ def test_an_arm_that_touches_what_it_carries_is_told_what_to_do(rm1: ArmDescript
     for motion in (FreeMotion(), PointToPoint(), LinearMotion()):
         request = PlanRequest(goal=NamedGoal(name="ready"), motion=motion)
         refusal = refused(planner.plan(request, home), PlanCode.START_STATE_IN_COLLISION)
-        assert refusal.message.endswith("touch")
-        assert "held" in refusal.message
-        assert "--touch" in refusal.remedy
+        assert refusal.why is not None
+        assert refusal.why.causes[0].code == "plan.pair.touch"
+        assert refusal.why.causes[0].values["second"] == "held"
+        assert refusal.why.causes[0].values["second_kind"] == "box"
+        assert refusal.why.remedies[-2:] == (remedy("touch_links", object="held"), remedy("let_go", object="held"))
 
 
 def test_no_joint_state_is_said(planner: Planner):
-    refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="home")), None), PlanCode.ROBOT_STATE_STALE)
-    assert "no joint state has come yet" in refusal.message
+    why = why_of(planner.plan(PlanRequest(goal=NamedGoal(name="home")), None), PlanCode.ROBOT_STATE_STALE)
+    assert why.code == "plan.state.none"
 
 
 def test_a_stale_joint_state_is_said_with_its_age(planner: Planner, home: JointState):
@@ -209,8 +229,9 @@ def test_a_stale_joint_state_is_said_with_its_age(planner: Planner, home: JointS
 
 def test_a_joint_state_without_a_joint_is_said(planner: Planner):
     state = JointState(name=("brazo_joint",), position=(0.0,))
-    refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="home")), state), PlanCode.INVALID_ROBOT_STATE)
-    assert "antebrazo_joint, efector_joint" in refusal.message
+    why = why_of(planner.plan(PlanRequest(goal=NamedGoal(name="home")), state), PlanCode.INVALID_ROBOT_STATE)
+    assert why.code == "plan.state.incomplete"
+    assert why.values == {"joints": ("antebrazo_joint", "efector_joint")}
 
 
 def test_a_moving_start_is_refused_with_the_joint(planner: Planner, rm1: ArmDescription):
@@ -227,7 +248,10 @@ def test_a_start_outside_the_limits_is_refused(planner: Planner, rm1: ArmDescrip
 
 def test_a_scaling_that_would_take_days_is_refused(planner: Planner, home: JointState):
     request = PlanRequest(goal=NamedGoal(name="ready"), velocity_scaling=1e-9)
-    assert "86400 s is the most" in refused(planner.plan(request, home), PlanCode.PLANNING_FAILED).message
+    why = why_of(planner.plan(request, home), PlanCode.PLANNING_FAILED)
+    assert why.code == "plan.verification"
+    assert why.causes[0].code == "plan.timing.too_long"
+    assert why.causes[0].values["most"] == 86400.0
 
 
 @table("allowed", [0.0, -1.0, -1e300, 120.5, 1e300])

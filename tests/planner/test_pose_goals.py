@@ -175,7 +175,7 @@ def test_rm1_says_that_it_cannot_tilt_its_tool_and_by_how_much(degrees: float):
     assert f"rm1 cannot tilt its tool, and its yaw follows from the position: the goal is {degrees:g} deg" in (
         refusal.message
     )
-    assert refusal.remedy == "ask for the position, or for the position + yaw"
+    assert refusal.remedy == "ask for the position alone, or for the position + yaw"
 
 
 def test_rm1_says_how_far_a_direction_is_from_those_that_its_tool_can_have():
@@ -282,7 +282,7 @@ UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 @pytest.mark.parametrize(
     ("goal", "subject", "said"),
     [
-        (PoseGoal(), "position", "a tool position has 3 numbers, not 0"),
+        (PoseGoal(), "position", "position has 3 numbers, not 0"),
         (PoseGoal(position=(0.1, 0.2)), "position", "not 2"),
         (PoseGoal(position=(1e300, 0.0, 0.0)), "position", "1e+300 0 0 m is no place"),
         (PoseGoal(position=HERE, orientation=(0.0, 0.0, 1.0)), "orientation", "has 4 numbers, not 3"),

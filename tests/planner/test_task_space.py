@@ -12,6 +12,7 @@ import pytest
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.planning import PoseGoal
+from gemelo.schemas.reasons import remedy
 from gemelo.services.planner.kinematics.goals import Goals
 from gemelo.services.planner.kinematics.targets import AxisPointing, ToolTarget
 from gemelo.services.planner.kinematics.task_space import TaskSpace, task_space
@@ -48,8 +49,8 @@ def test_rm1_only_yaws_and_that_follows_from_the_position():
     able = of(load_arm(ROOT / "rm1"))
     assert np.allclose(np.abs(able.axes), [[0.0, 0.0, 1.0]])
     assert able.chosen == 0
-    assert able.sentence == "rm1 cannot tilt its tool, and its yaw follows from the position"
-    assert able.remedy == "ask for the position, or for the position + yaw"
+    assert str(able.why) == "rm1 cannot tilt its tool, and its yaw follows from the position"
+    assert able.remedies == (remedy("position_alone"), remedy("position_and_yaw"))
 
 
 def test_parol6_can_do_everything():
@@ -58,18 +59,20 @@ def test_parol6_can_do_everything():
 
 
 @pytest.mark.parametrize(
-    ("fixed", "chosen", "remedy"),
+    ("fixed", "chosen", "code", "remedies"),
     [
-        (["joint_6"], 2, "ask for the position + the direction of one tool axis, or leave an axis free"),
-        (["joint_4", "joint_6"], 1, "ask for the position alone, or give the orientation a tolerance"),
-        (["joint_4", "joint_5", "joint_6"], 0, "ask for the position alone"),
+        (["joint_6"], 2, "plan.turns.some", ["position_and_axis", "free_axis"]),
+        (["joint_4", "joint_6"], 1, "plan.turns.some", ["position_alone", "orientation_tolerance"]),
+        (["joint_4", "joint_5", "joint_6"], 0, "plan.turns.follow", ["position_alone"]),
     ],
 )
-def test_with_fewer_joints_fewer_turns_can_be_chosen(fixed: list[str], chosen: int, remedy: str, tmp_path: Path):
+def test_with_fewer_joints_fewer_turns_can_be_chosen(
+    fixed: list[str], chosen: int, code: str, remedies: list[str], tmp_path: Path
+):
     able = of(without(fixed, tmp_path))
     assert (len(able.axes), able.chosen) == (3, chosen)
-    assert f"has {6 - len(fixed)} joints" in able.sentence
-    assert able.remedy == remedy
+    assert (able.why.code, able.why.values["joints"]) == (code, 6 - len(fixed))
+    assert [each.code for each in able.remedies] == remedies
 
 
 def test_an_arm_of_five_joints_points_its_tool_and_says_what_it_cannot_do(tmp_path: Path):

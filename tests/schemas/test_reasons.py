@@ -127,8 +127,8 @@ def test_a_sentence_without_a_code_is_itself_in_every_language():
 
 def test_several_remedies_are_a_choice():
     both = because("goal.points.none", remedy("plan_again"), remedy("in_parts"))
-    assert str(both) == "the trajectory has no points; plan again or send it in parts"
-    assert say(both, "es") == "El plan no tiene puntos; planifique otra vez o envíelo por partes"
+    assert str(both) == "the trajectory has no points; plan again, or send it in parts"
+    assert say(both, "es") == "El plan no tiene puntos; planifique otra vez, o envíelo por partes"
 
 
 def test_what_is_explained_is_a_code_or_the_beginning_of_some_in_every_language():

@@ -54,6 +54,11 @@ ANY_REMEDY = "send it in parts"
 class TooLarge(BadMessage):
     """A message that no receiver would take; the text has its size, the limit and the remedy."""
 
+    def __init__(self, text: str, size: int, limit: int) -> None:
+        """`size` and `limit` [bytes]."""
+        super().__init__(text)
+        self.size, self.limit = size, limit
+
 
 class Encoded(msgspec.Struct, Generic[M], frozen=True):
     """A message that can be sent, as it travels: its encoding cannot fail any more."""
@@ -98,4 +103,4 @@ def _check_size(schema: str, size: int) -> None:
     limit = limit_of(schema)
     if size > limit:
         remedy = REMEDY_OF.get(schema, ANY_REMEDY)
-        raise TooLarge(f"{size} bytes: a {schema} has at most {limit}; {remedy}")
+        raise TooLarge(f"{size} bytes: a {schema} has at most {limit}; {remedy}", size, limit)

@@ -98,8 +98,7 @@ class Page:
             self.scene.close()
 
     def _build(self, appearance: Appearance) -> None:
-        joints = {joint.name: joint for joint in self._operator.arm.description.joints}
-        self._words = words = Words(appearance.language, joints)
+        self._words = words = Words(appearance.language)
         self.kit = kit = Kit(self.client, self._operator, words)
         gui = self.client.gui
         gui.configure_theme(dark_mode=appearance.is_dark, show_logo=False, show_share_button=False, brand_color=BRAND)

@@ -307,8 +307,6 @@ ENGLISH: dict[str, str] = {
     "check_pulse_width": "Too fast for a driver",
     "check_device_queue": "Too fast for the device",
     "check_singularity": "Singularity",
-    "place_on_line": "At {gone} mm of {whole} mm of the path:",
-    "place_on_turn": "At {share} % of the turn:",
     "check_jump": "A joint would jump",
     "check_configuration": "Another configuration",
     "check_arc": "That is no arc",

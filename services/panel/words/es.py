@@ -216,8 +216,6 @@ SPANISH: dict[str, str] = {
     "remove": "Quitar",
     "remove_point": "Quitar el punto",
     "remove_question": "«{name}» no se puede recuperar, y un programa que va ahí ya no se ejecuta.",
-    "place_on_line": "A los {gone} mm de los {whole} mm del camino:",
-    "place_on_turn": "Al {share} % del giro:",
     "new_object": "Objeto nuevo",
     "name": "Nombre",
     "shape": "Forma",

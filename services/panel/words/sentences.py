@@ -60,7 +60,6 @@ class Language:
 
     name: str  # as its speakers call it
     table: Mapping[str, str]  # the page's own words, by the keys of the English ones
-    refusals: Mapping[str, str]  # by the check that refuses
     sentences: Sentences = field(default_factory=lambda: Sentences({}, {}))
     codes: Mapping[int, str] = field(default_factory=dict)  # of goals that the gateway rejects or aborts
 

@@ -10,20 +10,17 @@ from gemelo.schemas.reasons import Reason as Explained
 from gemelo.services.panel.model.availability import Reason
 from gemelo.services.panel.model.problems import Problem
 from gemelo.services.panel.words.en import ENGLISH
-from gemelo.services.panel.words.en_refusals import REFUSALS as ENGLISH_REFUSALS
 from gemelo.services.panel.words.es import SPANISH
 from gemelo.services.panel.words.es_device import FAULTS, GOAL_CODES, VALUES
 from gemelo.services.panel.words.es_gateway import GATEWAY
 from gemelo.services.panel.words.es_goals import GOALS
-from gemelo.services.panel.words.es_refusals import REFUSALS
 from gemelo.services.panel.words.es_work import WORK
-from gemelo.services.panel.words.refusals import Joints, key_of, place_of, sentence_of
 from gemelo.services.panel.words.sentences import Language, Sentences
 
 SPANISH_SENTENCES = Sentences(GATEWAY | GOALS | FAULTS | WORK, VALUES)
 LANGUAGES = {  # by the first part of a browser's language; the first one is that of all other browsers
-    "en": Language("English", ENGLISH, ENGLISH_REFUSALS),
-    "es": Language("Español", SPANISH, REFUSALS, SPANISH_SENTENCES, GOAL_CODES),
+    "en": Language("English", ENGLISH),
+    "es": Language("Español", SPANISH, SPANISH_SENTENCES, GOAL_CODES),
 }
 BUTTONS = {  # of the command line: what a person at the page presses instead
     "gemelo home": "home", "gemelo reference": "reference", "gemelo reset": "reset", "gemelo device arm": "arm",
@@ -35,9 +32,8 @@ BUTTONS = {  # of the command line: what a person at the page presses instead
 class Words:
     """`words("key", name=value)` is the text of the key with its values put in."""
 
-    def __init__(self, language: str, joints: Joints | None = None) -> None:
+    def __init__(self, language: str) -> None:
         self.language = language if language in LANGUAGES else next(iter(LANGUAGES))
-        self._joints = joints or {}
         self._of = LANGUAGES[self.language]
         self._table = self._of.table
 
@@ -55,16 +51,12 @@ class Words:
 
     def check(self, check: str) -> str:
         """What a check that refuses or limits is called; empty where the table has no name for it."""
-        return self._table.get(f"check_{key_of(check)}", "")
+        return self._table.get(f"check_{check.replace('-', ' ').replace(' ', '_')}", "")
 
     def problem(self, problem: Problem) -> tuple[str, str]:
         """A heading for the check, and a sentence; where this language has none, that of the part that refused."""
         heading = self.check(problem.check) or self("check_other" if problem.is_refusal else "check_ended")
-        known = self._table.get(f"text_{problem.text.replace(' ', '_')}")
-        if known is None and (template := sentence_of(problem, self._joints, self._of.refusals)) is not None:
-            place = place_of(problem)
-            known = template if place is None else f"{self(place[0], **place[1])} {template}"
-        return heading, known or self._told(problem)
+        return heading, self._table.get(f"text_{problem.text.replace(' ', '_')}") or self._told(problem)
 
     def why(self, reason: Explained) -> str:
         """The sentence of a reason; of causes that have no code, what `said` makes of them."""

@@ -9,9 +9,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from gemelo.libraries.arm.kinematics.kinematics import FramePose
-from gemelo.schemas.planning import PlanCode, Refusal
+from gemelo.schemas.planning import PlanCode
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.services.planner.cartesian.tool_path import ArcPiece
-from gemelo.services.planner.request.refusals import PlanRefused
+from gemelo.services.planner.request.refusals import PlanRefused, refusal_of
 
 Array = NDArray[np.float64]
 
@@ -29,7 +30,7 @@ def arc_through(start: FramePose, interim: Array, end: FramePose) -> ArcPiece:
     normal = np.cross(to_interim, to_end)
     sine = float(np.linalg.norm(normal)) / float(np.linalg.norm(to_interim) * np.linalg.norm(to_end))
     if sine < STRAIGHT:
-        raise _refused("interim", sine, STRAIGHT, "start, interim and goal are on one line", "go there by a line (LIN)")
+        raise _refused("interim", sine, STRAIGHT, because("plan.arc.line", remedy("by_line")))
     squares = float(to_interim @ to_interim) * to_end - float(to_end @ to_end) * to_interim
     centre = start.position + np.cross(squares, normal) / (2.0 * float(normal @ normal))
     normal = normal / float(np.linalg.norm(normal))
@@ -42,14 +43,13 @@ def arc_about(start: FramePose, centre: Array, end: FramePose) -> ArcPiece:
     first, last = start.position - centre, end.position - centre
     radii = float(np.linalg.norm(first)), float(np.linalg.norm(last))
     if abs(radii[0] - radii[1]) > SAME_RADIUS:
-        message = f"the centre is {radii[0]:.6g} m from the start and {radii[1]:.6g} m from the goal"
-        remedy = "give a centre as far from both, or a point on the arc (interim)"
-        raise _refused("center", abs(radii[0] - radii[1]), SAME_RADIUS, message, remedy)
+        would_do = remedy("even_centre"), remedy("give_interim")
+        why = because("plan.arc.radii", *would_do, of_start=radii[0], of_goal=radii[1])
+        raise _refused("center", abs(radii[0] - radii[1]), SAME_RADIUS, why)
     normal = np.cross(first, last)
     sine = float(np.linalg.norm(normal)) / (radii[0] * radii[1])
     if sine < STRAIGHT:
-        message = "start, centre and goal are on one line: there are many arcs"
-        raise _refused("center", sine, STRAIGHT, message, "give a point on the arc (interim)")
+        raise _refused("center", sine, STRAIGHT, because("plan.arc.many", remedy("give_interim")))
     chord = end.position - start.position
     centre = centre - chord * float((centre - 0.5 * (start.position + end.position)) @ chord) / float(chord @ chord)
     normal = normal / float(np.linalg.norm(normal))
@@ -67,18 +67,20 @@ def _angle(first: Array, last: Array, normal: Array) -> float:
 
 def _require_way(name: str, point: Array, start: Array, end: Array) -> None:
     if not np.abs(point).max() < FARTHEST:
-        raise _refused(name, float(np.abs(point).max()), FARTHEST, f"the {name} is no place for an arm", "give it in m")
+        farthest = float(np.abs(point).max())
+        why = because("plan.arc.far", remedy("in_metres"), name=name, value=farthest, most=FARTHEST)
+        raise _refused(name, farthest, FARTHEST, why)
     for what, one, other in (("goal", start, end), (name, start, point), (name, end, point)):
         distance = float(np.linalg.norm(one - other))
         if distance < SAME_POINT:
             where = "start" if one is start else "goal"
-            message = f"the {what} is where the {where} is, {1000 * distance:.3g} mm away: that is no arc"
-            remedy = "give another point, or go by a line (LIN)"
+            would_do = remedy("other_point"), remedy("by_line")
             if end is other and what == "goal":
-                remedy = "for a full circle ask for one half, then for the other; else give another point"
-            raise _refused(what, distance, SAME_POINT, message, remedy)
+                would_do = remedy("two_halves"), remedy("other_point")
+            why = because("plan.arc.same", *would_do, point=what, other=where, distance=distance)
+            raise _refused(what, distance, SAME_POINT, why)
 
 
-def _refused(subject: str, value: float, limit: float, message: str, remedy: str) -> PlanRefused:
-    refusal = Refusal(check="arc", subject=subject, value=value, limit=limit, message=message, remedy=remedy)
+def _refused(subject: str, value: float, limit: float, why: Reason) -> PlanRefused:
+    refusal = refusal_of(why, "arc", subject, value, limit)
     return PlanRefused(PlanCode.INVALID_GOAL_CONSTRAINTS, refusal)

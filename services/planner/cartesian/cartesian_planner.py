@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.motion import JointTrajectory
 from gemelo.schemas.planning import PlanCode, Refusal, Timing
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.services.planner.cartesian.continuation import FINEST, Continuation, FollowedPath, StopReason, is_same
 from gemelo.services.planner.cartesian.path_points import Run, between, states_of_runs
 from gemelo.services.planner.cartesian.tool_limits import ToolLimits
@@ -21,7 +21,13 @@ from gemelo.services.planner.cartesian.tool_path import METRES_PER_RADIAN, ToolP
 from gemelo.services.planner.collision.clearance import PathChecker
 from gemelo.services.planner.path.path import Start
 from gemelo.services.planner.request.deadline import Deadline
-from gemelo.services.planner.request.refusals import PlanRefused, not_verified
+from gemelo.services.planner.request.refusals import (
+    PlanRefused,
+    near_pairs,
+    not_verified,
+    refusal_of,
+    without_remedies,
+)
 from gemelo.services.planner.timing.path_timing import law_along
 from gemelo.services.planner.timing.profile import (
     JointLimits,
@@ -150,7 +156,7 @@ class CartesianPlanner:
         try:
             law = law_along(followed.curve, terms.limits, tool, marks, terms.timing, terms.deadline)
         except NoProfile as error:
-            raise not_verified(str(error)) from error
+            raise not_verified(error.reason) from error
         return Run(
             followed.curve,
             law,
@@ -166,7 +172,7 @@ class CartesianPlanner:
         try:
             require_short(float(states.times[-1]))
         except NoProfile as error:
-            raise not_verified(str(error)) from error
+            raise not_verified(error.reason) from error
         return trajectory_of(self._arm.joint_names, states)
 
     def _within(self, states: States, terms: CartesianTerms) -> States:
@@ -198,32 +204,29 @@ class CartesianPlanner:
 
     def _touches(self, configuration: Array, margin: float) -> StopReason:
         pairs = self._checker.pairs_within(configuration, DEEPER * margin + 1e-9) or [("?", "?")]
-        named = " and ".join(f"{first} with {second}" for first, second in pairs)
-        what = f"{named} would be nearer than {1000 * margin:g} mm"
-        distance = self._checker.distance(configuration)
-        return StopReason(
-            "collision", " / ".join(pairs[0]), distance, margin, what, "move what is in the way, or go around"
-        )
+        distance, links = self._checker.distance(configuration), self._arm.model.link_names
+        objects = {name: "object" for pair in pairs for name in pair if name not in links}
+        touching = near_pairs(pairs, objects, margin, None)
+        why = because("plan.tool.touches", *touching, remedy("make_room"), remedy("go_around"))
+        return StopReason("collision", " / ".join(pairs[0]), distance, margin, why)
 
 
 def _stopped(stop: StopReason, gone: float, metres: float, fraction: float) -> Refusal:
-    place = f"at {gone:.4f} m of {metres:.4f} m" if metres > SHORTEST_TOLD else f"at {fraction:.1%} of the turn"
-    return Refusal(
-        check=stop.check,
-        subject=stop.subject,
-        value=stop.value,
-        limit=stop.limit,
-        message=f"{place} along the path, {stop.what}",
-        remedy=stop.remedy,
-    )
+    cause, would_do = Reason(code=stop.why.code, values=stop.why.values, causes=stop.why.causes), stop.why.remedies
+    why = because("plan.tool.stopped", cause, *would_do, gone=gone, whole=metres)
+    if metres <= SHORTEST_TOLD:
+        why = because("plan.tool.stopped_turning", cause, *would_do, share=fraction)
+    return refusal_of(why, stop.check, stop.subject, stop.value, stop.limit)
 
 
 def _too_little(stop: Refusal, fraction: float, least: float) -> Refusal:
-    message = f"only {fraction:.1%} of the path can be followed, {least:.1%} is the least: {stop.message}"
+    would_do = () if stop.why is None else stop.why.remedies
+    if fraction > 0.001:
+        would_do = (*would_do, remedy("allow_less", fraction=math.floor(1000 * fraction) / 1000))
+    why = because("plan.tool.too_little", without_remedies(stop), *would_do, fraction=fraction, least=least)
     if fraction == 0.0:
-        message = f"the path cannot be begun: {stop.message}"
-    remedy = f"{stop.remedy}; or allow less (least_fraction {math.floor(1000 * fraction) / 1000:g})"
-    return replace(stop, message=message, remedy=remedy if fraction > 0.001 else stop.remedy)
+        why = because("plan.tool.not_begun", without_remedies(stop), *would_do)
+    return refusal_of(why, stop.check, stop.subject, stop.value, stop.limit)
 
 
 def _code(stop: Refusal) -> PlanCode:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gemelo.libraries.arm.kinematics.kinematics import FramePose, Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.services.planner.cartesian.tool_path import ToolPath
 from gemelo.services.planner.cartesian.tool_solver import ToolSolver
 from gemelo.services.planner.path.path_curve import CubicSpline
@@ -32,7 +33,6 @@ SAME = 1e-6  # [rad] or [m] by which configurations differ that are meant to be 
 ROUNDS = 8  # chosen: each halves the spacing where needed, so 1/256 of it at last
 LOOKS = 8  # at the joints' limits between two configurations; chosen: a spline bends little between them
 ORDER = 4  # configurations by which the next one is guessed; chosen: more extrapolate noise
-TOO_FINE = f"max_step is so fine that the path would have more than {MOST_CONFIGURATIONS} configurations"
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,7 @@ class StopReason:
     subject: str
     value: float
     limit: float
-    what: str  # completes "at 0.123 m of 0.300 m ..."
-    remedy: str
+    why: Reason
     share: float = 0.5
 
 
@@ -81,9 +80,8 @@ class Continuation:
         """
         spacing = min(max_step or SPACING, path.length / LEAST_CONFIGURATIONS)
         if path.length / spacing > MOST_CONFIGURATIONS:
-            return StopReason(
-                "max_step", "max_step", max_step, path.length / MOST_CONFIGURATIONS, TOO_FINE, "leave it at 0"
-            )
+            why = because("plan.tool.max_step", remedy("leave_zero"), value=max_step, most=MOST_CONFIGURATIONS)
+            return StopReason("max_step", "max_step", max_step, path.length / MOST_CONFIGURATIONS, why)
         lengths, configurations, stop = self._march(path, start, spacing, jump, deadline)
         if stop is not None and lengths[-1] < 4 * FINEST:
             return stop
@@ -224,26 +222,31 @@ class Continuation:
         joint, value = self._arm.joints[index], float(found[index])
         limit = joint.clamp(value)
         side = "upper" if value > joint.upper else "lower"
-        what = f'joint "{joint.name}" is at its {side} limit of {limit:g} {joint.unit}'
         share = max(LEAST, NEARLY * float((self._clipped(found) - last)[index] / (found - last)[index]))
-        remedy = "go around by another configuration, or end before it"
-        return StopReason("joint limit", joint.name, value, limit, what, remedy, share)
+        would_do = remedy("via_another"), remedy("end_before")
+        why = because("plan.tool.at_limit", *would_do, joint=joint.name, side=side, limit=limit, unit=joint.unit)
+        return StopReason("joint limit", joint.name, value, limit, why, share)
 
     def _lost(self, last: Array) -> StopReason:
         value = self.solver.manipulability(last)
-        what = f"the arm is stretched out or its axes line up (singularity, manipulability {value:.2g})"
-        remedy = "keep away from there, or go there freely instead of on a given path"
-        return StopReason("singularity", self._arm.tool_frame, value, 0.0, what, remedy)
+        would_do = remedy("keep_away"), remedy("go_freely")
+        why = because("plan.tool.singular", *would_do, manipulability=value)
+        return StopReason("singularity", self._arm.tool_frame, value, 0.0, why)
 
     def _jump(self, check: str, last: Array, found: Array, jump: float) -> StopReason:
         index = int(np.argmax(np.abs(found - last)))
         joint, value = self._arm.joints[index], float(abs(found[index] - last[index]))
-        what = (
-            f'joint "{joint.name}" would jump by {value:.3g} {joint.unit}, more than {jump:g}'
-            f" (singularity, manipulability {self.solver.manipulability(last):.2g})"
+        why = because(
+            "plan.tool.jump",
+            remedy("keep_away"),
+            remedy("go_freely"),
+            joint=joint.name,
+            value=value,
+            limit=jump,
+            unit=joint.unit,
+            manipulability=self.solver.manipulability(last),
         )
-        remedy = "keep away from the singularity, or go there freely instead of on a given path"
-        return StopReason(check, joint.name, value, jump, what, remedy)
+        return StopReason(check, joint.name, value, jump, why)
 
 
 def is_same(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from gemelo.schemas.planning import PlanCode, Refusal
-from gemelo.services.planner.request.refusals import PlanRefused
+from gemelo.schemas.planning import PlanCode
+from gemelo.schemas.reasons import because, remedy
+from gemelo.services.planner.request.refusals import PlanRefused, refusal_of
 
 
 @dataclass(frozen=True)
@@ -29,19 +30,12 @@ def require_tool_limits(tool: ToolLimits) -> None:
         ("jump_threshold", tool.jump),
     ):
         if not 0.0 <= value < math.inf:
-            raise _no_limit(name, value, 0.0, f"{name} is {value:g}: it must be above 0, or 0 for none of its own")
+            raise _no_limit(name, value, 0.0, "plan.tool.limit")
     if not 0.0 <= tool.least_fraction <= 1.0:
-        message = f"least_fraction is {tool.least_fraction:g}: it must be in [0, 1]"
-        raise _no_limit("least_fraction", tool.least_fraction, 1.0, message)
+        raise _no_limit("least_fraction", tool.least_fraction, 1.0, "plan.tool.least_fraction")
 
 
-def _no_limit(name: str, value: float, limit: float, message: str) -> PlanRefused:
-    refusal = Refusal(
-        check="tool limit",
-        subject=name,
-        value=value,
-        limit=limit,
-        message=message,
-        remedy=f"leave {name} at its default",
-    )
+def _no_limit(name: str, value: float, limit: float, code: str) -> PlanRefused:
+    why = because(code, remedy("leave_default", name=name), name=name, value=value)
+    refusal = refusal_of(why, "tool limit", name, value, limit)
     return PlanRefused(PlanCode.INVALID_GOAL_CONSTRAINTS, refusal)

@@ -17,9 +17,9 @@ from gemelo.schemas.planning import (
     PlanCode,
     PlanRequest,
     PoseGoal,
-    Refusal,
     WaypointGoal,
 )
+from gemelo.schemas.reasons import because, remedy
 from gemelo.services.planner.cartesian.arcs import arc_about, arc_through
 from gemelo.services.planner.cartesian.cartesian_planner import CartesianPath, CartesianPlanner, CartesianTerms
 from gemelo.services.planner.cartesian.tool_limits import ToolLimits, require_tool_limits
@@ -31,7 +31,7 @@ from gemelo.services.planner.kinematics.targets import ROTATION_TOLERANCE, ToolT
 from gemelo.services.planner.kinematics.task_space import TaskSpace
 from gemelo.services.planner.path.path import Start
 from gemelo.services.planner.request.deadline import NEVER, Deadline
-from gemelo.services.planner.request.refusals import PlanRefused, malformed
+from gemelo.services.planner.request.refusals import PlanRefused, malformed, refusal_of
 from gemelo.services.planner.timing.profile import JointLimits
 
 Array = NDArray[np.float64]
@@ -83,10 +83,10 @@ class ToolMotions:
         self, motion: CircularMotion, goal: Goal, start: Start, begin: FramePose, wanted: Start | None
     ) -> ToolPath:
         if isinstance(goal, WaypointGoal):
-            raise malformed(INVALID, "goal", "an arc has one goal, not waypoints", "ask for one arc after the other")
+            raise malformed(INVALID, "goal", because("plan.arc.waypoints", remedy("arc_by_arc")))
         if bool(motion.interim) == bool(motion.center):
-            given = "both an interim point and a center" if motion.interim else "neither an interim point nor a center"
-            raise malformed(INVALID, "interim", f"the arc has {given}", "give one of them, x y z in m")
+            given = "plan.arc.both" if motion.interim else "plan.arc.neither"
+            raise malformed(INVALID, "interim", because(given, remedy("one_of_them")))
         end = self._pose(goal, start, begin, wanted)
         name, values = ("interim", motion.interim) if motion.interim else ("center", motion.center)
         point = self._point(name, values, goal, start)
@@ -95,7 +95,8 @@ class ToolMotions:
     def _point(self, name: str, values: Vector, goal: Goal, start: Start) -> Array:
         """In the base frame; given in the goal's."""
         if len(values) != 3:
-            raise malformed(INVALID, name, f"{name} has 3 numbers, not {len(values)}", "give x y z in m")
+            why = because("plan.numbers", remedy("point_in_metres"), name=name, needed=3, count=len(values))
+            raise malformed(INVALID, name, why)
         frame = self._goals.frame(goal, start) if isinstance(goal, PoseGoal) else IDENTITY
         x, y, z = values
         return np.array(compose(frame, ((x, y, z), IDENTITY[1]))[0])
@@ -133,10 +134,8 @@ class ToolMotions:
         missing = target.misses(self._kinematics.tool(end))[1]
         if missing > max(ROTATION_TOLERANCE, target.rotation_tolerance):
             next(self._goals.candidates(last, start, NEVER), None)
-            message = (
-                f"on this path the tool ends {np.degrees(missing):.3g} deg from the orientation that was asked for"
-            )
-            raise malformed(INVALID, "orientation", message, self._task_space.remedy, check="orientation")
+            why = because("plan.tool.turned", *self._task_space.remedies, angle=missing)
+            raise malformed(INVALID, "orientation", why, check="orientation")
 
     def _wanted(self, goal: Goal, start: Start) -> list[Start | None]:
         """The configurations of those points that are joint values, None for poses; a joint that is not named stays as
@@ -160,24 +159,19 @@ def points_of(goal: Goal) -> tuple[Goal, ...]:
     if not isinstance(goal, WaypointGoal):
         return (goal,)
     if not goal.points:
-        raise malformed(INVALID, "points", "the goal has no waypoint", "give at least one")
+        raise malformed(INVALID, "points", because("plan.waypoints.none", remedy("give_one")))
     if not 0.0 <= goal.blend <= FARTHEST:
-        message = f"blend is {goal.blend:g} m: it must be 0 or more, and no more than {FARTHEST:g}"
-        raise malformed(INVALID, "blend", message, "give 0 to stop at every point, or a radius in m")
+        would_do = remedy("blend_zero"), remedy("blend_radius")
+        raise malformed(INVALID, "blend", because("plan.waypoints.blend", *would_do, value=goal.blend, most=FARTHEST))
     return goal.points
 
 
 def _other_configuration(joint: Joint, end: Start, wanted: float, reached: float) -> PlanRefused:
     """The tool is where it should be, the joints are not."""
-    refusal = Refusal(
-        check="configuration",
-        subject=joint.name,
-        value=reached,
-        limit=wanted,
-        nearest=end,
-        message=f'the tool can go there so, but "{joint.name}" ends at {reached:.4g} {joint.unit}, not at {wanted:.4g}',
-        remedy="ask for the pose of the tool instead of joint values, or go there freely",
-    )
+    would_do = remedy("ask_pose"), remedy("go_freely")
+    figures = {"reached": reached, "wanted": wanted}
+    why = because("plan.tool.configuration", *would_do, joint=joint.name, unit=joint.unit, **figures)
+    refusal = refusal_of(why, "configuration", joint.name, reached, wanted, end)
     return PlanRefused(PlanCode.GOAL_VIOLATES_PATH_CONSTRAINTS, refusal)
 
 

@@ -12,6 +12,7 @@ from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.message import Vector
 from gemelo.schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
+from gemelo.schemas.reasons import because, remedy
 from gemelo.services.planner.collision.clearance import DistanceChecker
 from gemelo.services.planner.kinematics.ik import InverseKinematics
 from gemelo.services.planner.kinematics.joint_ranges import FullTurns
@@ -63,9 +64,7 @@ class Goals:
             case PoseGoal():
                 return self._poses(goal, self.frame(goal, standing or start), start, deadline)
             case WaypointGoal():
-                raise malformed(
-                    INVALID, "goal", "this planner takes one goal at a time", "ask for the first point alone"
-                )
+                raise malformed(INVALID, "goal", because("plan.waypoints.here", remedy("first_point")))
 
     def other_ways_round(self, configurations: Sequence[Start], start: Start) -> list[Start]:
         """Where the arm stands as in one of the `configurations` (n,) [rad] or [m], with joints without limits a full
@@ -83,16 +82,15 @@ class Goals:
     def _named(self, goal: NamedGoal, start: Start) -> Start:
         values = self._arm.named_state(goal.name, start)
         if values is None:
-            where = f"{self._arm.srdf_path.name} of {self._arm.name}"
-            raise unknown_name(INVALID, "unknown state", goal.name, self._arm.state_names, where)
+            raise unknown_name(INVALID, "unknown state", goal.name, self._arm.state_names, self._arm.srdf_path.name)
         return self._within_limits(self._arm.joint_names, values)
 
     def _joints(self, goal: JointGoal, start: Start) -> Start:
         if goal.name == self._arm.joint_names and are_usable(self._arm, goal.position):
             return goal.position
         if not goal.name:
-            raise malformed(INVALID, "joints", "the goal names no joint", "name at least one joint and its position")
-        require_parallel(goal.name, goal.position, "the joint goal")
+            raise malformed(INVALID, "joints", because("plan.goal.no_joint", remedy("name_a_joint")))
+        require_parallel(goal.name, goal.position, "joint_goal")
         for name in goal.name:
             if name not in self._arm.joint_names:
                 raise unknown_name(INVALID, "unknown joint", name, self._arm.joint_names, self._arm.name)

@@ -21,6 +21,7 @@ from gemelo.schemas.planning import (
     ValidityRequest,
     ValidityResponse,
 )
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.scene import Contact
 from gemelo.services.planner.collision.clearance import DistanceChecker, last_free
 from gemelo.services.planner.collision.world import World
@@ -121,14 +122,14 @@ class KinematicRequests:
 
     def _touching(self, asked: Start, nearest: Start, contacts: Sequence[Contact], world: World) -> PlanRefused:
         pairs = [(contact.first, contact.second) for contact in contacts]
-        remedy = "take the nearest configuration that is free" if nearest else "choose another configuration"
+        would_do = remedy("nearest_free") if nearest else remedy("other_configuration")
         return in_collision(
             PlanCode.GOAL_IN_COLLISION,
-            "there",
+            "plan.collision.there",
             pairs,
             world.clearance,
             nearest,
-            remedy,
+            (would_do,),
             asked,
             world.objects,
             contacts[0].distance,
@@ -140,17 +141,13 @@ class KinematicRequests:
 
     def _completed(self, request: FkRequest, present: JointState | None, age: float) -> Start:
         """The named joints where they are said to be, beyond their limits too; the others where they are now."""
-        require_parallel(request.name, request.position, "the request")
+        require_parallel(request.name, request.position, "request")
         for name, value in zip(request.name, request.position, strict=True):
             if name not in self._arm.joint_names:
                 raise unknown_name(INVALID, "unknown joint", name, self._arm.joint_names, self._arm.name)
             if abs(value) > FARTHEST:
-                raise malformed(
-                    INVALID,
-                    name,
-                    f"{value:g} is no position for {name}",
-                    "give rad for a turning joint, m for a sliding one",
-                )
+                why = because("ik.position", remedy("rad_or_metres"), joint=name, value=value, most=FARTHEST)
+                raise malformed(INVALID, name, why)
         given = dict(zip(request.name, request.position, strict=True))
         if len(given) == len(self._arm.joints):
             return tuple(given[name] for name in self._arm.joint_names)
@@ -163,13 +160,11 @@ def _free(configurations: list[Start], checker: DistanceChecker) -> list[Start]:
     free = [configuration for configuration in configurations if checker.distance(configuration) > checker.clearance]
     if free:
         return free
-    where = (
-        "in every configuration for this pose" if len(configurations) > 1 else "in the only configuration for this pose"
-    )
-    remedy = "ask for another pose, or for configurations that touch as well (avoid_collisions false)"
+    where = "ik.collision.every" if len(configurations) > 1 else "ik.collision.only"
+    would_do = remedy("other_pose"), remedy("touching_too")
     pairs, near = checker.pairs_within(configurations[0], checker.clearance), checker.distance(configurations[0])
     code, clearance = PlanCode.GOAL_IN_COLLISION, checker.clearance
-    raise in_collision(code, where, pairs, clearance, (), remedy, distance=near)
+    raise in_collision(code, where, pairs, clearance, (), would_do, distance=near)
 
 
 def _at_rest(state: JointState | None) -> JointState | None:
@@ -178,9 +173,5 @@ def _at_rest(state: JointState | None) -> JointState | None:
 
 def _require_count(count: int) -> None:
     if not 1 <= count <= MOST_SOLUTIONS:
-        raise malformed(
-            INVALID,
-            "solutions",
-            f"{count} solutions cannot be asked for",
-            f"ask for 1 to {MOST_SOLUTIONS}",
-        )
+        why = because("ik.solutions", remedy("ask_up_to", most=MOST_SOLUTIONS), count=count)
+        raise malformed(INVALID, "solutions", why)

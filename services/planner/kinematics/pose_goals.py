@@ -12,6 +12,7 @@ from gemelo.libraries.arm.frames.transforms import IDENTITY, Point, Quaternion, 
 from gemelo.libraries.arm.kinematics.kinematics import FramePose
 from gemelo.schemas.message import Vector
 from gemelo.schemas.planning import PlanCode, PoseGoal
+from gemelo.schemas.reasons import because, remedy
 from gemelo.services.planner.kinematics.targets import AxisPointing, ToolTarget, turn_between
 from gemelo.services.planner.request.refusals import malformed
 
@@ -70,13 +71,11 @@ def _least_turned(asked: Array, goal: PoseGoal, pose: FramePose) -> Array:
 def _require_form(goal: PoseGoal) -> None:
     """Raises `PlanRefused` for what is no pose, or two at once."""
     if len(goal.position) != 3:
-        raise malformed(
-            INVALID, "position", f"a tool position has 3 numbers, not {len(goal.position)}", "give x y z in m"
-        )
+        why = because("plan.numbers", remedy("point_in_metres"), name="position", needed=3, count=len(goal.position))
+        raise malformed(INVALID, "position", why)
     if max(abs(value) for value in goal.position) > FARTHEST:
-        raise malformed(
-            INVALID, "position", f"the position {_shown(goal.position)} m is no place for an arm", "give x y z in m"
-        )
+        why = because("plan.pose.far", remedy("point_in_metres"), position=goal.position, most=FARTHEST)
+        raise malformed(INVALID, "position", why)
     if goal.orientation:
         _require_quaternion(goal.orientation)
     for name in ("free_axis", "tool_axis", "direction"):
@@ -88,45 +87,31 @@ def _require_form(goal: PoseGoal) -> None:
 
 def _require_one_meaning(goal: PoseGoal) -> None:
     if goal.orientation and (goal.tool_axis or goal.direction):
-        raise malformed(
-            INVALID,
-            "orientation",
-            "the goal has an orientation, and a tool_axis or a direction as well",
-            "give either an orientation (with a free_axis, if turning about that is free), or tool_axis and direction",
-        )
+        why = because("plan.pose.two_meanings", remedy("one_meaning"))
+        raise malformed(INVALID, "orientation", why)
     if bool(goal.tool_axis) != bool(goal.direction):
         given, missing = ("tool_axis", "direction") if goal.tool_axis else ("direction", "tool_axis")
-        raise malformed(
-            INVALID,
-            missing,
-            f"the goal has a {given} of {_shown(getattr(goal, given))}, and no {missing}",
-            f"give both, as tool_axis 0 0 1 along direction 0 0 -1, or leave {given} empty",
-        )
+        would_do = remedy("axis_and_direction"), remedy("leave_empty", name=given)
+        named = {"given": given, "missing": missing}
+        why = because("plan.pose.half", *would_do, **named, axis=getattr(goal, given))
+        raise malformed(INVALID, missing, why)
     if goal.free_axis and not goal.orientation:
-        raise malformed(
-            INVALID,
-            "free_axis",
-            f"the goal has a free_axis of {_shown(goal.free_axis)}, and no orientation that it frees",
-            "give an orientation, or tool_axis and direction instead",
-        )
+        would_do = remedy("give_orientation"), remedy("axis_and_direction")
+        why = because("plan.pose.free_axis", *would_do, axis=goal.free_axis)
+        raise malformed(INVALID, "free_axis", why)
 
 
 def _require_quaternion(values: Vector) -> None:
     if len(values) != 4:
-        raise malformed(
-            INVALID, "orientation", f"an orientation has 4 numbers, not {len(values)}", "give x y z w of length 1"
-        )
+        why = because("plan.numbers", remedy("unit_quaternion"), name="orientation", needed=4, count=len(values))
+        raise malformed(INVALID, "orientation", why)
     length = math.hypot(*values)
     if abs(length - 1.0) > UNIT:
-        remedy = "give x y z w of length 1"
+        would_do = remedy("unit_quaternion")
         if LEAST_AXIS < length < 1.0 / LEAST_AXIS:
-            remedy += f", as {_shown(tuple(value / length for value in values))}"
-        raise malformed(
-            INVALID,
-            "orientation",
-            f"the orientation {_shown(values)} is no unit quaternion: its length is {length:.4g}",
-            remedy,
-        )
+            would_do = remedy("this_quaternion", values=tuple(value / length for value in values))
+        why = because("plan.pose.quaternion", would_do, orientation=values, length=length)
+        raise malformed(INVALID, "orientation", why)
 
 
 def _require_axis(name: str, values: Vector) -> None:
@@ -134,18 +119,20 @@ def _require_axis(name: str, values: Vector) -> None:
     if not values:
         return
     if len(values) != 3:
-        raise malformed(INVALID, name, f"{name} has 3 numbers, not {len(values)}", "give x y z, as 0 0 1")
+        why = because("plan.numbers", remedy("give_axis"), name=name, needed=3, count=len(values))
+        raise malformed(INVALID, name, why)
     length = math.hypot(*values)
     if not LEAST_AXIS < length < 1.0 / LEAST_AXIS:
-        raise malformed(
-            INVALID, name, f"{name} {_shown(values)} has length {length:.4g}: it shows nowhere", "give x y z, as 0 0 1"
-        )
+        why = because("plan.pose.axis", remedy("give_axis"), name=name, axis=values, length=length)
+        raise malformed(INVALID, name, why)
 
 
 def _require_tolerance(name: str, value: float) -> None:
     if value < 0.0:
         unit = "m" if name == "position_tolerance" else "rad"
-        raise malformed(INVALID, name, f"{name} is {value:g} {unit}, below 0", "give 0 for exact, or a larger one")
+        would_do = remedy("exact"), remedy("larger_tolerance")
+        why = because("plan.pose.tolerance", *would_do, name=name, value=value, unit=unit)
+        raise malformed(INVALID, name, why)
 
 
 def _unit(values: Vector) -> Point:
@@ -163,7 +150,3 @@ def _quaternion(values: Vector) -> Quaternion:
 def _matrix(quaternion: Quaternion) -> Array:
     matrix: Array = pin.Quaternion(np.array(quaternion)).normalized().matrix()
     return matrix
-
-
-def _shown(values: Vector) -> str:
-    return " ".join(f"{value:.4g}" for value in values)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.reasons import Reason, Remedy, because, remedy
 from gemelo.services.planner.kinematics.targets import ROTATION_TOLERANCE, ToolTarget
 
 Array = NDArray[np.float64]
@@ -43,32 +44,32 @@ class TaskSpace:
         return self.chosen == 3
 
     @property
-    def sentence(self) -> str:
-        """What the arm can do with its tool, as a person says it."""
+    def why(self) -> Reason:
+        """What the arm can do with its tool."""
         turns = len(self.axes)
         if self.is_full:
-            return f"{self.arm} can turn its tool as it likes"
+            return because("plan.turns.all", robot=self.arm)
         if turns == 0:
-            return f"{self.arm} cannot turn its tool"
+            return because("plan.turns.none", robot=self.arm)
         if turns == 1 and self.chosen == 1:
-            return f"{self.arm} {self._no_tilt}, only {self._turn}"
+            return because("plan.turns.vertical" if self._is_upright else "plan.turns.one_axis", robot=self.arm)
         if turns == 1:
-            return f"{self.arm} {self._no_tilt}, and {self._its_turn} follows from the position"
+            return because("plan.turns.no_tilt" if self._is_upright else "plan.turns.follows_axis", robot=self.arm)
         if self.chosen == 0:
-            return f"{self.arm} has {self.joints} joints: how its tool is turned follows from the position"
-        return f"{self.arm} has {self.joints} joints: beside a position it can choose {self.chosen} of 3 turns"
+            return because("plan.turns.follow", robot=self.arm, joints=self.joints)
+        return because("plan.turns.some", robot=self.arm, joints=self.joints, count=self.chosen)
 
     @property
-    def remedy(self) -> str:
+    def remedies(self) -> tuple[Remedy, ...]:
         """What to ask for instead."""
         turns = len(self.axes)
         if turns == 0 or (self.chosen == 0 and turns > 1):
-            return "ask for the position alone"
+            return (remedy("position_alone"),)
         if turns == 1:
-            return f"ask for the position, or for the position + {self._yaw}"
+            return remedy("position_alone"), remedy("position_and_yaw" if self._is_upright else "position_and_turn")
         if self.chosen == 1:
-            return "ask for the position alone, or give the orientation a tolerance"
-        return "ask for the position + the direction of one tool axis, or leave an axis free"
+            return remedy("position_alone"), remedy("orientation_tolerance")
+        return remedy("position_and_axis"), remedy("free_axis")
 
     @property
     def turning(self) -> str:
@@ -97,22 +98,6 @@ class TaskSpace:
     @property
     def _is_upright(self) -> bool:
         return len(self.axes) == 1 and abs(float(self.axes[0][2])) > UPRIGHT
-
-    @property
-    def _no_tilt(self) -> str:
-        return "cannot tilt its tool" if self._is_upright else "turns its tool about one axis only"
-
-    @property
-    def _turn(self) -> str:
-        return "turn it about the vertical" if self._is_upright else "about that"
-
-    @property
-    def _its_turn(self) -> str:
-        return "its yaw" if self._is_upright else "how far"
-
-    @property
-    def _yaw(self) -> str:
-        return "yaw" if self._is_upright else "the turn about that axis"
 
 
 def task_space(arm: ArmDescription, kinematics: Kinematics) -> TaskSpace:

@@ -12,14 +12,15 @@ from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, inv
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.message import Vector
-from gemelo.schemas.planning import PlanCode, PoseGoal, Refusal
+from gemelo.schemas.planning import PlanCode, PoseGoal
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.services.planner.collision.clearance import DistanceChecker, last_free
 from gemelo.services.planner.kinematics.ik import InverseKinematics
 from gemelo.services.planner.kinematics.pose_goals import as_goal
 from gemelo.services.planner.kinematics.targets import POSITION_TOLERANCE, ToolTarget
 from gemelo.services.planner.kinematics.task_space import TaskSpace
 from gemelo.services.planner.request.deadline import Deadline
-from gemelo.services.planner.request.refusals import PlanRefused, out_of_reach
+from gemelo.services.planner.request.refusals import PlanRefused, out_of_reach, refusal_of
 
 Array = NDArray[np.float64]
 
@@ -95,50 +96,27 @@ class UnreachableRefusals:
 
     def _tilt_refused(self, goal: PoseGoal, target: ToolTarget, frame: Rigid, best: Array) -> PlanRefused:
         missing = self._task_space.missing_tilt(target)
-        return PlanRefused(
-            PlanCode.INVALID_GOAL_CONSTRAINTS,
-            Refusal(
-                check="orientation",
-                subject=self._task_space.turning,
-                value=missing,
-                limit=target.rotation_tolerance,
-                nearest=as_goal(goal, self._kinematics.tool(best), frame),
-                message=f"{self._task_space.sentence}: the goal is {math.degrees(missing):.4g} deg from all that it"
-                " can",
-                remedy=self._task_space.remedy,
-            ),
-        )
+        able, nearest = self._task_space, as_goal(goal, self._kinematics.tool(best), frame)
+        why = because("plan.orientation.impossible", able.why, *able.remedies, missing=missing)
+        refusal = refusal_of(why, "orientation", able.turning, missing, target.rotation_tolerance, nearest)
+        return PlanRefused(PlanCode.INVALID_GOAL_CONSTRAINTS, refusal)
 
     def _turn_refused(self, goal: PoseGoal, target: ToolTarget, frame: Rigid, best: Array) -> PlanRefused:
         pose = self._kinematics.tool(best)
         missing = target.misses(pose)[1]
-        nearest = as_goal(goal, pose, frame)
-        what, shown = ("direction" if goal.tool_axis else "orientation"), " ".join(f"{v:.6f}" for v in nearest[3:])
-        remedies = [f"the nearest {what} there is {shown}"]
+        nearest, what = as_goal(goal, pose, frame), "direction" if goal.tool_axis else "orientation"
+        would_do = [remedy("nearest_direction" if goal.tool_axis else "nearest_orientation", turned=nearest[3:])]
         if not self._task_space.is_full:
-            remedies.append(self._task_space.remedy)
+            would_do += self._task_space.remedies
         if missing < FORGIVABLE:
-            remedies.append(f"allow an orientation_tolerance of {math.ceil(missing * 1e4) / 1e4:g} rad")
-        return PlanRefused(
-            PlanCode.NO_IK_SOLUTION,
-            Refusal(
-                check="orientation",
-                subject=what,
-                value=missing,
-                limit=target.rotation_tolerance,
-                nearest=nearest,
-                message=f"{self._arm.tool_frame} can be at this point, but not turned like that:"
-                f" {math.degrees(missing):.4g} deg are missing{self._why(best)}",
-                remedy="; or ".join(remedies),
-            ),
-        )
-
-    def _why(self, configuration: Array) -> str:
-        """What keeps the tool from turning further."""
-        held = self._held(configuration)
-        if held:
-            return f", held by {', '.join(held)}"
-        return "" if self._task_space.is_full else f"; {self._task_space.sentence}"
+            would_do.append(remedy("allow_turn", tolerance=math.ceil(missing * 1e4) / 1e4))
+        held = self._held(best)
+        code = "plan.orientation.held" if held else "plan.orientation"
+        if not held and not self._task_space.is_full:
+            code, held = "plan.orientation.unable", [self._task_space.why]
+        why = because(code, *held, *would_do, tool=self._arm.tool_frame, missing=missing)
+        refusal = refusal_of(why, "orientation", what, missing, target.rotation_tolerance, nearest)
+        return PlanRefused(PlanCode.NO_IK_SOLUTION, refusal)
 
     def _printable(self, point: Array, configuration: Array, frame: Rigid, deadline: Deadline) -> Vector:
         """The nearest point to `point` that has few decimals in the goal's frame and can be reached like that."""
@@ -155,15 +133,15 @@ class UnreachableRefusals:
                 return (x, y, z)
         return tuple(local.tolist())
 
-    def _held(self, configuration: Array) -> list[str]:
-        """The joints between base and tool that stand at a limit, in words."""
+    def _held(self, configuration: Array) -> list[Reason]:
+        """The joints between base and tool that stand at a limit."""
         held = []
         for joint, value in zip(self._arm.joints, configuration.tolist(), strict=True):
             if joint.name not in self._carrying:
                 continue
             for side, limit in (("lower", joint.lower), ("upper", joint.upper)):
                 if abs(value - limit) < 1e-9:
-                    held.append(f"{joint.name} at its {side} limit of {limit:g} {joint.unit}")
+                    held.append(because("plan.held", joint=joint.name, side=side, limit=limit, unit=joint.unit))
         return held
 
 

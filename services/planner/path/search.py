@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.planners import DEFAULT, NAMES, NATIVE, PLANNERS, planner_named
-from gemelo.schemas.planning import PlanCode, Refusal
+from gemelo.schemas.planning import PlanCode
+from gemelo.schemas.reasons import because, remedy
 from gemelo.services.planner.collision.checker import CollisionChecker
 from gemelo.services.planner.native.paths import FreePath, NoPath
 from gemelo.services.planner.path import searches
@@ -21,7 +22,7 @@ from gemelo.services.planner.path.path import Path, PathNotFound, Sought
 from gemelo.services.planner.path.smoothing import Rounded, shorten, smooth, smooth_unknown
 from gemelo.services.planner.path.validity import ValidityChecker
 from gemelo.services.planner.request.deadline import Deadline, Stopwatch
-from gemelo.services.planner.request.refusals import PlanRefused, SearchFailure, unknown_name
+from gemelo.services.planner.request.refusals import PlanRefused, SearchFailure, refusal_of, unknown_name
 
 if TYPE_CHECKING:
     from gemelo.services.planner.native.native_planner import NativePlanner
@@ -148,12 +149,5 @@ def require_known(planner_id: str) -> None:
 
 
 def _not_built() -> PlanRefused:
-    return PlanRefused(
-        PlanCode.INVALID_GOAL_CONSTRAINTS,
-        Refusal(
-            check="unknown planner",
-            subject=NATIVE,
-            message="the native planner has not been built here",
-            remedy=f"run `make setup`, or ask for {DEFAULT}",
-        ),
-    )
+    why = because("plan.planner.not_built", remedy("make_setup"), remedy("use_name", name=DEFAULT))
+    return PlanRefused(PlanCode.INVALID_GOAL_CONSTRAINTS, refusal_of(why, "unknown planner", NATIVE))

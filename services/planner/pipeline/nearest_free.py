@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
+from gemelo.schemas.reasons import Remedy, remedy
 from gemelo.services.planner.collision.checker import CollisionChecker
 from gemelo.services.planner.jog.jog_obstacles import CONTACT_SPEED, comes_away
 from gemelo.services.planner.path.path import Start
@@ -53,18 +54,21 @@ def nearest_free(
     return nearest
 
 
-def jog_words(arm: ArmDescription, reach: Array, start: Start, configuration: Start) -> str:
-    """The command that moves from `start` to `configuration`, (n,) [rad] or [m]; `reach` (n,) [m/rad] or [m/m] as a
+def jog_out(arm: ArmDescription, reach: Array, start: Start, configuration: Start) -> Remedy:
+    """The jog that moves from `start` to `configuration`, (n,) [rad] or [m]; `reach` (n,) [m/rad] or [m/m] as a
     world's."""
     moves = [after - before for before, after in zip(start, configuration, strict=True)]
     fastest = max(abs(move) / joint.velocity for joint, move in zip(arm.joints, moves, strict=True))
     needed = max(LEAST_SECONDS, float(np.abs(moves) @ reach) / CONTACT_SPEED, fastest / SHARE)
     seconds = math.ceil(10.0 * needed) / 10.0
-    speeds = (_speed(joint, move / seconds) for joint, move in zip(arm.joints, moves, strict=True) if abs(move) > TINY)
-    return f"gemelo jog --joint {' '.join(speeds)} --for {seconds:g}"
+    speeds = tuple(
+        _speed(joint, move / seconds) for joint, move in zip(arm.joints, moves, strict=True) if abs(move) > TINY
+    )
+    return remedy("jog_out", speeds=" ".join(speeds), seconds=seconds)
 
 
 def _speed(joint: Joint, velocity: float) -> str:
+    """As `gemelo jog` takes it."""
     if joint.unit == "rad":
         return f"{joint.name}={math.degrees(velocity):.3g}deg/s"
     return f"{joint.name}={1000.0 * velocity:.3g}mm/s"

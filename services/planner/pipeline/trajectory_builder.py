@@ -143,7 +143,7 @@ class TrajectoryBuilder:
                 require_ends(trajectory, start, goal)
                 require_limits(self._arm, states, seen, self._limits, self._request.timing is Timing.JERK_LIMITED)
             except BadTrajectory as error:
-                raise not_verified(str(error)) from error
+                raise not_verified(error.reason) from error
         return VerifiedTrajectory(trajectory, margins, scale)
 
     def _require_free(self, rows: Array, free_line: Array | None = None) -> None:
@@ -181,4 +181,4 @@ def _timed(time: Callable[[], States]) -> States:
     try:
         return time()
     except NoProfile as error:
-        raise not_verified(str(error)) from error
+        raise not_verified(error.reason) from error

@@ -131,7 +131,7 @@ class WaypointPlanner:
             states = states_of_runs([_run(line, context) for line in lines], context.deadline)
             return trajectory_of(names, at_limits(states, limits, is_jerk_limited))
         except NoProfile as error:
-            raise not_verified(str(error)) from error
+            raise not_verified(error.reason) from error
 
 
 def _run(line: RoundedLines, context: PlanningContext) -> Run:

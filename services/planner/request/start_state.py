@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from gemelo.libraries.arm.model.description import ROUNDING, ArmDescription, Joint
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import PlanCode
+from gemelo.schemas.reasons import because, remedy
 from gemelo.services.planner.request.per_arm import once_per_arm
 from gemelo.services.planner.request.refusals import (
     malformed,
@@ -50,19 +51,15 @@ def _present(arm: ArmDescription, present: JointState | None, age: float) -> dic
     values = _values(arm, present)
     missing = [name for name in arm.joint_names if name not in values]
     if missing:
-        raise malformed(
-            PlanCode.INVALID_ROBOT_STATE,
-            missing[0],
-            f"the joint state has no position for {', '.join(missing)}",
-            "give a start state with every joint, or see what stepper_gateway publishes",
-            check="joint state",
-        )
+        would_do = remedy("whole_start"), remedy("see_joint_states")
+        why = because("plan.state.incomplete", *would_do, joints=tuple(missing))
+        raise malformed(PlanCode.INVALID_ROBOT_STATE, missing[0], why, check="joint state")
     return values
 
 
 def _values(arm: ArmDescription, state: JointState) -> dict[str, float]:
     """The positions by name; the joints must stand."""
-    require_parallel(state.name, state.position, "the start state")
+    require_parallel(state.name, state.position, "start_state")
     for name in state.name:
         if name not in arm.joint_names:
             raise unknown_name(PlanCode.INVALID_ROBOT_STATE, "unknown joint", name, arm.joint_names, arm.name)
@@ -92,26 +89,21 @@ def _spans(arm: ArmDescription) -> list[tuple[float, float]]:
 def require_unwound(code: PlanCode, joint: Joint, value: float) -> None:
     """Raises `PlanRefused` if the joint has no limits and `value` [rad] is more than `MOST_TURNED` from 0."""
     if math.isinf(joint.upper) and abs(value) > MOST_TURNED:
-        raise malformed(
-            code,
-            joint.name,
-            f'"{joint.name}" at {value:.6g} rad is more than {MOST_TURNED:g} rad from 0, where angles lose digits',
-            "count from where it is now (`gemelo reference`), or give the same angle with fewer turns",
-            check="joint limit",
-        )
+        would_do = remedy("count_from_here"), remedy("fewer_turns")
+        why = because("plan.limit.turns", *would_do, joint=joint.name, value=value, limit=MOST_TURNED)
+        raise malformed(code, joint.name, why, check="joint limit")
 
 
 def require_parallel(names: Sequence[str], positions: Sequence[float], where: str) -> None:
-    """Raises `PlanRefused` unless there is one position [rad] or [m] for every name, and no name twice."""
+    """Raises `PlanRefused` unless there is one position [rad] or [m] for every name, and no name twice.
+
+    `where` is a word of the catalogue.
+    """
     if len(names) != len(positions):
-        raise malformed(
-            PlanCode.INVALID_GOAL_CONSTRAINTS,
-            where,
-            f"{where} has {len(names)} names and {len(positions)} positions",
-            "give one position for every name",
-        )
+        counts = {"names": len(names), "positions": len(positions)}
+        why = because("plan.names.count", remedy("one_position_each"), where=where, **counts)
+        raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, where, why)
     for name in names:
         if names.count(name) > 1:
-            raise malformed(
-                PlanCode.INVALID_GOAL_CONSTRAINTS, name, f'{where} names "{name}" twice', "name every joint once"
-            )
+            why = because("plan.names.twice", remedy("name_once"), where=where, joint=name)
+            raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, name, why)

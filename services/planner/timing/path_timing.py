@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gemelo.schemas.planning import Timing
+from gemelo.schemas.reasons import because
 from gemelo.services.planner.path.path_curve import PathCurve
 from gemelo.services.planner.request.deadline import Deadline
 from gemelo.services.planner.timing.bounds import (
@@ -127,7 +128,7 @@ def time_law(demand: Demand, deadline: Deadline) -> TimeLaw:
     tries = [(edges, share) for edges in reversed(finer) for share in SHARES[:2]]
     tries += [(whole, share) for share in SHARES]
     best: TimeLaw | None = None
-    why = NoProfile(f"no jerk-limited profile for a path of {float(demand.along[-1]):.3g}")
+    why = NoProfile(because("plan.timing.none", length=float(demand.along[-1])))
     for edges, share in tries:
         deadline.check()
         try:
@@ -178,7 +179,7 @@ def _sections(demand: Demand, edges: Array, share: float) -> list[Section]:
     rows = zip(*(column.tolist() for column in (np.diff(edges), speed, rise, jerk)), strict=True)
     sections = [Section(length, v, a, j, bends=True) for length, v, a, j in rows]
     if min(min(section.speed, section.acceleration, section.jerk) for section in sections) <= 0.0:
-        raise NoProfile(f"no jerk-limited profile for a path of {end:.3g}")
+        raise NoProfile(because("plan.timing.none", length=float(end)))
     return sections
 
 

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
+from gemelo.schemas.reasons import because
 from gemelo.services.planner.native.compiled import motion, where_built
 from gemelo.services.planner.request.per_arm import once_per_arm
 
@@ -35,8 +37,8 @@ NO_TIME = 1e-12  # [s] a phase that is shorter is none; chosen: rounding of time
 HOLD = 0.1  # [s] that a plan to where the arm already is takes
 
 
-class NoProfile(ValueError):
-    """ruckig found no profile; the text has its result."""
+class NoProfile(ReasonedError, ValueError):
+    """A path gets no time; the reason says of which, or what the library says."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,12 @@ def stop_and_go_in_python(corners: Array, limits: JointLimits) -> States:
 def stop_and_go(corners: Array, limits: JointLimits) -> States:
     """From corner to corner of the polyline (m, n) [rad] or [m], each leg as `straight_line`, at rest at all of them;
     raises `NoProfile`."""
-    return compiled_states(lambda: motion.timed_lines(np.ascontiguousarray(corners), *limits.rows))
+    try:
+        return compiled_states(lambda: motion.timed_lines(np.ascontiguousarray(corners), *limits.rows))
+    except NoProfile:
+        moves = np.abs(np.diff(corners, axis=0))
+        require_short(max(float((moves / limits.velocity).max()), float((moves / limits.acceleration).max()) ** 0.5))
+        raise
 
 
 def compiled_states(timed: Callable[[], tuple[Array, Array, Array, Array]]) -> States:
@@ -136,7 +143,7 @@ def compiled_states(timed: Callable[[], tuple[Array, Array, Array, Array]]) -> S
     try:
         return States(*timed())
     except motion.NoProfile as error:
-        raise NoProfile(str(error)) from error
+        raise NoProfile(because("plan.timing.core", detail=str(error))) from error
 
 
 def _leg(start: Array, goal: Array, limits: JointLimits, began: float) -> list[States]:
@@ -155,7 +162,7 @@ def _leg(start: Array, goal: Array, limits: JointLimits, began: float) -> list[S
 def require_short(lasts: float) -> None:
     """Raises `NoProfile` for a path that takes at least so long [s]."""
     if not lasts <= LONGEST:
-        raise NoProfile(f"it would take more than {lasts:.3g} s, {LONGEST:g} s is the most")
+        raise NoProfile(because("plan.timing.too_long", time=lasts, most=LONGEST))
 
 
 def _time_line(length: float, direction: Array, limits: JointLimits) -> tuple[Trajectory, list[float]]:
@@ -167,19 +174,19 @@ def _time_line(length: float, direction: Array, limits: JointLimits) -> tuple[Tr
     demand.max_velocity = [MARGIN * float(np.min(limits.velocity[moving] / share[moving]))]
     demand.max_acceleration = [MARGIN * float(np.min(limits.acceleration[moving] / share[moving]))]
     demand.max_jerk = [MARGIN * float(np.min(limits.jerk[moving] / share[moving]))]
-    profile = solved(demand, f"a path of {length:.3g} s at full speed")
+    profile = solved(demand, length)
     return profile, list(accumulate(phase.duration for phase in phases_of(profile)))
 
 
-def solved(demand: InputParameter, what: str) -> Trajectory:
-    """ruckig's profile for `demand`; raises `NoProfile` that names `what` it was for."""
+def solved(demand: InputParameter, length: float) -> Trajectory:
+    """ruckig's profile for `demand`, a stretch of `length` [s] at full speed; raises `NoProfile`."""
     profile = Trajectory(1)
     try:
         result = Ruckig(1).calculate(demand, profile)
     except RuckigError as error:
-        raise NoProfile(f"no jerk-limited profile for {what}") from error
+        raise NoProfile(because("plan.timing.none", length=length)) from error
     if result not in (Result.Working, Result.Finished):
-        raise NoProfile(f"no jerk-limited profile for {what}: {result.name}")
+        raise NoProfile(because("plan.timing.ruckig", length=length, result=result.name))
     return profile
 
 

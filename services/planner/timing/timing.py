@@ -124,7 +124,7 @@ def _through(section: Section, before: float, after: float) -> Trajectory:
     demand.target_position = [section.length]
     demand.max_velocity, demand.max_acceleration = [section.speed], [section.acceleration]
     demand.max_jerk = [section.jerk]
-    return solved(demand, f"a stretch of {section.length:.3g} s")
+    return solved(demand, section.length)
 
 
 def peak_shares(stamps: Array, p: Array, v: Array, a: Array, limits: JointLimits) -> tuple[float, float, float]:

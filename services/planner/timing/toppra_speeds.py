@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.schemas.reasons import because, remedy
 from gemelo.services.planner.timing.profile import JointLimits, NoProfile, require_short
 
 Array = NDArray[np.float64]
@@ -67,7 +68,7 @@ class _Task:
         )
         _, speeds, _ = algorithm.compute_parameterization(0.0, 0.0)
         if speeds is None or not np.isfinite(speeds).all() or (speeds[1:-1] <= 0.0).any():
-            raise NoProfile("toppra found no speeds within the limits: ask for the jerk-limited timing")
+            raise NoProfile(because("plan.timing.toppra", remedy("jerk_limited")))
         return np.asarray(speeds, dtype=np.float64) / unit
 
     def _unit(self) -> float:
@@ -96,10 +97,7 @@ def load_toppra() -> Any:
             import toppra.algorithm
             import toppra.constraint
     except ImportError as error:
-        raise NoProfile(
-            f"the time-optimal timing needs toppra, which is not on this machine ({error}): it has wheels for x86_64 "
-            "alone; ask for the jerk-limited timing"
-        ) from error
+        raise NoProfile(because("plan.timing.no_toppra", remedy("jerk_limited"), detail=str(error))) from error
 
     toppra.setup_logging("ERROR")
     return toppra

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.motion import JointTrajectory, TrajectoryPoint
-from gemelo.schemas.planning import PlanCode, Refusal, StepMargin
+from gemelo.schemas.planning import PlanCode, StepMargin
+from gemelo.schemas.reasons import Reason, Remedy, because, remedy
 from gemelo.services.planner.native.compiled import motion, where_built
 from gemelo.services.planner.request.deadline import NEVER, Deadline
 from gemelo.services.planner.request.per_arm import once_per_arm
-from gemelo.services.planner.request.refusals import PlanRefused
+from gemelo.services.planner.request.refusals import PlanRefused, refusal_of
 from gemelo.services.planner.timing.profile import LONGEST, States
 from gemelo.services.planner.verification.verify import states_at, states_of
 
@@ -200,11 +201,15 @@ def _accelerations(arm: ArmDescription) -> Array:
     return np.array([joint.acceleration for joint in arm.joints])
 
 
-def sentence(margin: StepMargin) -> str:
-    """ "brazo_joint peaks at 91 % of 4665.6 steps/s"."""
+STEPS_OF = {"step rate": "plan.steps.rate", "pulse width": "plan.steps.pulse_width"}  # by `StepMargin.limited_by`
+
+
+def _cannot_follow(margin: StepMargin, would_do: Remedy) -> Reason:
+    """The joint, and its share of what its stepper can do."""
     if margin.limited_by == "pull-out torque":
-        return f"{margin.name} needs {margin.share:.0%} of its motor's pull-out torque"
-    return f"{margin.name} peaks at {margin.share:.0%} of {margin.rate_limit:g} steps/s ({margin.limited_by})"
+        return because("plan.steps.torque", would_do, joint=margin.name, share=margin.share)
+    code, limit = STEPS_OF[margin.limited_by], margin.rate_limit
+    return because(code, would_do, joint=margin.name, share=margin.share, limit=limit)
 
 
 def require_feasible(
@@ -219,30 +224,12 @@ def require_feasible(
     if worst.share <= FULL and filled <= 1.0:
         return found
     scale = feasible_scale(arm, trajectory)
-    remedy = f"slow down to {scale:.2f} of this speed, or let step_policy do so" if scale else "see robot.toml"
+    would_do = remedy("slow_down", scale=scale) if scale else remedy("see_robot_file")
     if worst.share > FULL:
-        raise PlanRefused(
-            PlanCode.PLANNING_FAILED,
-            Refusal(
-                check=worst.limited_by,
-                subject=worst.name,
-                value=worst.share,
-                limit=1.0,
-                message=f"the stepper cannot follow: {sentence(worst)}",
-                remedy=remedy,
-            ),
-        )
-    raise PlanRefused(
-        PlanCode.PLANNING_FAILED,
-        Refusal(
-            check="device queue",
-            subject=arm.device.name,
-            value=filled,
-            limit=1.0,
-            message=f"braking from this speed takes {filled:.0%} of the device's {arm.device.queue_capacity} knots",
-            remedy=remedy,
-        ),
-    )
+        refusal = refusal_of(_cannot_follow(worst, would_do), worst.limited_by, worst.name, worst.share, 1.0)
+        raise PlanRefused(PlanCode.PLANNING_FAILED, refusal)
+    why = because("plan.device_queue", would_do, share=filled, knots=arm.device.queue_capacity)
+    raise PlanRefused(PlanCode.PLANNING_FAILED, refusal_of(why, "device queue", arm.device.name, filled, 1.0))
 
 
 def feasible_scale(arm: ArmDescription, trajectory: JointTrajectory, deadline: Deadline = NEVER) -> float:

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.motion import JointTrajectory
+from gemelo.schemas.reasons import because
 from gemelo.services.planner.native.compiled import motion, where_built
 from gemelo.services.planner.request.per_arm import once_per_arm
 from gemelo.services.planner.timing.profile import JointLimits, States
@@ -24,11 +26,12 @@ Array = NDArray[np.float64]
 DENSITY = 10  # samples between two points; chosen: a quintic between two points 0.05 s apart bends little in 5 ms
 ROUNDING = 1e-9  # [rad] or [m], and a share of limits: what floating point may add
 
+PER_TIME = {"position": "", "velocity": "/s", "acceleration": "/s2"}  # behind a joint's unit
 LOOSE_JERK = 1.01  # share of the limit; chosen: third differences of neighbouring points have few digits left
 
 
-class BadTrajectory(ValueError):
-    """A trajectory that must not be executed; the text names the joint, the value and the limit."""
+class BadTrajectory(ReasonedError, ValueError):
+    """A trajectory that must not be executed; the reason names the joint, the value and the limit."""
 
 
 @dataclass(frozen=True)
@@ -206,9 +209,11 @@ def require_within_limits(arm: ArmDescription, samples: Samples, limits: JointLi
     for what, excess, values in checks:
         if not float(excess.max()) <= 0.0:  # what is not a number is not within its limits
             row, column = np.unravel_index(int(excess.argmax()), excess.shape)
-            value, over = values[row, column], excess[row, column]
-            name, t = arm.joint_names[int(column)], samples.times[row]
-            raise BadTrajectory(f'{what} of "{name}" is {value:.6g} at {t:.3f} s, {over:.2g} beyond its limit')
+            value, over, t = values[row, column], excess[row, column], samples.times[row]
+            name = arm.joint_names[int(column)]
+            unit = arm.joints[int(column)].unit + PER_TIME[what]
+            figures = {"value": float(value), "beyond": float(over), "time": float(t)}
+            raise BadTrajectory(because("plan.verify.limit", quantity=what, joint=name, unit=unit, **figures))
 
 
 def require_jerk(arm: ArmDescription, samples: Samples, limits: JointLimits) -> None:
@@ -217,7 +222,8 @@ def require_jerk(arm: ArmDescription, samples: Samples, limits: JointLimits) -> 
     if not float(share.max()) <= LOOSE_JERK:
         row, column = np.unravel_index(int(share.argmax()), share.shape)
         name, t = arm.joint_names[int(column)], samples.times[row]
-        raise BadTrajectory(f'jerk of "{name}" is {share[row, column]:.3g} times its limit at {t:.3f} s')
+        most = float(share[row, column])
+        raise BadTrajectory(because("plan.verify.jerk", joint=name, share=most, time=float(t)))
 
 
 def require_ends(trajectory: JointTrajectory, start: tuple[float, ...], goal: tuple[float, ...]) -> None:
@@ -226,9 +232,9 @@ def require_ends(trajectory: JointTrajectory, start: tuple[float, ...], goal: tu
     times = [point.time_from_start for point in trajectory.points]
     if not all(map(lt, times, times[1:])):
         before, after = next(pair for pair in pairwise(times) if not lt(*pair))
-        raise BadTrajectory(f"the trajectory goes from {before:.6f} s to {after:.6f} s")
+        raise BadTrajectory(because("plan.verify.times", before=before, after=after))
     first, last = trajectory.points[0], trajectory.points[-1]
     if first.positions != start or last.positions != goal or first.time_from_start != 0.0:
-        raise BadTrajectory("the trajectory does not lead from the start to the goal")
+        raise BadTrajectory(because("plan.verify.ends"))
     if any(first.velocities + first.accelerations + last.velocities + last.accelerations):
-        raise BadTrajectory("the trajectory is not at rest at its ends")
+        raise BadTrajectory(because("plan.verify.rest"))

@@ -14,6 +14,7 @@ from gemelo.services.planner.collision.sphere_check import counted_time
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.request.deadline import Stopwatch, endless
+from gemelo.services.planner.request.refusals import failed
 from gemelo.services.planner.timing.profile import NoProfile
 from gemelo.services.planner.timing.toppra_speeds import load_toppra
 from gemelo.services.planner.workers.jobs import Job
@@ -22,10 +23,8 @@ from gemelo.services.planner.workers.process import nothing
 from gemelo.services.planner.workers.workers import (
     AGAIN,
     CHANGING,
-    CHANGING_REMEDY,
     Present,
     Scene,
-    failed,
     for_process,
     inputs_of,
     longest,
@@ -79,7 +78,7 @@ class PlansInProcess:
             elif tries > 1:
                 self._make(pending_plan, tries - 1)
             else:
-                pending_plan.end(failed(CHANGING, CHANGING_REMEDY))
+                pending_plan.end(failed(CHANGING))
 
         self._clock.later(took, answer)
 

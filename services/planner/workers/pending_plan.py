@@ -17,15 +17,8 @@ from gemelo.schemas.planning import (
     PlanResponse,
     Refusal,
 )
-
-WORDS = {
-    PlanPhase.WAITING: "waiting",
-    PlanPhase.IK: "looking for configurations of the goal",
-    PlanPhase.SEARCH: "searching",
-    PlanPhase.SMOOTHING: "smoothing",
-    PlanPhase.TIMING: "timing",
-    PlanPhase.VERIFICATION: "verifying",
-}
+from gemelo.schemas.reasons import Reason, because, remedy
+from gemelo.services.planner.request.refusals import refusal_of
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 SHORT = 0.1  # [s] until which nothing is said of a plan; chosen: a person does not see less
@@ -58,11 +51,6 @@ class PendingPlan:
     def elapsed(self) -> float:
         """[s] since it was asked for."""
         return self._clock.monotonic() - self._asked
-
-    @property
-    def words(self) -> str:
-        """How long it lasts, and what it is at."""
-        return f"after {self.elapsed:.2f} s, while {WORDS[self.phase]}"
 
     def progress(self, now: int) -> PlanProgress:
         """`now` [ns] UNIX."""
@@ -108,13 +96,8 @@ class PendingPlan:
             self._answer(self._preempted() if response is None or self._is_cancelled else response)
 
     def _preempted(self) -> PlanResponse:
-        refusal = Refusal(
-            check="cancelled",
-            subject=self.request_id,
-            message=f"the plan was cancelled {self.words}",
-            remedy="plan again, if it is wanted after all",
-        )
-        return PlanResponse(code=PlanCode.PREEMPTED, refusal=refusal)
+        why = because("plan.cancelled", remedy("plan_again"), time=self.elapsed, phase=self.phase)
+        return PlanResponse(code=PlanCode.PREEMPTED, refusal=refusal_of(why, "cancelled", self.request_id))
 
 
 class PendingPlans:
@@ -149,12 +132,13 @@ class PendingPlans:
     def cancel(self, request_id: str) -> PlanCancelResult:
         """Cancels the plan of that id, if there is one; the answer to who asked for it."""
         if not request_id:
-            return PlanCancelResult(message="request_id is empty: give the one that the plan was asked for with")
+            return _no_such(because("plan.cancel.empty", remedy("give_request_id")))
         with self._lock:
             pending_plan = self._plans.get(request_id)
         if pending_plan is None or not pending_plan.cancel():
-            return PlanCancelResult(message=f'there is no plan "{request_id}": it has ended, or never began')
-        return PlanCancelResult(found=True, message=f'the plan "{request_id}" is cancelled {pending_plan.words}')
+            return _no_such(because("plan.cancel.none", id=request_id))
+        why = because("plan.cancel.done", id=request_id, time=pending_plan.elapsed, phase=pending_plan.phase)
+        return PlanCancelResult(found=True, message=str(why), why=why)
 
     def progress(self, now: int) -> list[PlanProgress]:
         """Of every plan that is no short one; `now` [ns] UNIX."""
@@ -164,16 +148,17 @@ class PendingPlans:
 
     def _objection_to(self, request_id: str) -> Refusal | None:
         if len(self._plans) >= MOST_PLANS:
-            return _refused(
-                "plan", f"{MOST_PLANS} plans are waiting already", "plan again when some of them have ended"
-            )
-        remedy = "choose another request_id, or leave it empty"
+            why = because("plan.requests.too_many", remedy("plan_when_fewer"), limit=MOST_PLANS)
+            return refusal_of(why, "request", "plan")
+        would_do = remedy("other_request_id"), remedy("leave_empty", name="request_id")
         if len(request_id) > LONGEST_ID:
-            return _refused("request_id", f"request_id has {len(request_id)} characters: at most {LONGEST_ID}", remedy)
+            why = because("plan.request_id.long", *would_do, count=len(request_id), limit=LONGEST_ID)
+            return refusal_of(why, "request", "request_id")
         if request_id in self._plans:
-            return _refused("request_id", f'a plan "{request_id}" is being made already', remedy)
+            why = because("plan.request_id.taken", *would_do, id=request_id)
+            return refusal_of(why, "request", "request_id")
         return None
 
 
-def _refused(subject: str, message: str, remedy: str) -> Refusal:
-    return Refusal(check="request", subject=subject, message=message, remedy=remedy)
+def _no_such(why: Reason) -> PlanCancelResult:
+    return PlanCancelResult(message=str(why), why=why)

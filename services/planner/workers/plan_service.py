@@ -50,7 +50,7 @@ def sendable(response: PlanResponse) -> PlanResponse:
     try:
         encoded(response)
     except TooLarge as error:
-        return too_large(str(error))
+        return too_large(error.size, error.limit)
     return response
 
 

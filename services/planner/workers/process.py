@@ -12,7 +12,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TypeVar
 
+from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.planning import PlanPhase, PlanResponse, Timing
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.scene import PlanningScene
 from gemelo.services.planner.workers.jobs import (
     REPORTS,
@@ -46,8 +48,8 @@ class Late(Exception):
     """The plan was not made in its time; its process is still at it, until `settle`."""
 
 
-class WorkerDied(Exception):
-    """The process has ended."""
+class WorkerDied(ReasonedError):
+    """The process has ended; the reason says how."""
 
 
 class PlannerProcess:
@@ -148,18 +150,19 @@ class PlannerProcess:
             else:
                 on_tick()
 
-    def _replace(self) -> str:
+    def _replace(self) -> Reason:
         """Another process in place of this one; returns how that has ended. Where none can be started (no memory, no
         descriptor), `be_ready` tries again."""
         self._process.kill()
-        ended = f"exit code {self._process.wait()}"
+        code = self._process.wait()
+        ended = because("plan.worker.exit", code=code)
         self.close()
         self._told, self._is_ready, self._has_toppra = None, False, False
         if not self._is_over:
             try:
                 self._process = self._started()
             except OSError as error:
-                ended += f", and no other can be started now: {error.strerror}"
+                ended = because("plan.worker.none", code=code, detail=error.strerror or str(error))
         return ended
 
     def _started(self) -> subprocess.Popen[bytes]:

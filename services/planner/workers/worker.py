@@ -17,11 +17,13 @@ from typing import IO
 
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.runtime.process.priority import step_behind
-from gemelo.schemas.planning import PlanPhase, PlanResponse, Refusal, Timing
+from gemelo.schemas.planning import PlanPhase, PlanResponse, Timing
+from gemelo.schemas.reasons import because, remedy
 from gemelo.services.planner.collision.sphere_check import cancel_flag
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.request.deadline import Stopwatch
+from gemelo.services.planner.request.refusals import failed
 from gemelo.services.planner.timing.profile import NoProfile
 from gemelo.services.planner.timing.toppra_speeds import load_toppra
 from gemelo.services.planner.workers.jobs import (
@@ -100,9 +102,8 @@ def plan_at_hand(planner: Planner, at_hand: AtHand) -> PlanResponse:
     except Exception as error:
         with suppress(OSError):  # a disk that is full takes no words
             traceback.print_exc()
-        message = f"a defect of the planner: {type(error).__name__}: {error}"
-        remedy = "ask for something else, and report this with what the planner's log says"
-        return PlanResponse(refusal=Refusal(check="planner", subject="worker", message=message, remedy=remedy))
+        would_do = remedy("ask_else"), remedy("report_with_log")
+        return failed(because("plan.defect", *would_do, kind=type(error).__name__, detail=str(error)))
 
 
 def _read(pipe: IO[bytes], jobs: SimpleQueue[AtHand | Show], answers: Answers) -> None:

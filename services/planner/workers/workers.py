@@ -20,10 +20,11 @@ from gemelo.schemas.planning import (
     PlanProgress,
     PlanRequest,
     PlanResponse,
-    Refusal,
 )
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.scene import PlanningScene
 from gemelo.services.planner.core import LONGEST
+from gemelo.services.planner.request.refusals import failed, refusal_of
 from gemelo.services.planner.workers.jobs import Job
 from gemelo.services.planner.workers.pending_plan import Answer, Cancelled, OnInputs, PendingPlan, PendingPlans
 from gemelo.services.planner.workers.process import Late, PlannerProcess, WorkerDied, nothing
@@ -37,13 +38,9 @@ WAY, MOST_WAY = (
 )  # [s] to the process and back; of short times that share; chosen: a busy small computer
 GRACE = 1.0  # [s] after that answer in which a process ends its plan by itself; chosen: a new process costs more
 PATIENCE = 5.0  # [s] for a thread to see that its process is gone; chosen: only a broken machine needs more
-CHANGING, CHANGING_REMEDY = (
-    "the scene changes faster than a plan can be made in it",
-    "plan again when it stays as it is",
-)
+CHANGING = because("plan.scene.changing", remedy("plan_when_still"))
 AGAIN = 3  # plans of one request, where the scene changes or the process dies meanwhile; chosen: then a person is told
 MOST_DEATHS = 1  # after which a plan is made again; chosen: one that ends two processes may end every one
-DIED_REMEDY = "plan again: new ones are started; the system's log may say what has ended them (out of memory?)"
 LOOK = 0.2  # [s] between two looks whether the scene has changed; chosen: an idle thread that costs nothing
 
 Present = Callable[[], tuple[JointState | None, float]]
@@ -61,6 +58,7 @@ class Workers:
         self._threads: list[threading.Thread] = []
         self._pending_plans = PendingPlans()
         self._lock = threading.Lock()
+        str(CHANGING)  # reads the catalogue of reasons now: when a process dies there may be no descriptor left for it
         self._start_one()
 
     @property
@@ -162,23 +160,19 @@ class Workers:
                 deaths += 1
                 request = _with_what_is_left(request, began)
                 if deaths > MOST_DEATHS or request.allowed_time <= 0.0:
-                    return failed(f"{deaths} worker processes of the planner have ended ({error})", DIED_REMEDY)
+                    would_do = remedy("plan_again_new_processes"), remedy("see_system_log")
+                    return failed(because("plan.worker.died", error.reason, *would_do, count=deaths))
                 continue
             if response.code is not PlanCode.SUCCESS or self._scene() is scene:
                 return response
-        return failed(CHANGING, CHANGING_REMEDY)
+        return failed(CHANGING)
 
     def _late(self, pending_plan: PendingPlan) -> PlanResponse:
         """It was stopped, for it did not stop by itself."""
         allowed = pending_plan.request.allowed_time
-        refusal = Refusal(
-            check="allowed time",
-            subject="allowed_time",
-            value=pending_plan.elapsed,
-            limit=allowed,
-            message=f"the plan was stopped {pending_plan.words}: {allowed:g} s were allowed",
-            remedy="allow more time, a larger scaling, or a goal nearer to where the arm is",
-        )
+        elapsed, would_do = pending_plan.elapsed, (remedy("more_time"), remedy("faster"), remedy("nearer_goal"))
+        why = because("plan.time.stopped", *would_do, time=elapsed, phase=pending_plan.phase, allowed=allowed)
+        refusal = refusal_of(why, "allowed time", "allowed_time", elapsed, allowed)
         scene = self._scene()
         return PlanResponse(
             code=PlanCode.TIMED_OUT, refusal=refusal, scene_version=scene.version, scene_epoch=scene.epoch
@@ -213,8 +207,3 @@ def _with_what_is_left(request: PlanRequest, began: float | None) -> PlanRequest
     """The request with the time that is left of its own; the time that a process takes to start is not its own."""
     spent = 0.0 if began is None else time.monotonic() - began
     return replace(request, allowed_time=request.allowed_time - spent)
-
-
-def failed(message: str, remedy: str) -> PlanResponse:
-    refusal = Refusal(check="planner", subject="worker", message=message, remedy=remedy)
-    return PlanResponse(code=PlanCode.FAILURE, refusal=refusal)

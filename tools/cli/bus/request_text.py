@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from gemelo.api.planning import whole_reason
 from gemelo.api.targets import usual_time
 from gemelo.schemas.planning import (
     CircularMotion,
@@ -22,12 +23,14 @@ from gemelo.schemas.planning import (
     Timing,
     WaypointGoal,
 )
+from gemelo.schemas.reasons import remedy
 from gemelo.tools.cli.common.errors import CommandError
 from gemelo.tools.cli.common.units import DEGREE, SHOWN
 
 if TYPE_CHECKING:
     from gemelo import Refused
     from gemelo.libraries.arm.model.description import ArmDescription
+    from gemelo.schemas.reasons import Reason
 
 
 def request_text(request: PlanRequest, arm: ArmDescription) -> str:
@@ -126,17 +129,15 @@ def _tool_limits(motion: LinearMotion | CircularMotion) -> list[str]:
     ]
 
 
-def refusal_text(refusal: Refusal, goal: Goal, arm: ArmDescription) -> str:
-    """One sentence: the reason, and the nearest goal that can be reached as options, else the remedy."""
-    text = f"refused ({refusal.check}): {refusal.message}" if refusal.check else f"refused: {refusal.message}"
-    if refusal.nearest:
-        return f"{text}; nearest that can: {as_typed(goal, refusal.nearest, arm)}"
-    return f"{text}; {refusal.remedy}" if refusal.remedy else text
+def refusal_reason(refusal: Refusal, goal: Goal, arm: ArmDescription) -> Reason:
+    """The reason, and the nearest goal that can be reached as options, else the remedies."""
+    typed = as_typed(goal, refusal.nearest, arm) if refusal.nearest else ""
+    return whole_reason(refusal, remedy("nearest_that_can", arguments=typed) if typed else None)
 
 
 def refusal_error(error: Refused, goal: Goal, arm: ArmDescription) -> CommandError:
     """The end of a command whose `goal` was refused, in options where `gemelo` says arguments."""
-    return CommandError(refusal_text(error.refusal, goal, arm) if error.refusal is not None else str(error))
+    return CommandError(refusal_reason(error.refusal, goal, arm) if error.refusal is not None else error)
 
 
 def as_typed(goal: Goal, values: Sequence[float], arm: ArmDescription) -> str:
