@@ -13,6 +13,7 @@ from gemelo.libraries.runtime.deployment import is_loopback, load_deployment
 from gemelo.libraries.runtime.running import robots_on
 from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.reasons import because, remedy
 
 GATEWAY = "stepper_gateway"
 LOOK_EVERY = 0.1  # [s] while the twin is awaited
@@ -85,8 +86,10 @@ def _await_gateway(session: Session, end: float) -> None:
     while GATEWAY not in session.node.alive():
         if time.monotonic() > end:
             others = robots(session.deployment)
-            hint = f'; there is {", ".join(others)}: gemelo.connect("{others[0]}")' if others else ""
-            here = f": start the twin with `GEMELO_ROBOT=urdf/{robot} make up`"
-            hint = hint or (here if is_loopback(router.host) else ": `gemelo deploy status` says where it should run")
-            raise Lost(f"no {GATEWAY} of {robot} at the router {router.host}:{router.port}{hint}", others)
+            if others:
+                hint = remedy("other_arm", names=", ".join(others), robot=others[0])
+            else:
+                hint = remedy("start_arm", robot=robot) if is_loopback(router.host) else remedy("see_deployment")
+            said = because("lost.gateway", hint, gateway=GATEWAY, robot=robot, host=router.host, port=router.port)
+            raise Lost(said, others)
         time.sleep(LOOK_EVERY)

@@ -17,6 +17,7 @@ from gemelo.libraries.runtime.clock import token
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlState, ControlTake
 from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import CONTROL, CONTROL_GIVE, CONTROL_JOIN, CONTROL_TAKE
 
 TO_REST = 15.0  # [s] that the arm may take to come to rest, where another moves it
@@ -121,7 +122,7 @@ class Control:
         """
         own, self._own = self._own, None
         if own is None:
-            raise Refused("refused: this connection does not hold control: nothing to give back", check="control")
+            raise Refused(because("client.control.none"), check="control")
         self.give_with(own.secret)
 
     def give_with(self, secret: str) -> None:

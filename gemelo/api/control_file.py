@@ -12,6 +12,7 @@ import msgspec
 
 from gemelo.api.errors import Error
 from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.reasons import because
 
 PATH_VARIABLE = "GEMELO_CONTROL"  # another file than the usual one, for a login that several people share
 
@@ -45,7 +46,8 @@ def write(path: Path, secret: str, name: str) -> None:
             file.write(msgspec.json.encode(hold))
         fresh.replace(path)
     except OSError as error:
-        raise Error(f"{path}: {error.strerror}: name another file in ${PATH_VARIABLE}") from error
+        why = {"error": str(error.strerror), "variable": PATH_VARIABLE}
+        raise Error(because("client.control_file.unwritable", path=str(path), **why)) from error
 
 
 def read(path: Path) -> SharedHold | None:
@@ -62,7 +64,7 @@ def read(path: Path) -> SharedHold | None:
         return None
     if about.st_uid != os.getuid() or stat.S_IMODE(about.st_mode) & 0o077:
         mode = stat.S_IMODE(about.st_mode)
-        raise Error(f"{path} belongs to user {about.st_uid} with mode {mode:o}: remove it, and take control anew")
+        raise Error(because("client.control_file.readable", path=str(path), user=about.st_uid, mode=f"{mode:o}"))
     try:
         hold = msgspec.json.decode(content, type=SharedHold)
     except (msgspec.DecodeError, UnicodeDecodeError):

@@ -30,7 +30,7 @@ from gemelo.schemas.device import (
 )
 from gemelo.schemas.device_faults import fault_text
 from gemelo.schemas.device_link import offline_text
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURATION,
@@ -154,7 +154,7 @@ class Device:
             return self.configuration.crc32
         state = self.state
         if state.mode in MOVING:
-            raise Refused(f"refused: the device is in {state.mode.name}: wait, or arm.stop()", check="device")
+            raise Refused(because("client.device.moving", remedy("wait_or_stop"), mode=state.mode.name), check="device")
         if state.armed:
             if before_disarm is not None:
                 before_disarm()
@@ -185,7 +185,7 @@ class Device:
             raise BadArgument(because("argument.inject.unknown", nearest(what, kinds), name=what))
         self._require_target(InjectKind(what), target)
         if self.status.online and not self.status.virtual:
-            raise Refused(f"{self.status.device} is a real device: only a virtual one takes this", check="virtual")
+            raise Refused(because("client.not_virtual", device=self.status.device), check="virtual")
         request = InjectRequest(kind=InjectKind(what), target=target, value=number("value", value))
         answer = self._session.call(DEVICE_INJECT, request, TO_ANSWER)
         self._session.changed()

@@ -22,7 +22,7 @@ def as_reason(text: Reason | str) -> Reason:
     return text if isinstance(text, Reason) else plain(text)
 
 
-def reason_of(error: Exception) -> Reason:
+def reason_of(error: Exception | None) -> Reason:
     """Why, as another part's error says it."""
     found = getattr(error, "reason", None)
     return found if isinstance(found, Reason) else plain(str(error))

@@ -11,6 +11,7 @@ from gemelo.libraries.arm.frames.transforms import IDENTITY, Quaternion, Rigid, 
 from gemelo.libraries.arm.model.jaws import jaw_edges
 from gemelo.schemas.cell import Thing
 from gemelo.schemas.grippers.kinds import Gripper
+from gemelo.schemas.reasons import because
 
 GAP = 0.003  # [m] between the thing's top and the tool, and between the jaws' tips and the table
 OVERLAP = 0.004  # [m] of the jaws' length that must be beside the thing
@@ -31,8 +32,10 @@ def lift_above(thing: Thing, gripper: Gripper, seen: Seen) -> float:
     beside = top - (tool - beyond)
     if beside < OVERLAP:
         raise Refused(
-            f"{thing.name} is {1e3 * height:.0f} mm high: the jaws, {1e3 * beyond:.0f} mm long, would be beside "
-            f"{1e3 * max(beside, 0.0):.1f} mm of it (at least {1e3 * OVERLAP:g})",
+            because(
+                "pick.flat", thing=thing.name, height=1e3 * height, long=1e3 * beyond,
+                beside=1e3 * max(beside, 0.0), least=1e3 * OVERLAP,
+            ),
             check="grasp", subject=thing.name, value=beside, limit=OVERLAP,
         )  # fmt: skip
     return tool - grasp

@@ -92,10 +92,7 @@ class Gripping:
     def _gripper(self) -> Gripper:
         gripper = self._session.description.gripper
         if gripper is None:
-            raise Refused(
-                f"{self._session.description.name} has no gripper: write a [gripper] into its robot.toml",
-                check="gripper",
-            )
+            raise Refused(because("client.no_gripper", robot=self._session.description.name), check="gripper")
         return gripper
 
     def _is_virtual(self) -> bool:
@@ -122,10 +119,10 @@ class Gripping:
         except KeyboardInterrupt:
             handle.cancel()
             self._session.wait_for(lambda: handle.is_over, TO_STAY)
-            raise Interrupted("stopped by Ctrl-C: the gripper stays where it is") from None
+            raise Interrupted(because("client.gripper.interrupted")) from None
         self._session.changed()
         if handle.outcome is None:
-            raise Lost(str(handle.lost), has_begun=True)
+            raise Lost(reason_of(handle.lost), has_begun=True)
         status, result = handle.outcome.status, handle.outcome.result
         if status is not GoalStatusCode.SUCCEEDED:
             reason = result.error_string or "no reason was given"

@@ -14,6 +14,7 @@ from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device import DeviceCommand, DeviceEvent, DeviceMode, DeviceState, HomeCommand, StopKind
 from gemelo.schemas.device_faults import fault_text
 from gemelo.schemas.device_link import offline_text
+from gemelo.schemas.reasons import FrontEnd, Reason, because, plain, remedy, say
 from gemelo.schemas.robot import HomingDirection
 from gemelo.schemas.topics import DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
 
@@ -35,7 +36,7 @@ class HomingWait:
     def __init__(self, arm: ArmDescription, joints: Sequence[Joint]) -> None:
         self.joints = tuple(joints)
         self.has_begun = False
-        self.reason = ""  # why it ended before its end
+        self.why: Reason | None = None  # it ended before its end
         self.steps_off: dict[str, int] = {}
         self.phases = {joint.name: WAITS for joint in joints}  # by joint: WAITS, TO, OFF or HOME
         self._arm = arm
@@ -72,7 +73,7 @@ class HomingWait:
             case "homed":
                 self._on_homed(event.detail)
             case "homing_stopped":
-                self.reason = self.reason or _stopped_text(event.detail)
+                self.why = self.why or _stopped(event.detail)
 
     def on_state(self, state: DeviceState) -> None:
         """How it is now; a state from before the homing, which may still be on its way, is passed over."""
@@ -81,7 +82,7 @@ class HomingWait:
             return
         self._mode = state.mode
         if state.fault:
-            self.reason = fault_text(state.fault, joint_name(self._arm, state.fault_joint))
+            self.why = plain(fault_text(state.fault, joint_name(self._arm, state.fault_joint)))
         velocity = dict(zip(state.name, state.velocity, strict=False))
         for joint in self.joints:
             if self.phases[joint.name] != HOME:
@@ -125,16 +126,11 @@ def homing_joints(arm: ArmDescription, names: Iterable[str]) -> list[Joint]:
         asked.append(arm.joint(name))
     without = [joint.name for joint in asked if joint.drive.homing is None]
     if without:
-        raise Refused(
-            f'joint "{without[0]}" has no [joint.homing] in robot.toml, so it cannot home: '
-            f'declare where it stands, arm.reference({{"{without[0]}": ...}})',
-            check="homing",
-        )
+        hint = remedy("declare_joint", joint=without[0])
+        raise Refused(because("homing.no_switch", hint, joint=without[0]), check="homing")
     found = asked or [joint for joint in arm.joints if joint.drive.homing is not None]
     if not found:
-        raise Refused(
-            "no joint has a [joint.homing] in robot.toml: declare where they stand, arm.reference()", check="homing"
-        )
+        raise Refused(because("homing.no_switches", remedy("declare_joints")), check="homing")
     return found
 
 
@@ -147,17 +143,18 @@ def _require_ready(session: Session) -> None:
     """Raises `Refused` with the remedy where homing cannot begin."""
     status = session.newest(DEVICE_STATUS)
     if not status.online:
-        reason = f"the device is {offline_text(status, session.node.now())}"
-        raise Refused(f"homing refused: {reason}", check="device", reason=reason)
+        reason = plain(f"the device is {offline_text(status, session.node.now())}")
+        raise Refused(because("homing.refused", reason), check="device", reason=reason)
     state = session.newest(DEVICE_STATE)
     if state.fault or state.mode in (DeviceMode.FAULT, DeviceMode.ESTOP):
         about = fault_text(state.fault, joint_name(session.description, state.fault_joint))
-        raise Refused(f"homing refused: {about or state.mode.name}", check="device", remedy="arm.device.reset()")
+        why = because("homing.refused", plain(about)) if about else because("homing.mode", mode=state.mode.name)
+        raise Refused(why, check="device", remedy="arm.device.reset()")
     if not state.armed:
-        remedy = "arm.device.arm(), then arm.home()"
-        raise Refused(f"homing refused: the drivers are off: {remedy}", check="device", remedy=remedy)
+        why = because("homing.drivers_off", remedy("arm_then_home"))
+        raise Refused(why, check="device", remedy="arm.device.arm(), then arm.home()")
     if state.mode in (DeviceMode.RUN, DeviceMode.HOLD, DeviceMode.HOMING):
-        raise Refused(f"homing refused: the device is in {state.mode.name}: wait, or arm.stop()", check="device")
+        raise Refused(because("homing.moving", remedy("wait_or_stop"), mode=state.mode.name), check="device")
 
 
 def _follow(
@@ -183,21 +180,21 @@ def _follow(
     is_interrupted = False
     try:
         command(HomeCommand(name=tuple(joint.name for joint in homing.joints)))
-        session.wait_for(lambda: homing.is_over or bool(watch.trouble()), None, tell)
+        session.wait_for(lambda: homing.is_over or watch.trouble() is not None, None, tell)
     except KeyboardInterrupt:  # also while the answer is on its way: the device may have begun
         is_interrupted = True
         command(StopKind.STOP)
         if on_cancel is not None:
             on_cancel()
         session.wait_for(lambda: homing.is_over, BRAKING, tell)
-    session.wait_for(lambda: homing.is_done or bool(homing.reason or watch.trouble()), LAST_WORDS)
+    session.wait_for(lambda: homing.is_done or (homing.why or watch.trouble()) is not None, LAST_WORDS)
     tell()
     report = _report(homing, node.monotonic() - began, watch)
-    ended = f"homing ended after {report.took:.1f} s: {report.reason or 'all joints are home'}"
+    ended = because("homing.ended", report.why or because("homing.all_home"), time=report.took)
     if is_interrupted:
         raise Interrupted(ended, homing=report)
-    if report.reason:
-        raise Aborted(ended, homing=report)
+    if report.why is not None:
+        raise Aborted(ended, homing=report, reason=report.why)
     return report
 
 
@@ -206,8 +203,8 @@ def _report(homing: HomingWait, took: float, watch: HomingEnd) -> HomingReport:
     if homing.is_done:
         return HomingReport(homing.homed, homing.steps_off, took)
     missing = ", ".join(name for name in homing.phases if name not in homing.homed)
-    reason = homing.reason or watch.trouble() or f"the device ended it without {missing}"
-    return HomingReport(homing.homed, homing.steps_off, took, reason)
+    why = homing.why or watch.trouble() or because("homing.without", joints=missing)
+    return HomingReport(homing.homed, homing.steps_off, took, say(why, front_end=FrontEnd.SCRIPT), why)
 
 
 class HomingEnd:
@@ -218,19 +215,19 @@ class HomingEnd:
         self._status, self._state = session.latest(DEVICE_STATUS), session.latest(DEVICE_STATE)
         self._began = self._node.monotonic()
 
-    def trouble(self) -> str:
-        """The reason; empty if there is none."""
+    def trouble(self) -> Reason | None:
+        """None while it is waited for."""
         elapsed = self._node.monotonic() - self._began
         status = self._status.message
         if status is not None and not status.online and self._state.age() > OFFLINE:
-            return f"the device went offline: {status.reason}"
+            return because("homing.offline", reason=status.reason)
         if self._state.age() > BRAKING:
-            return "the device has fallen silent: `gemelo device status`"
+            return because("homing.silent", remedy("see_device"))
         if not self._homing.has_begun and elapsed > TO_BEGIN:
-            return "the device did not begin: `gemelo device status`"
+            return because("homing.not_begun", remedy("see_device"))
         if elapsed > self._homing.longest:
-            return f"it has not ended after {elapsed:.0f} s: arm.stop(), `gemelo device status`"
-        return ""
+            return because("homing.late", remedy("stop_and_see_device"), time=elapsed)
+        return None
 
 
 def _phase_of(joint: Joint, velocity: float) -> str:
@@ -241,8 +238,6 @@ def _phase_of(joint: Joint, velocity: float) -> str:
     return TO if math.copysign(1.0, velocity) == towards else OFF
 
 
-def _stopped_text(detail: str) -> str:
+def _stopped(detail: str) -> Reason:
     """Why the device broke off."""
-    if detail == "heartbeat":
-        return "the device heard nothing from stepper_gateway for too long and stopped: arm.home() again"
-    return "it was stopped; the joints that were not home yet are unreferenced: arm.home() again"
+    return because("homing.heartbeat" if detail == "heartbeat" else "homing.stopped", remedy("home_again"))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from gemelo.schemas.reasons import Reason
+
 WAITS, TO, OFF, HOME = "waits", "to its switch", "off its switch", "home"
 
 
@@ -37,3 +39,4 @@ class HomingReport:
     steps_off: dict[str, int]  # of joints whose place had been known before
     took: float  # [s]
     reason: str = ""  # why not all are home, where an error carries the report
+    why: Reason | None = None  # the same as data

@@ -15,14 +15,13 @@ from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceEvent
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.planning import JogCommand, JogStatus
-from gemelo.schemas.reasons import Remedy, because, remedy
+from gemelo.schemas.reasons import Reason, Remedy, because, remedy
 from gemelo.schemas.topics import DEVICE_EVENTS, JOG, JOG_STATUS, JOINT_STATES, JOINT_TARGETS
 
 PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
 ANSWER = 3.0  # [s] of jogging without a word of the planner, after which it counts as lost
 BEGIN = 0.5  # [s] of a jog in which a refusal may be about the past: the planner hears a goal's end after its client
 PAUSE = 0.5  # [s] without a command, after which the next one begins a new jog
-SILENT = "the planner does not answer to jogging: is it running? `gemelo node list`"
 GAP = 1.0  # [s] without a word in the middle: the planner of a jog says ten a second, the gateway of a stream fifty
 REST = 5.0  # [s] that the arm may take to come to rest
 FASTEST = 1.0  # [m/s] of the tool of a desktop arm
@@ -49,12 +48,9 @@ class JogCommands:
         node.publisher(JOG).put(replace(command, stamp=node.now()))
         heard = self._heard_since(self._began)
         if heard is None and now - self._began > ANSWER:
-            raise Lost(SILENT)
+            raise Lost(_silent())
         if heard is not None and now - self._heard_at > GAP:
-            raise Lost(
-                f"the planner has said nothing for {GAP:g} s: the arm has stopped in the middle of the jog; "
-                "`gemelo node list`"
-            )
+            raise Lost(because("lost.jog.silent", remedy("list_nodes"), time=GAP))
         if heard is not None and not heard.active and heard.limited_by:
             counts_after = PERIOD if heard.check else BEGIN
             if now - self._began > counts_after:
@@ -91,7 +87,7 @@ class JogCommands:
 
         if not self._session.wait_for(is_at_rest, REST) or self._heard is None:
             is_silent = self._heard_since(began) is None
-            raise Lost(SILENT if is_silent else f"the planner does not say within {REST:g} s that the jog has ended")
+            raise Lost(_silent() if is_silent else because("lost.jog.end", time=REST))
         self._session.changed()
         if self._heard.limited_by and not self._heard.limits:
             raise _refused(self._heard)
@@ -128,10 +124,7 @@ class Streaming:
         self._said = now
         states = self._session.latest(JOINT_STATES)  # heard from the first target on
         if now - self._began > GAP and states.age() > GAP:
-            raise Lost(
-                f"nothing heard of joint_states for {GAP:g} s: no target is followed; is stepper_gateway running? "
-                "`gemelo node list`"
-            )
+            raise Lost(because("lost.stream", remedy("list_nodes"), time=GAP))
         reason, self._refused = self._refused, ""
         if reason:
             raise Refused(f"refused: {reason}", check="stream")
@@ -143,6 +136,10 @@ class Streaming:
             return
         if event.event == "target_refused" and self._session.clock.monotonic() - self._said < PAUSE:
             self._refused = event.detail
+
+
+def _silent() -> Reason:
+    return because("lost.jog.planner", remedy("list_nodes"))
 
 
 def _refused(status: JogStatus) -> Refused:

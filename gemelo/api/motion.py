@@ -110,7 +110,7 @@ class Motion:
         (True, True)
         """
         if self._outcome is None:
-            raise Error("the motion has no result: it is under way, or the gateway was lost; see status, and wait()")
+            raise Error(because("client.motion.no_result"))
         return self._outcome.result
 
     @property
@@ -183,7 +183,7 @@ class Motion:
             if self._wants_cancel or self.is_over or isinstance(error, Interrupted):
                 raise
             if self._handle is None:
-                raise Interrupted("stopped by Ctrl-C before the motion began: nothing moves") from None
+                raise Interrupted(because("client.motion.not_begun")) from None
             raise self._interrupted(on_cancel) from None
 
     def _send(self, client: Client, goal: FollowJointTrajectoryGoal) -> None:
@@ -199,7 +199,7 @@ class Motion:
         except (runtime.NoAnswer, runtime.BusError) as error:
             raise Lost(reason_of(error)) from error
         except KeyboardInterrupt:
-            raise Interrupted("stopped by Ctrl-C as the motion began: it is cancelled") from None
+            raise Interrupted(because("client.motion.as_it_began")) from None
         self._handle.on_end = self._session.notify
 
     def _await(self, timeout: float | None, on_progress: OnMotion | None) -> bool:
@@ -220,11 +220,11 @@ class Motion:
         else:
             self._session.node.log.warning("Ctrl-C: the arm slows down on its path (again: leave without waiting)")
         if not self._session.wait_for(lambda: self.is_over, BRAKING):
-            silent = f"the arm was told to stop, but did not say within {BRAKING:g} s that it rests"
-            return Interrupted(silent)
+            return Interrupted(because("client.motion.not_at_rest", time=BRAKING))
         self._session.changed()
         ended = self._require_outcome()
-        return Interrupted(f"stopped by Ctrl-C: {self!r}", self.stopped_at, ended.status, ended.result)
+        said = because("client.motion.interrupted", motion=repr(self))
+        return Interrupted(said, self.stopped_at, ended.status, ended.result)
 
     def _ended(self) -> Motion:
         outcome = self._require_outcome()
@@ -239,7 +239,7 @@ class Motion:
         """How it ended; raises `Lost` where the gateway was lost before."""
         assert self._handle is not None
         if self._handle.outcome is None:
-            raise Lost(str(self._handle.lost), has_begun=True)
+            raise Lost(reason_of(self._handle.lost), has_begun=True)
         return self._handle.outcome
 
     def __repr__(self) -> str:
@@ -306,7 +306,7 @@ class MotionRegistry:
         for motion in running:
             motion.cancel()
         if running and not self._session.wait_for(lambda: all(motion.is_over for motion in running), BRAKING):
-            raise Lost(f"the motion before was to stop, but did not say within {BRAKING:g} s that it rests")
+            raise Lost(because("lost.rest", time=BRAKING))
         if running:
             self._session.changed()
 

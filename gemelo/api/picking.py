@@ -23,6 +23,7 @@ from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, fro
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.cell import Place, PosePlace, Thing
 from gemelo.schemas.grippers.kinds import Gripper
+from gemelo.schemas.reasons import because, remedy
 
 APPROACH = 0.04  # [m] the straight way down to a thing, and up with it
 SLOW = 0.05  # [m/s] down and up
@@ -105,7 +106,7 @@ class Hand:
 
     def _proceed(self) -> None:
         if self.is_cancelled():
-            raise Canceled("the pick was cancelled: the arm stands", GoalStatusCode.CANCELED)
+            raise Canceled(because("pick.canceled"), GoalStatusCode.CANCELED)
 
 
 def pick(
@@ -135,7 +136,7 @@ def pick(
             if name in arm.scene.objects and not arm.scene.objects[name].attached:
                 arm.scene.remove(name)
         tell("the jaws have closed on nothing")
-    raise Aborted(f"{name} was not gripped: the jaws closed on nothing, {ATTEMPTS} times; where is it? `gemelo detect`")
+    raise Aborted(because("pick.not_gripped", remedy("look_for_it"), thing=name, count=ATTEMPTS))
 
 
 def _seen_afterwards(hand: Hand, eyes: Eyes, before: Seen, camera: str, spot: Point) -> tuple[Pose | None, str]:
@@ -151,10 +152,7 @@ def _seen_afterwards(hand: Hand, eyes: Eyes, before: Seen, camera: str, spot: Po
     here, stood = now.pose.position, before.pose.position
     if math.dist(here, stood) < STAYED < math.dist(spot[:2], stood[:2]):
         x, y, z = (1e3 * value for value in here)
-        raise Aborted(
-            f"{before.name} was not picked: it still stands at {x:.1f} {y:.1f} {z:.1f} mm, where it was; the jaws "
-            "closed beside it: is the camera where camera.toml says? `gemelo camera check`"
-        )
+        raise Aborted(because("pick.still_there", remedy("check_camera"), thing=before.name, x=x, y=y, z=z))
     return now.pose, ""
 
 
@@ -173,7 +171,7 @@ def named(arm: MovingArm, eyes: Eyes, name: str, to: str) -> tuple[Thing, Place,
     cell = eyes.cell()
     gripper = arm.description.gripper
     if gripper is None:
-        raise Refused(f"{arm.name} has no gripper: write a [gripper] into its robot.toml", check="gripper")
+        raise Refused(because("client.no_gripper", robot=arm.name), check="gripper")
     try:
         return cell.thing(name), cell.place(to), gripper
     except DescriptionError as error:
@@ -196,8 +194,9 @@ def _way_to(arm: MovingArm, thing: Thing, seen: Seen, tool: Point, gripper: Grip
     width = side * math.cos(turned) + other * abs(math.sin(turned))
     if width + BESIDE > gripper.open or abs(turned) > MOST_TURN:
         raise Refused(
-            f"{thing.name} stands {math.degrees(abs(turned)):.0f} deg turned between the jaws, {1e3 * width:.1f} mm "
-            f"wide there, and they open to {1e3 * gripper.open:g} mm: turn it",
+            because(
+                "pick.turned", thing=thing.name, angle=math.degrees(abs(turned)), width=width, open=gripper.open
+            ),
             check="grasp", subject=thing.name, value=width, limit=gripper.open,
         )  # fmt: skip
     return Approach(joints, turned)
@@ -222,7 +221,7 @@ def _configurations_above(
         except Refused as error:
             refused = refused or error
     if not found:
-        raise refused or Refused("no side of it is narrower than the open jaws", check="grasp")
+        raise refused or Refused(because("pick.too_wide"), check="grasp")
     return found
 
 
@@ -240,9 +239,7 @@ def _yaw_at(arm: MovingArm, place: Place, seen: Seen, way: Approach) -> float | 
     if not isinstance(place, PosePlace) or place.yaw is None:
         return None
     if len(arm.joint_names) < FULL:
-        raise Refused(
-            f"{arm.name} cannot turn its tool, and {place.name} asks for a turn: leave out its yaw", check="orientation"
-        )
+        raise Refused(because("pick.cannot_turn", robot=arm.name, place=place.name), check="orientation")
     return place.yaw + yaw_of(arm.fk(way.above).orientation) - yaw_of(seen.pose.orientation)
 
 
@@ -295,7 +292,7 @@ def _put(hand: Hand, name: str, release: Mapping[str, float]) -> None:
         held = hand.arm.scene.objects.get(name)
         if held is None or not held.attached:
             raise
-        said = f"{name} was picked and is still between the jaws: {error}"
+        said = because("pick.between_the_jaws", error.message, thing=name)
         raise (Canceled(said, error.status) if isinstance(error, Canceled) else Aborted(said)) from error
 
 

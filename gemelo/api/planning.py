@@ -144,7 +144,7 @@ class Plan:
         try:
             saved = msgspec.json.decode(read_text(Path(path)), type=SavedPlan)
         except (OSError, NotUtf8, msgspec.MsgspecError) as error:
-            raise Error(f"{path} holds no plan: {error}") from error
+            raise Error(because("client.plan.no_file", path=str(path), error=str(error))) from error
         return cls(saved.robot, Target(**saved.target), saved.response)  # type: ignore[typeddict-item]
 
     def __repr__(self) -> str:
@@ -189,7 +189,7 @@ def make_plan(session: Session, asked: PlanRequest, target: Target, on_progress:
         _require_no_homing(session, response.refusal)
         raise refused(session.description, response.refusal, request, target, response.code)
     if not response.trajectory.points:
-        raise Refused(f"refused: the planner answered {response.code.name} without a trajectory", code=response.code)
+        raise Refused(because("client.plan.no_trajectory", answer=response.code.name), code=response.code)
     return Plan(session.description.name, target, response)
 
 
@@ -201,8 +201,9 @@ def _require_no_homing(session: Session, refusal: Refusal) -> None:
     state = session.latest(DEVICE_STATE)
     session.wait_for(lambda: state.message is not None, LOOK_AGAIN * 3)
     if state.message is not None and state.message.mode is DeviceMode.HOMING:
-        reason = "the arm is looking for its switches: wait until it is home, or end that with arm.stop()"
-        raise Refused(f"refused: {reason}", check="homing", reason=reason, code=PlanCode.INVALID_ROBOT_STATE)
+        reason = because("client.plan.homing")
+        said = because("client.refused", reason)
+        raise Refused(said, check="homing", reason=reason, code=PlanCode.INVALID_ROBOT_STATE)
 
 
 def find_configurations(session: Session, request: IkRequest, target: ToolGoal) -> Configurations:
@@ -364,12 +365,12 @@ def _interrupted(
     """Cancels, and waits for the planner's last word; a second Ctrl-C leaves at once."""
     tell()
     _cancel(session, request)
-    said = "the plan was cancelled"
+    said = because("client.plan.canceled")
     with suppress(Lost, Refused):
         if call is not None and session.wait_for(lambda: call.is_over, MARGIN, tell):
             refusal = answer_of(call).refusal
-            said = refusal.message if refusal is not None else "cancelled when the plan was just made"
-    return Interrupted(f"{said}: nothing moves")
+            said = plain(refusal.message) if refusal is not None else because("client.plan.just_made")
+    return Interrupted(because("client.plan.interrupted", said))
 
 
 def _cancel(session: Session, request: PlanRequest) -> None:

@@ -13,11 +13,11 @@ from gemelo.api.errors import BadArgument, Error, Lost, reason_of
 from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.model import description as descriptions
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.libraries.runtime.deployment import CONFIG, load_deployment, project_root, when_silent
+from gemelo.libraries.runtime.deployment import CONFIG, is_loopback, load_deployment, project_root
 from gemelo.libraries.runtime.running import find_deployment, folder_of
 from gemelo.libraries.runtime.started import deployment_of_arm
 from gemelo.schemas.deployment import Deployment
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import because, remedy
 
 LOOK_TIMEOUT = 1.0  # [s] of one look for the router
 
@@ -80,7 +80,9 @@ def require_router(deployment: Deployment) -> None:
     try:
         socket.create_connection(address, timeout=LOOK_TIMEOUT).close()
     except OSError:
-        raise Lost(f"no router at {address[0]}:{address[1]}: {when_silent(address[0])}") from None
+        host, port = address
+        hint = remedy("start_twin") if is_loopback(host) else remedy("look_at_host", host=host)
+        raise Lost(because("lost.router", hint, host=host, port=port)) from None
 
 
 def _folder(robot: str) -> Path:

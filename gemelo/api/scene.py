@@ -313,7 +313,7 @@ class Scene:
         subscription = self._session.node.subscribe(topic, take)
         try:
             if not self._session.wait_for(lambda: not found.empty(), TO_ANSWER):
-                raise Lost(f"nothing heard of {topic.key} for {TO_ANSWER:g} s: was the mesh removed meanwhile?")
+                raise Lost(because("lost.mesh", topic=topic.key, time=TO_ANSWER))
         finally:
             subscription.close()
         return found.get()

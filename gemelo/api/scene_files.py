@@ -67,6 +67,6 @@ def read_scene(path: Path) -> PlanningScene:
     try:
         return msgspec.json.decode(read_text(path), type=PlanningScene)
     except OSError as error:
-        raise Error(f"{path} cannot be read: {error.strerror}") from error
+        raise Error(because("client.file.unreadable", path=str(path), error=str(error.strerror))) from error
     except ValueError as error:
-        raise Error(f"{path} holds no scene: {error}") from error
+        raise Error(because("client.scene.no_file", path=str(path), error=str(error))) from error

@@ -19,11 +19,11 @@ from gemelo.libraries.runtime.topics import Subscription
 from gemelo.schemas.camera import CameraCondition, CameraStatus
 from gemelo.schemas.cell import CellTexts, TagThing, Thing
 from gemelo.schemas.detections import Detection, Detections
-from gemelo.schemas.reasons import Reason, because
+from gemelo.schemas.reasons import Reason, because, plain, remedy
 from gemelo.schemas.system import Empty
 from gemelo.schemas.topics import CAMERA, CELL, JOINT_STATES, camera_detections, camera_status
 
-NO_CELL = "(urdf/rm1/cell.toml is a sample: GEMELO_CELL=urdf/rm1/cell.toml make up)"
+SAMPLE = "urdf/rm1/cell.toml"  # a cell file
 TO_READ = 2.0  # [s] for the cell to come over the bus
 IMAGES = 5  # of which the median is taken
 ENOUGH = 3  # of them that must show a thing
@@ -54,6 +54,7 @@ class Seen(NamedTuple):
     camera: str
     stamp: int  # [ns UNIX] of the newest image that shows it
     trouble: str  # why it cannot be picked as it is seen; empty if it can
+    why: Reason | None = None  # the same as data
 
     def __str__(self) -> str:
         """One line for a person."""
@@ -81,15 +82,16 @@ class Eyes:
     def _read_cell(self) -> CellTexts:
         """What the twin's process `camera` has published of its cell; raises `Refused` where it has none."""
         latest, robot = self._session.latest(CELL), self._session.description.name
+        sample = remedy("start_with_cell", sample=SAMPLE)
         if CAMERA not in self._session.node.alive():
-            why = f"the twin of {robot} has no cell file, and no process camera"
+            why = because("detect.cell.no_camera", sample, robot=robot)
         elif not self._session.wait_for(lambda: latest.message is not None, TO_READ) or latest.message is None:
-            why = f"the process camera of {robot} says nothing of its cell: is it running? `gemelo node list`"
+            why = because("detect.cell.silent", remedy("list_nodes"), robot=robot)
         elif not latest.message.path:
-            why = f"the twin of {robot} was started without a cell file"
+            why = because("detect.cell.none", sample, robot=robot)
         else:
             return latest.message
-        raise Refused(f"{why} {NO_CELL}", check="cell")
+        raise Refused(why, check="cell")
 
     def detect(self, name: str, camera: str, in_scene: bool) -> tuple[Seen, ...]:
         """What is seen of `name`, or of all things and places; raises `Refused`, `BadArgument`, `Error` or `Lost`."""
@@ -99,7 +101,7 @@ class Eyes:
             raise BadArgument(_unknown_thing(cell.path, name, known))
         cameras = cell.camera_names if not camera else (_known_camera(cell, camera),)
         if not cameras:
-            raise Refused(f"{cell.path} has no [[camera]]", check="camera")
+            raise Refused(because("detect.no_camera", path=str(cell.path)), check="camera")
         stood = self._require_rest()
         found: dict[str, Seen] = {}
         unclear = ""
@@ -114,14 +116,9 @@ class Eyes:
         if moved > STILL:
             raise _moving()
         if name and name not in found and unclear:
-            raise Refused(f"{name} cannot be measured: {unclear}", check="detection", subject=name)
+            raise Refused(because("detect.unclear", thing=name, reason=unclear), check="detection", subject=name)
         if name and name not in found:
-            others = f"; it sees {', '.join(sorted(found))}" if found else ", and nothing else"
-            raise Refused(
-                f"{name} is not seen by {' or '.join(cameras)}{others}: is it in the image, lit, and not behind the "
-                "arm? `gemelo camera view`",
-                check="detection", subject=name,
-            )  # fmt: skip
+            raise Refused(_not_seen(name, cameras, sorted(found)), check="detection", subject=name)
         if in_scene:
             self._put_into_scene(cell, [seen for seen in found.values() if not name or seen.name == name])
         return tuple(seen for _, seen in sorted(found.items()) if not name or seen.name == name)
@@ -130,7 +127,8 @@ class Eyes:
         """The thing of that name, as it can be picked; raises `Refused` with the reason where it cannot."""
         (seen,) = self.detect(name, camera, False)
         if seen.trouble:
-            raise Refused(f"{name}: {seen.trouble}", check="detection", subject=name)
+            why = because("detect.unfit", seen.why or plain(seen.trouble), thing=name)
+            raise Refused(why, check="detection", subject=name)
         return seen
 
     def _require_rest(self) -> tuple[float, ...]:
@@ -180,7 +178,8 @@ class Eyes:
             raise Refused(_why_none(camera, status, late, patience), check="camera", subject=camera)
         doubt = heard[-1].doubt
         if doubt:
-            raise Refused(f'camera "{camera}": {doubt}', check="camera", subject=camera)
+            why = because("detect.camera_doubt", camera=camera, reason=doubt)
+            raise Refused(why, check="camera", subject=camera)
         return heard
 
     def _put_into_scene(self, cell: Cell, seen: Iterable[Seen]) -> None:
@@ -214,10 +213,10 @@ def combined(images: Sequence[Detections], known: Iterable[str]) -> list[Seen]:
         twice = sum(len(items) > 1 for items in shown)
         if twice >= ENOUGH:
             items = next(items for items in shown if len(items) > 1)
-            trouble = f"it is seen {len(items)} times: take the others away, or give each a tag of its own"
-            found.append(_seen([(images[-1].stamp, items[0])], images[-1].camera, trouble))
+            why = because("detect.twice", count=len(items))
+            found.append(_seen([(images[-1].stamp, items[0])], images[-1].camera, why))
         elif len(once) >= ENOUGH:
-            found.append(_seen(once, images[-1].camera, ""))
+            found.append(_seen(once, images[-1].camera, None))
     return found
 
 
@@ -229,7 +228,7 @@ def why_unclear(images: Sequence[Detections], name: str) -> str:
     return told[-1] if len(told) >= ENOUGH else ""
 
 
-def _seen(once: Sequence[tuple[int, Detection]], camera: str, trouble: str) -> Seen:
+def _seen(once: Sequence[tuple[int, Detection]], camera: str, trouble: Reason | None) -> Seen:
     """The median position, with the turn of the image that is nearest to it."""
     places = [item.base_from_thing.translation for _, item in once]
     middle: Point = (median(p[0] for p in places), median(p[1] for p in places), median(p[2] for p in places))
@@ -237,20 +236,21 @@ def _seen(once: Sequence[tuple[int, Detection]], camera: str, trouble: str) -> S
     spread = (sum(_apart(place, middle) ** 2 for place in places) / len(places)) ** 0.5
     sigma = max(median(item.sigma for _, item in once), spread)
     _, turn = from_message(item.base_from_thing)
+    why = trouble or _trouble(item, camera, sigma)
     return Seen(
         name=item.name, pose=Pose(middle, turn), sigma=sigma, kind=str(item.kind), camera=camera,
-        stamp=max(stamp for stamp, _ in once), trouble=trouble or _trouble(item, camera, sigma),
+        stamp=max(stamp for stamp, _ in once), trouble=str(why or ""), why=why,
     )  # fmt: skip
 
 
-def _trouble(item: Detection, camera: str, sigma: float) -> str:
+def _trouble(item: Detection, camera: str, sigma: float) -> Reason | None:
     if not item.is_located:
-        return f"it is not known where the camera {camera} stands: measure it, and write it into camera.toml"
+        return because("detect.camera_nowhere", camera=camera)
     if item.flip_ratio > FLIPPED:
-        return f"its tag may be tilted one way or the other ({item.flip_ratio:.2f} of 1): look at it from aside"
+        return because("detect.tilted", ratio=item.flip_ratio)
     if sigma > UNCERTAIN:
-        return f"it is known to +-{1e3 * sigma:.1f} mm only (limit {1e3 * UNCERTAIN:g}): bring the camera nearer"
-    return ""
+        return because("detect.uncertain", error=1e3 * sigma, limit=1e3 * UNCERTAIN)
+    return None
 
 
 def _unknown_thing(path: str | Path, name: str, known: Sequence[str]) -> Reason:
@@ -259,8 +259,15 @@ def _unknown_thing(path: str | Path, name: str, known: Sequence[str]) -> Reason:
     return because("argument.thing.unknown", path=str(path), name=name, names=tuple(known))
 
 
+def _not_seen(name: str, cameras: Sequence[str], others: Sequence[str]) -> Reason:
+    hint, by = remedy("view_camera"), ", ".join(cameras)
+    if not others:
+        return because("detect.not_seen", hint, thing=name, cameras=by)
+    return because("detect.others_seen", hint, thing=name, cameras=by, others=", ".join(others))
+
+
 def _moving() -> Refused:
-    return Refused("the arm moves: images of it are blurred; wait until it stands", check="moving")
+    return Refused(because("detect.moving"), check="moving")
 
 
 def _apart(first: Sequence[float], second: Sequence[float]) -> float:
@@ -272,17 +279,14 @@ def streams(status: Sequence[CameraStatus]) -> bool:
     return bool(status) and status[-1].condition is CameraCondition.STREAMING
 
 
-def _why_none(camera: str, status: Sequence[CameraStatus], late: Sequence[float], patience: float) -> str:
+def _why_none(camera: str, status: Sequence[CameraStatus], late: Sequence[float], patience: float) -> Reason:
     if status and status[-1].text:
-        return status[-1].text
+        return because("detect.camera_state", reason=status[-1].text)
     if late and min(late) > OLDEST:
-        return (
-            f'every image of camera "{camera}" is {min(late):.1f} s old when it comes (at most {OLDEST:g}): what lags '
-            "there, the camera, the network, or a `detector` with too much to do?"
-        )
+        return because("detect.late", camera=camera, age=min(late), limit=OLDEST)
     if streams(status):
-        return f"nothing is heard of the detector for {patience:.1f} s: is the process `detector` running?"
-    return f'no image of camera "{camera}" within {patience:.1f} s: `gemelo camera list`'
+        return because("detect.detector_silent", time=patience)
+    return because("detect.no_image", remedy("list_cameras"), camera=camera, time=patience)
 
 
 def _known_camera(cell: Cell, name: str) -> str:

@@ -19,6 +19,7 @@ from gemelo.libraries.runtime.requests.client import PendingCall
 from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.topics import Request, Topic
 
 if TYPE_CHECKING:
@@ -61,11 +62,11 @@ class Session:
     def node(self) -> Node:
         """The node, if it can be used from here; raises `Error` in a forked process, `Lost` after its end."""
         if os.getpid() != self._pid:
-            raise Error(f"this connection belongs to process {self._pid}: a forked process calls gemelo.connect() anew")
+            raise Error(because("client.forked", process=self._pid))
         if self._failure is not None:
-            raise Lost(f"the connection has ended: {self._failure}") from self._failure
+            raise Lost(because("lost.connection.ended", error=str(self._failure))) from self._failure
         if self._is_closed or (self._thread is not None and not self._thread.is_alive()):
-            raise Lost("this connection is closed: call gemelo.connect() anew")
+            raise Lost(because("lost.connection.closed"))
         return self._node
 
     def latest(self, topic: Topic[M], handle: Callable[[M], object] | None = None) -> Latest[M]:
@@ -106,9 +107,7 @@ class Session:
             clock = self._clock_of(topic.writer)
             self.wait_for(was_measured_since, ON_ITS_WAY)  # not for ever: it came after the change in any case
         if not self.wait_for(is_there, PATIENCE) or latest.message is None:
-            raise Lost(
-                f"nothing heard of {topic.key} for {PATIENCE:g} s: is {topic.writer} running? `gemelo node list`"
-            )
+            raise Lost(because("lost.topic", remedy("list_nodes"), topic=topic.key, time=PATIENCE, writer=topic.writer))
         return latest.message
 
     def _clock_of(self, writer: str) -> NodeClock:
@@ -135,7 +134,7 @@ class Session:
     ) -> bool:
         """Sleeps until `is_so()`, looking after every message; False after `timeout` [s]. `on_news` runs in between."""
         if self._node.is_in_turn or (self._thread is not None and threading.current_thread() is self._thread):
-            raise Error("this waits for messages, so it cannot be called where messages are handled")
+            raise Error(because("client.waits_in_a_handler"))
         end = None if timeout is None else self.clock.monotonic() + timeout
         while True:
             with self.news:

@@ -13,12 +13,13 @@ from gemelo.api.targets import require_joint
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device_config import InputRole
 from gemelo.schemas.ledger import VerifiedBy
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.schemas.robot import HomingDirection
 
 OVERSHOOT = {"rad": 0.02, "m": 0.002}  # chosen: beyond the switch, where the limits leave as much
 LEAST_STEPS = 3.0  # beyond the switch: closer to it the limit may come first
 
-OnVerifying = Callable[[str], object]
+OnVerifying = Callable[[Reason], object]
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def verify(
     off = {name: arm.ledger.joints[name].found_off for name in passed}
     trip.homing += [joint.name for joint in trip.passable if joint.name not in passed]
     if trip.homing:
-        say(f"homing: {', '.join(trip.homing)}")
+        say(because("verify.homing", joints=", ".join(trip.homing)))
         off |= arm.home(*trip.homing).steps_off
     return Verification(
         passed=tuple(passed),
@@ -82,8 +83,7 @@ def trip_of(arm: ArmDescription, names: Iterable[str], referenced: Sequence[bool
             trip.homing.append(name)
     if not trip.passable and not trip.homing:
         raise Refused(
-            f"no switch can verify {', '.join(trip.without_switch)}: they have no [joint.homing] in robot.toml; look "
-            "where they stand and declare it: arm.reference({...})",
+            because("verify.no_switch", remedy("look_and_declare"), joints=", ".join(trip.without_switch)),
             check="verify",
             subject=trip.without_switch[0],
             remedy="arm.reference({...})",
@@ -137,7 +137,7 @@ def _pass(arm: MovingArm, trip: Trip, run: Callable[[Plan], object], say: OnVeri
         try:
             found += _pass_together(arm, [joint], run, say)
         except Refused as refused:
-            say(f"{joint.name} cannot pass its switch here and is homed: {refused}")
+            say(because("verify.cannot_pass", refused.message, joint=joint.name))
     return found
 
 
@@ -149,7 +149,7 @@ def _pass_together(
     ends = {joint.name: far_side(joint, at[joint.name]) for joint in joints}
     there = arm.plan(joints={name: end[0] for name, end in ends.items()})
     back = arm.plan(joints={name: end[1] for name, end in ends.items()}, from_joints=there.end)
-    say(f"passing the switch of {', '.join(ends)}")
+    say(because("verify.passing", joints=", ".join(ends)))
     run(there)
     run(back)
     return [joint.name for joint in joints if _was_passed(before, arm.ledger, joint.name)]
@@ -162,5 +162,5 @@ def _was_passed(before: Ledger, now: Ledger, name: str) -> bool:
     return is_seen and new.confidence > 0.0
 
 
-def _silent(_text: str) -> None:
+def _silent(_what: Reason) -> None:
     """For nobody."""

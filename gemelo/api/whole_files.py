@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from gemelo.api.errors import Error
+from gemelo.schemas.reasons import because
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -15,7 +16,7 @@ def write_whole(path: Path, content: bytes) -> None:
     `path` is a folder or a device, whose place no file takes; where it is a link, what it points to is written."""
     path = path.resolve()
     if path.exists() and not path.is_file():
-        raise Error(f"{path} cannot be written: it is there already, and is no file")
+        raise Error(because("client.file.in_the_way", path=str(path)))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, beside = tempfile.mkstemp(prefix=".", suffix=".tmp", dir=path.parent)
@@ -31,4 +32,4 @@ def write_whole(path: Path, content: bytes) -> None:
                 Path(beside).unlink()
             raise
     except OSError as error:
-        raise Error(f"{path} cannot be written: {error.strerror}") from error
+        raise Error(because("client.file.unwritable", path=str(path), error=str(error.strerror))) from error

@@ -14,6 +14,7 @@ from gemelo.schemas.reasons.units import in_display_units, in_si_units
 # SI units; names of joints, links, objects and hosts as they are; several numbers, or each by its joint's name
 Value = bool | int | float | str | tuple[str | float, ...] | dict[str, float]
 FILE = "file."  # begins the codes of what is wrong in a file
+NOTHING = "-"  # the text of a remedy that a front end does not have
 PLAIN = "plain"  # the code of a sentence that has none of its own
 
 
@@ -80,7 +81,8 @@ class _Writer(string.Formatter):
 
     def remedies(self, reason: Explained) -> str:
         """What would do; empty where nothing is known."""
-        return self._either([self._filled(each, self._template(each.code), {}) for each in reason.remedies])
+        texts = (self._filled(each, self._template(each.code), {}) for each in reason.remedies)
+        return self._either([text for text in texts if text != NOTHING])
 
     def _filled(self, what: Coded, found: str | None, within: Mapping[str, str]) -> str:
         """A code that no catalogue has, as a newer program may send it, is given as it is, with its values."""

@@ -193,7 +193,7 @@ def test_without_a_planner_it_ends_with_the_remedy(connected, gateway, seconds):
 
 def test_a_planner_that_dies_in_the_middle_of_a_jog_ends_it_and_is_named(connected, gateway, jogger):
     jogger.ends_after = 10
-    said = "said nothing for 1 s: the arm has stopped in the middle of the jog"
+    said = "sent nothing for 1 s: the arm has stopped in the middle of the jog"
     with pytest.raises(CommandError, match=said), reported(load_robot()):
         jog_for(connected, TURN, 5.0)
     assert len(jogger.commands) < 150  # 5 s of them would be 250
@@ -207,7 +207,7 @@ def test_a_stream_that_nobody_follows_says_so(connected):
             connected.stream({"brazo_joint": 0.1})
             time.sleep(0.02)
 
-    with pytest.raises(gemelo.Lost, match="nothing heard of joint_states for 1 s: no target is followed"):
+    with pytest.raises(gemelo.Lost, match="nothing received of joint_states for 1 s: no target is followed"):
         stream()
     assert time.monotonic() - began > 1.0  # which is given to a twin that has just been found
 

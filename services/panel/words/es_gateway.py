@@ -170,13 +170,6 @@ _COMMANDS: dict[str, str] = {
     'there is no {kind} "{name}"': "No hay {kind} «{name}».",
     "stopped by a device command ({command})": "Lo detuvo una orden al equipo ({command}).",
     "{name} was asked for after it: ask again": "Después se pidió {name}: pídalo otra vez.",
-    "homing refused: the drivers are off: arm.device.arm(), then arm.home()": "Los motores están apagados: "
-    "enciéndalos, "
-    "y busque luego el origen.",
-    "homing refused: the device is in {mode}: wait, or arm.stop()": "El equipo está en modo «{mode}»: espere, o pulse "
-    "Parar.",
-    "homing refused: {mode}": "El equipo está en modo «{mode}»: borre el fallo.",
-    "homing refused: {reason}": "No se puede buscar el origen: {reason}",
     "refused: the device is in {mode}: wait, or arm.stop()": "El equipo está en modo «{mode}»: espere, o pulse Parar.",
     "the device refused the configuration: {reason}": "El equipo rechazó la configuración: {reason}",
     "homing ended after {time} s: {reason}": "La búsqueda del origen terminó tras {time} s: {reason}",

@@ -39,8 +39,6 @@ _SCENE: dict[str, str] = {
     "the scene is too large: {size}": "La escena es demasiado grande ({size}).",
     'object "{name}": its mesh has {size} bytes, more than {most}; simplify it, or write it as a binary STL file': "La "
     "malla de «{name}» tiene {size} bytes, más de {most}: simplifíquela, o guárdela como STL binario.",
-    "nothing heard of {topic} for {time} s: was the mesh removed meanwhile?": "No llega la malla ({topic}) desde hace "
-    "{time} s: ¿se quitó el objeto entretanto?",
     'the scene has two objects "{name}"; give one of them another name': "La escena tiene dos objetos «{name}»: "
     "cambie el "
     "nombre de uno.",
@@ -83,7 +81,6 @@ _SCENE: dict[str, str] = {
     "the file's content": "«{name}»: la ruta «{path}» lleva a otra parte.",
     'object "{name}": there is no mesh "{path}" in {folders}': "«{name}»: no hay una malla «{path}» en {folders}.",
     'object "{name}": mesh {path} cannot be read: {error}': "«{name}»: la malla {path} no se puede leer ({error}).",
-    "{path} holds no scene: {error}": "{path} no tiene una escena ({error}).",
     '"{path}": {reason}': "{reason}",
     "it holds no triangle": "La malla no tiene ningún triángulo.",
     "it holds {count} triangles, more than {most}; simplify it": "La malla tiene {count} triángulos, más de {most}: "
@@ -101,19 +98,12 @@ _SCENE: dict[str, str] = {
 
 # Things, cameras and picking
 _THINGS: dict[str, str] = {
-    "the twin has no cell file: urdf/rm1/cell.toml is a sample; start it with GEMELO_CELL=urdf/rm1/cell.toml make up": (
-        "No hay archivo de la celda: urdf/rm1/cell.toml es un ejemplo; arranque con GEMELO_CELL=urdf/rm1/cell.toml "
-        "make "
-        "up."
-    ),
-    "{path} has no [[camera]]": "{path} no tiene [[camera]].",
     "{word} is not seen by {cameras}, and nothing else: is it in the image, lit, and not behind the arm? `gemelo "
     "camera "
     "view`": "{cameras} no ve {word}, ni nada más: ¿está en la imagen, con luz, y no detrás del brazo?",
-    "{word} is not seen by {cameras}; it sees {others}: is it in the image, lit, and not behind the arm? `gemelo "
+    "{word} is not seen by {cameras}, which see {others}: is it in the image, lit, and not behind the arm? `gemelo "
     "camera "
     "view`": "{cameras} no ve {word}; ve {others}: ¿está en la imagen, con luz, y no detrás del brazo?",
-    "{name} cannot be measured: {reason}": "No se puede medir {name}: {reason}",
     "something {colour} is seen, and its outline is not that of a box of {sizes} mm on the table: is it partly hidden, "
     "tilted, or of another size?": "se ve algo de color {colour}, y su contorno no es el de una caja de {sizes} mm en "
     "la mesa: ¿está tapado en parte, inclinado, o tiene otro tamaño?",
@@ -135,23 +125,8 @@ _THINGS: dict[str, str] = {
     'every image of camera "{camera}" is {time} s old when it comes (at most {limit}): what lags there, the camera, '
     "the network, or a `detector` with too much to do?": "Cada imagen de la cámara «{camera}» llega con {time} s (a lo "
     "sumo {limit}): ¿qué se retrasa, la cámara, la red o un `detector` con demasiado trabajo?",
-    "nothing is heard of the detector for {time} s: is the process `detector` running?": "El detector calla desde hace "
+    "nothing received of the detector for {time} s: is the process `detector` running?": "El detector calla desde hace "
     "{time} s: ¿está en marcha?",
-    "{name} is {height} mm high: the jaws, {long} mm long, would be beside {beside} mm of it (at least "
-    "{least})": "{name} mide {height} mm de alto: las mordazas, de {long} mm, tomarían {beside} mm (al menos {least}).",
-    "{name} stands {angle} deg turned between the jaws, {width} mm wide there, and they open to {open} mm: turn it": (
-        "{name} está girada {angle}° entre las mordazas y mide ahí {width} mm; se abren {open} mm: gírela."
-    ),
-    "{robot} cannot turn its tool, and {place} asks for a turn: leave out its yaw": "{robot} no puede girar su "
-    "herramienta, y {place} pide un giro: quítele yaw.",
-    "no side of it is narrower than the open jaws": "Ningún lado suyo es más estrecho que las mordazas abiertas.",
-    "{name} was not gripped: the jaws closed on nothing, {count} times; where is it? `gemelo detect`": "No se agarró "
-    "{name}: las mordazas se cerraron sobre nada {count} veces; ¿dónde está?",
-    "{name} was not picked: it still stands at {x} {y} {z} mm, where it was; the jaws closed beside it: is the camera "
-    "where camera.toml says? `gemelo camera check`": "No se tomó {name}: sigue en {x} {y} {z} mm, donde estaba; las "
-    "mordazas se cerraron a su lado: ¿está la cámara donde dice camera.toml? `gemelo camera check`",
-    "{name} was picked and is still between the jaws: {reason}": "{name} sigue entre las mordazas: {reason}",
-    "the pick was cancelled: the arm stands": "se canceló: el brazo está quieto.",
     "{name} ({kind}): {x} {y} {z} mm, +-{error} mm by {camera}": "{name}: {x} {y} {z} mm, +-{error} mm por {camera}",
     "{name} ({kind}): {x} {y} {z} mm, +-{error} mm by {camera}: {reason}": "{name}: {x} {y} {z} mm, +-{error} mm por "
     "{camera}: {reason}",
@@ -177,19 +152,6 @@ _THINGS: dict[str, str] = {
 
 # Jogging, planning and what is asked for
 _ASKED: dict[str, str] = {
-    "the planner does not answer to jogging: is it running? `gemelo node list`": "El planificador no responde: ¿está "
-    "en "
-    "marcha?",
-    "the planner has said nothing for {time} s: the arm has stopped in the middle of the jog; `gemelo node list`": (
-        "El planificador no dice nada desde hace {time} s: el brazo se detuvo a medio mover."
-    ),
-    "nothing heard of joint_states for {time} s: no target is followed; is stepper_gateway running? `gemelo node "
-    "list`": (
-        "No se oye nada del brazo desde hace {time} s: nadie sigue lo que se le pide. ¿Está en marcha stepper_gateway?"
-    ),
-    "the planner does not say within {time} s that the jog has ended": "El planificador no dijo en {time} s que el "
-    "brazo "
-    "ya no se mueve a mano.",
     "jogging was interrupted ({reason}), and nothing resumes by itself: let go for {time} s": "Mover a mano se "
     "interrumpió y nada sigue solo: suelte {time} s. {reason}",
     "a goal has taken over": "El brazo va hacia una meta.",
@@ -213,16 +175,9 @@ _ASKED: dict[str, str] = {
     "singularity (manipulability at {share} % of where slowing begins)": "El brazo está casi estirado, o con dos ejes "
     "alineados (singularidad).",
     "speed limit of {joint} ({limit})": "{joint} no va más rápido que {limit}.",
-    "cancelled when the plan was just made: nothing moves": "Se canceló: nada se mueve.",
-    "{reason}: nothing moves": "{reason} Nada se mueve.",
-    "the plan was cancelled": "El plan fue cancelado.",
-    "refused: the planner answered {status} without a trajectory": "El planificador no dio ningún camino ({status}).",
     "refused: it is {sure} sure that no step is lost, {wanted} are required: {why}": "Solo es seguro al {sure} que no "
     "se "
     "perdió ningún paso, y se pide {wanted}: verifique el brazo.",
-    "no switch can verify {joints}: they have no [joint.homing] in robot.toml; look where they stand and declare it: "
-    "arm.reference({example})": "Ningún interruptor puede verificar {joints}: mire dónde están y declare la "
-    "referencia.",
 }
 
 # Who does not answer
@@ -251,16 +206,6 @@ _SILENT: dict[str, str] = {
     "nobody serves {key} to {certificate}: is {server} running, and may this role ask it? schemas/roles.py says who "
     "may": ("Nadie responde: ¿está en marcha {server}, y puede pedírselo esta página?"),
     "the answer of {server} to {key} cannot be read: {error}": "La respuesta de {server} no se puede leer ({error}).",
-    "nothing heard of {key} for {time} s: is {server} running? `gemelo node list`": "No se oye {key} desde hace "
-    "{time} s: "
-    "¿está en marcha {server}?",
-    "the motion before was to stop, but did not say within {time} s that it rests": "El movimiento anterior debía "
-    "parar, y no dijo en {time} s que el brazo esté quieto.",
-    "the arm was told to stop, but did not say within {time} s that it rests": "Se le dijo al brazo que parase, y no "
-    "dijo "
-    "en {time} s que esté quieto.",
-    "this connection is closed: call gemelo.connect() anew": "La conexión se cerró: recargue la página.",
-    "the connection has ended: {error}": "La conexión terminó ({error}): recargue la página.",
     "{key}: {size} bytes, and {whose} are waiting already: at most {most}; ask again after their answers": "Esperan "
     "demasiados datos a la vez, más de {most} bytes: pruebe de nuevo en un momento.",
     "{key}: {count} requests are waiting already": "Se piden demasiadas cosas a la vez: espere un momento.",

@@ -28,7 +28,7 @@ from gemelo.schemas.camera import CameraInfo
 from gemelo.tools.cli.bus.request_text import joints_text
 from gemelo.tools.cli.camera.camera_boards import tag_board
 from gemelo.tools.cli.camera.camera_images import Eye, Subject
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands, unknown, usage
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, text_of, unknown, usage
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.terminal import confirm
 from gemelo.tools.cli.common.units import LENGTH, parse_quantity
@@ -243,7 +243,7 @@ def drive(arm: Arm, eye: Eye, task: Task, poses: Sequence[Array]) -> tuple[list[
             arm.move(joints=_named(arm, joints), speed=SPEED)
             sighting = _look(eye, task)
         except gemelo.Refused as refused:
-            print(f"pose {number} is left out: {in_commands(str(refused))}", flush=True)
+            print(f"pose {number} is left out: {text_of(refused)}", flush=True)
             continue
         except ValueError as error:
             print(f"pose {number} is left out: {error}", flush=True)

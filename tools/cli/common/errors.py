@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from enum import IntEnum
@@ -92,25 +91,10 @@ def require_name(kind: str, name: str, parts: Sequence[Input] | Sequence[Digital
     return name
 
 
-COMMAND_OF = (  # methods of `gemelo` that its sentences name, and the commands that do the same
-    (r"arm\.device\.arm\(\)", "`gemelo device arm`"),
-    (r"arm\.device\.reset\(\)", "`gemelo reset`"),
-    (r"arm\.take_control\(\)", "`gemelo control take`"),
-    (r"arm\.home\(\)", "`gemelo home`"),
-    (r"arm\.verify\(\)", "`gemelo verify`"),
-    (r"arm\.reference\(\{\.\.\.\}\)", "`gemelo reference --joints NAME=...`"),
-    (r"arm\.stop\(\)", "`gemelo stop`"),
-    (r'arm\.reference\(\{"(\w+)": \.\.\.\}\)', r"`gemelo reference --joints \1=...`"),
-    (r"arm\.reference\(\)", "`gemelo reference`"),
-    (r"gemelo\.(mm|deg)\(([-+.\de]+)\)", r"\2\1"),
-    (r'gemelo\.connect\("([\w-]+)"\)', r"`gemelo --robot \1 ...`"),
-)
-
-
 def text_of(cause: Reason | BaseException) -> str:
-    """The sentence in the language of this command line; of an error without a code, its own with commands in it."""
+    """The sentence in the language of this command line; of an error without a code, its own."""
     reason = _reason_of(cause)
-    return in_commands(str(cause)) if reason is None else sentence(reason)
+    return str(cause) if reason is None else sentence(reason)
 
 
 def _reason_of(cause: Reason | BaseException) -> Reason | None:
@@ -119,10 +103,3 @@ def _reason_of(cause: Reason | BaseException) -> Reason | None:
 
     parts = (cause, getattr(cause, "message", None), getattr(cause, "reason", None))
     return next((each for each in parts if isinstance(each, Reason) and each.code != PLAIN), None)
-
-
-def in_commands(text: str) -> str:
-    """A sentence of `gemelo`, with the commands in the place of its methods."""
-    for method, command in COMMAND_OF:
-        text = re.sub(method, command, text)
-    return text

@@ -8,7 +8,7 @@ import msgspec
 
 import gemelo
 from gemelo.schemas.device import DeviceConfiguration
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, text_of
 from gemelo.tools.cli.common.session import connect_arm
 from gemelo.tools.cli.common.terminal import confirm
 from gemelo.tools.cli.parser import Options, Parser, json_option
@@ -56,7 +56,7 @@ def push(arm: Arm, yes: bool) -> ExitCode:
         crc32 = arm.device.configure(before_disarm=lambda: confirm(QUESTION, yes))
     except gemelo.Refused as error:
         again = ", and push again" if error.check == "device" else ""
-        raise CommandError(f"{in_commands(str(error))}{again}") from error
+        raise CommandError(f"{text_of(error)}{again}") from error
     print(f"the device works with configuration {crc32:08x}")
     if was_armed:
         print("armed again; no joint is referenced: `gemelo home` or `gemelo reference`")

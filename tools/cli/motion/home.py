@@ -9,7 +9,8 @@ import msgspec
 
 import gemelo
 from gemelo.api.homing_report import HOME, WAITS
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands, joint_of
+from gemelo.schemas.reasons import because, plain
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, joint_of
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.terminal import LiveBlock
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option
@@ -69,7 +70,7 @@ def home(arm: Arm, names: Sequence[str], as_json: bool = False) -> ExitCode:
         print(msgspec.json.encode(report).decode())
     if report.reason:
         code = ExitCode.CANCELLED if is_interrupted else ExitCode.FAILED
-        raise CommandError(f"homing ended after {report.took_s:.1f} s: {report.reason}", code)
+        raise CommandError(because("homing.ended", ended.why or plain(report.reason), time=ended.took), code)
     if not as_json:
         print(f"homed {len(report.homed)} of {len(report.homed)} joints in {report.took_s:.1f} s")
     return ExitCode.OK
@@ -81,7 +82,7 @@ def _report_of(ended: HomingReport, is_interrupted: bool) -> HomeReport:
         steps_off=ended.steps_off,
         took_s=round(ended.took, 3),
         interrupted=is_interrupted,
-        reason=in_commands(ended.reason),
+        reason=str(ended.why or ""),
     )
 
 

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, in_commands, joint_of
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, joint_of
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.motion.home import home_text
 from gemelo.tools.cli.parser import Options, Parser, json_option
 
 if TYPE_CHECKING:
     from gemelo import Arm
+    from gemelo.schemas.reasons import Reason
 
 
 class VerifyReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -81,5 +83,5 @@ def _off(steps: int) -> str:
     return "right to the step" if steps == 0 else f"{steps:+d} steps off, less than a motor can lose"
 
 
-def _tell(text: str) -> None:
-    print(in_commands(text), flush=True)
+def _tell(what: Reason) -> None:
+    print(sentence(what), flush=True)
