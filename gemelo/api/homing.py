@@ -222,9 +222,9 @@ class HomingEnd:
         if status is not None and not status.online and self._state.age() > OFFLINE:
             return because("homing.offline", reason=status.reason)
         if self._state.age() > BRAKING:
-            return because("homing.silent", remedy("see_device"))
+            return because("homing.silent", remedy("look_at_device"))
         if not self._homing.has_begun and elapsed > TO_BEGIN:
-            return because("homing.not_begun", remedy("see_device"))
+            return because("homing.not_begun", remedy("look_at_device"))
         if elapsed > self._homing.longest:
             return because("homing.late", remedy("stop_and_see_device"), time=elapsed)
         return None

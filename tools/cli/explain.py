@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from gemelo.schemas.reasons import FrontEnd, Reason, because, remedy, say
-from gemelo.schemas.reasons.catalogue import ENGLISH, codes, entries, explanation, languages, template
+from gemelo.schemas.reasons.catalogue import ENGLISH, EXPLAIN, codes, entries, explanation, languages, template
 from gemelo.schemas.reasons.examples import example_of
 from gemelo.tools.cli.common.errors import ExitCode, nearest, unknown, usage
 from gemelo.tools.cli.common.language import language, sentence
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from gemelo.tools.cli.parser import Parser
 
 WIDTH = 100
-OF_SOURCE = ("help",)  # contexts of texts whose English stands in the program itself
+HELP = "help"  # the context of texts whose English stands in the program itself
+NEEDED = ("", EXPLAIN, HELP)  # contexts of texts that each language has; words of one front end are as many as it likes
 
 
 class InLanguage(msgspec.Struct, frozen=True):
@@ -142,7 +143,8 @@ def missing(name: str) -> list[str]:
 
 def _wanted(name: str) -> frozenset[tuple[str, str]]:
     everything = frozenset[tuple[str, str]]().union(*(entries(each) for each in languages()))
-    return frozenset(each for each in everything if name != ENGLISH or each[0] not in OF_SOURCE)
+    contexts = NEEDED if name != ENGLISH else NEEDED[:2]
+    return frozenset(each for each in everything if each[0] in contexts)
 
 
 def _count_line(name: str, lacks: list[str]) -> str:
