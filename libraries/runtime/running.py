@@ -14,6 +14,7 @@ from gemelo.libraries.runtime.deployment import CONFIG, PREFIX, load_deployment,
 from gemelo.libraries.runtime.started import chosen_name, deployment_of_arm, load_started
 from gemelo.schemas.deployment import Deployment, RouterSection
 from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.system import Empty, NodeInfo
 
 GATEWAY = "stepper_gateway"
@@ -29,10 +30,10 @@ class SeveralRobots(ConfigurationError):
     """Several robots run on the router, and nobody has said which of them is meant."""
 
     def __init__(self, router: RouterSection, robots: tuple[str, ...]) -> None:
-        first = robots[0]
+        hint = remedy("choose_robot", robot=robots[0])
+        names = ", ".join(robots)
         super().__init__(
-            f"{len(robots)} robots run at {router.host}:{router.port}: {', '.join(robots)}. Name one: "
-            f'gemelo.connect("{first}"); `gemelo use {first}` chooses it for this folder'
+            because("robots.several", hint, count=len(robots), host=router.host, port=router.port, names=names)
         )
         self.robots = robots
 
