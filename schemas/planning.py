@@ -386,7 +386,8 @@ class JogTick(Message, frozen=True, kw_only=True, tag="tick"):
     not_ready: str = ""  # why the device does not move
     scene: SceneVersion | None = None  # None: as in the tick before
     told_to: str = ""  # the node that a status is about
-    said: str = ""  # BLAKE2 of target and status in msgpack; empty: neither
+    said: str = ""  # BLAKE2 of target and status in msgpack, without reasons as data; empty: neither
+    why: Reason | None = None  # `not_ready` as data
 
 
 class JogInputs(Message, frozen=True, kw_only=True):

@@ -15,7 +15,7 @@ from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceEvent
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.planning import JogCommand, JogStatus
-from gemelo.schemas.reasons import Reason, Remedy, because, remedy
+from gemelo.schemas.reasons import Reason, Remedy, because, plain, remedy
 from gemelo.schemas.topics import DEVICE_EVENTS, JOG, JOG_STATUS, JOINT_STATES, JOINT_TARGETS
 
 PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
@@ -143,7 +143,8 @@ def _silent() -> Reason:
 
 
 def _refused(status: JogStatus) -> Refused:
-    return Refused(f"refused: {status.limited_by}", check=status.check or "jog", reason=status.limited_by)
+    why = status.why or plain(status.limited_by)
+    return Refused(because("refused.plan", why), check=status.check or "jog", reason=why)
 
 
 def jog_command(arm: ArmDescription, joints: Joints | None, twist: Vector | None, frame: str) -> JogCommand:

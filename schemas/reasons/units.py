@@ -47,6 +47,7 @@ _SAME: dict[str, Written] = {
     "typed rad or m": _typed("deg", degrees(1.0)),
     "typed share": _typed("%", 100.0),
     "mm": _short(" mm", _thousand),
+    "mm/s": _short(" mm/s", _thousand),
     "s": _unit("s", 3),
     "%": _unit("%", 0, _hundred),
     "steps": _unit("steps", 0),
@@ -56,6 +57,7 @@ _SAME: dict[str, Written] = {
 in_si_units: Mapping[str, Written] = {
     **_SAME,
     "deg": _short(" deg", degrees),
+    "deg/s": _short(" deg/s", degrees),
     "rad": _unit("rad", 4),
     "m": _unit("m", 4),
     "rad/s": _unit("rad/s", 4),
@@ -66,6 +68,7 @@ in_si_units: Mapping[str, Written] = {
 in_display_units: Mapping[str, Written] = {
     **_SAME,
     "deg": _short("°", degrees),
+    "deg/s": _short("°/s", degrees),
     "rad": _in_display("°", 1, degrees),
     "m": _in_display("mm", 1, _thousand),
     "rad/s": _in_display("°/s", 1, degrees),

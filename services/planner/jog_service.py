@@ -11,6 +11,7 @@ from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JogCommand, JogStatus
+from gemelo.schemas.reasons import Reason, because, plain, remedy
 from gemelo.schemas.topics import (
     CONTROL,
     DEVICE_STATUS,
@@ -56,7 +57,7 @@ class JogService:
 
     def _on_command(self, command: JogCommand, writer: str) -> None:
         """The gateway decides whose targets move the arm; here others are kept from disturbing the holder's jog."""
-        if reason := self._objection(writer):
+        if (reason := self._objection(writer)) is not None:
             return self._refuse(reason, writer)
         now = self._node.monotonic()
         begins = not self._is_ticking and now - self._active > SILENCE
@@ -87,12 +88,13 @@ class JogService:
             self._log.finish()
             node.forget(self._tick)
 
-    def _objection(self, writer: str) -> str:
-        """Why `writer` may not jog, empty if it may."""
+    def _objection(self, writer: str) -> Reason | None:
+        """Why `writer` may not jog; None if it may."""
         control = self._control.message
         if control is None or not control.held or writer in control.members:
-            return ""
-        return f"{control.name} holds control, from node {control.node} on {control.host}: see `gemelo control who`"
+            return None
+        holder = {"name": control.name, "node": control.node, "host": control.host}
+        return because("jog.control", remedy("who_holds"), **holder)
 
     @property
     def _told_to(self) -> str:
@@ -100,16 +102,19 @@ class JogService:
         control = self._control.message
         return self._client if control is not None and control.held else ""
 
-    def _refuse(self, reason: str, writer: str) -> None:
+    def _refuse(self, reason: Reason, writer: str) -> None:
         now = self._node.monotonic()
         if now - self._refused >= STATUS_PERIOD:
             self._refused = now
             stamp = self._node.now()
-            self._status.put(JogStatus(stamp=stamp, scale=0.0, limited_by=reason, client=writer, check="control"))
+            self._status.put(
+                JogStatus(stamp=stamp, scale=0.0, limited_by=str(reason), client=writer, check="control", why=reason)
+            )
 
     @property
-    def _not_ready(self) -> str:
-        return "" if self._device.message is None else self._device.message.reason
+    def _not_ready(self) -> Reason | None:
+        status = self._device.message
+        return None if status is None or not status.reason else plain(status.reason)
 
     @property
     def _goal_is_active(self) -> bool:

@@ -50,8 +50,6 @@ ERRORS = (
     "Error",
     "Lost",
     "Canceled",
-    "JogRefused",
-    "BadJog",
     "SceneError",
     "BadStl",
 )
@@ -93,7 +91,7 @@ def _part(node: ast.expr) -> str:
 
 PARTS = [
     *(f"services/stepper_gateway/{room}" for room in ("goals", "device", "control", "gripper", "motion", "core.py")),
-    *(f"services/planner/{room}" for room in ("jog", "jog_service.py", "scene")),
+    "services/planner/scene",
     *("services/planner/collision/scene_shapes.py", "services/planner/collision/arm_geometry.py"),
     *("libraries/runtime/requests/client.py", "libraries/runtime/requests/limits.py", "libraries/arm/stl.py"),
     *("services/panel/model", "gemelo"),
@@ -129,7 +127,6 @@ NOT_ON_THE_PAGE = {  # of files, logs and clients that a page does not have, and
     "services/stepper_gateway/goals/scene_versions.py": ("version {} is ", "it comes from {}", "a process that "),
     "services/stepper_gateway/device/state_checks.py": ("a state that ",),
     "services/stepper_gateway/device/echoes.py": ("too many measurements", "no link to the device", "its longest pass"),
-    "services/planner/jog/jog_command.py": ("a jog command ", "a twist is given in"),
     "gemelo/api/connection.py": ("no {} of {} at the router",),
     "gemelo/api/control_file.py": ("{} belongs to user", "{}: {}: name another file in"),
     "gemelo/api/motion.py": ("{} in {} s{}, final error",),

@@ -85,7 +85,7 @@ def test_an_unknown_joint_is_named_once_and_nothing_moves():
         (JogCommand(name=("brazo_joint",), velocity=(0.1, 0.2)), "1 joints and gives 2"),
         (JogCommand(name=("brazo_joint", "brazo_joint"), velocity=(0.1, 0.2)), "twice"),
         (JogCommand(linear=(0.1, 0.2)), "linear has 2 values"),
-        (JogCommand(linear=(0.1, 0.0, 0.0), frame="moon"), 'not in "moon": use base_link or efector_link'),
+        (JogCommand(linear=(0.1, 0.0, 0.0), frame="moon"), 'not in "moon"; use one of base_link, efector_link'),
         (JogCommand(name=("brazo_joint",), velocity=(0.1,), linear=(0.1, 0.0, 0.0)), "one of them"),
     ],
 )

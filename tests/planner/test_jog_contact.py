@@ -57,8 +57,10 @@ def test_one_way_leads_out_of_a_contact_and_the_other_does_not_begin(name: str, 
     assert jogged.world.distance(jogged.tracker.knot.position) < -0.01
     jogged.hold(JogCommand(linear=(0.0, 0.05, 0.0)), 0.5)
     assert not np.any(jogged.velocities)
-    assert "thing (14." in jogged.statuses[-1].limited_by
-    assert "mm inside one another" in jogged.statuses[-1].limited_by
+    why = jogged.statuses[-1].limits[-1].why
+    assert why is not None
+    assert (why.code, why.values["second"]) == ("jog.limit.inside", "thing")
+    assert why.values["depth"] == pytest.approx(0.014, abs=1e-3)
     jogged.hold(JogCommand(linear=(0.0, -0.05, 0.0)), 4.0)
     assert jogged.world.distance(jogged.commanded[-1]) > CLEARANCE
     jogged.let_go()

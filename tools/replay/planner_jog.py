@@ -8,6 +8,7 @@ from typing import Any
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.planning import JogTaken, JogTick
+from gemelo.schemas.reasons import plain
 from gemelo.schemas.topics import JOG_INPUTS, JOG_STATUS, JOINT_TARGETS, SCENE
 from gemelo.services.planner.jog.jog import Jog, signed
 from gemelo.services.planner.jog.jog_log import digest_of
@@ -69,7 +70,8 @@ class JogAgain:
     def _tick(self, number: int, at: float, tick: JogTick) -> bool:
         """False at a difference."""
         jog = self._in_its_world(at, tick)
-        output = jog.step(tick.now, tick.stamp, tick.present, tick.age, tick.goal_is_active, tick.not_ready)
+        not_ready = tick.why or (plain(tick.not_ready) if tick.not_ready else None)
+        output = jog.step(tick.now, tick.stamp, tick.present, tick.age, tick.goal_is_active, not_ready)
         said = signed(output, self._client, tick.told_to)
         for topic, message in zip((JOINT_TARGETS, JOG_STATUS), said, strict=True):
             heard = self._said[topic.key].pop(tick.stamp, None)

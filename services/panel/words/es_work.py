@@ -152,29 +152,6 @@ _THINGS: dict[str, str] = {
 
 # Jogging, planning and what is asked for
 _ASKED: dict[str, str] = {
-    "jogging was interrupted ({reason}), and nothing resumes by itself: let go for {time} s": "Mover a mano se "
-    "interrumpió y nada sigue solo: suelte {time} s. {reason}",
-    "a goal has taken over": "El brazo va hacia una meta.",
-    "no fresh joint_states: is the stepper_gateway running?": "No se sabe dónde está el brazo: vea si el equipo está "
-    "conectado.",
-    "{joint} does not follow its targets: see what `gemelo state` says of the device": "{joint} no sigue lo que se le "
-    "pide: vea la pestaña Equipo.",
-    "{robot} cannot turn its tool as it likes: only the linear part counts": "{robot} no puede girar su herramienta "
-    "libremente: solo se desplaza.",
-    "collision of {first} and {second} ({away} apart, {clearance} stay free)": "{first} y {second} están a {away}; "
-    "deben "
-    "quedar {clearance} libres.",
-    "contact of {first} and {second} ({away} apart: they may only come away, slowly)": "{first} y {second} están a "
-    "{away}: solo pueden separarse, despacio.",
-    "contact of {first} and {second} ({away} inside one another: they may only come away, slowly)": "{first} y "
-    "{second} "
-    "se tocan ({away}): solo pueden separarse, despacio.",
-    "joint limit of {joint} ({limit})": "{joint} está cerca de su límite, {limit}.",
-    "joint limit of {joint} ({limit} deg)": "{joint} está cerca de su límite, {limit}°.",
-    "speed limit of {joint} ({limit} deg/s)": "{joint} no va más rápido que {limit}°/s.",
-    "singularity (manipulability at {share} % of where slowing begins)": "El brazo está casi estirado, o con dos ejes "
-    "alineados (singularidad).",
-    "speed limit of {joint} ({limit})": "{joint} no va más rápido que {limit}.",
     "refused: it is {sure} sure that no step is lost, {wanted} are required: {why}": "Solo es seguro al {sure} que no "
     "se "
     "perdió ningún paso, y se pide {wanted}: verifique el brazo.",

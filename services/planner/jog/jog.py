@@ -17,10 +17,11 @@ from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.joints import JointState, JointTargets
 from gemelo.schemas.planning import JogCommand, JogLimit, JogStatus
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.jog.braking import Braking
 from gemelo.services.planner.jog.jog_command import BadJog, JogInterpreter, JogRefused, Wanted, standing_position
-from gemelo.services.planner.jog.jog_limits import no_command, singularity
+from gemelo.services.planner.jog.jog_limits import no_command, singularity, worded
 from gemelo.services.planner.jog.velocity_limiter import VelocityLimiter
 
 Array = NDArray[np.float64]
@@ -61,7 +62,9 @@ class Jog:
         self._command = JogCommand()
         self._heard = self._told = self._rested = self._on_way = NEVER
         self._is_heard = False
-        self._interrupted_by = ""  # what has ended the jog while it was commanded: to be let go before it begins again
+        self._interrupted_by: Reason | None = (
+            None  # what has ended the jog while it was commanded: to be let go before it begins again
+        )
         self._known: set[str] = set()  # sentences that have been said
         self._trail: deque[tuple[float, Array]] = deque()
         self._positions: Array | None = None  # commanded, where the jog leads; None: it leads nothing
@@ -88,7 +91,7 @@ class Jog:
     def on_command(self, command: JogCommand, now: float) -> None:
         """Takes a command that has come at `now` [s]; the newest one counts."""
         if now - self._heard > SILENCE:
-            self._interrupted_by = ""
+            self._interrupted_by = None
         self._command, self._heard = command, now
         self._is_heard = True
 
@@ -99,7 +102,7 @@ class Jog:
         present: JointState | None,
         age: float,
         goal_is_active: bool,
-        not_ready: str = "",
+        not_ready: Reason | None = None,
     ) -> JogOutput:
         """One period; `present` is `age` [s] old, `stamp` is [ns] UNIX, `not_ready` why the device does not move."""
         self._is_heard = now - self._heard <= DEAD_MAN
@@ -111,19 +114,18 @@ class Jog:
             said = self._lead(now)
             self._require_followed(present, age, goal_is_active, not_ready, now)
         except JogRefused as refused:
-            return self._end(str(refused), now, stamp)
+            return self._end(refused.reason, now, stamp)
         return self._output(now, stamp, present, said)
 
-    def _begin(self, present: JointState | None, age: float, goal_is_active: bool, not_ready: str, now: float) -> None:
+    def _begin(
+        self, present: JointState | None, age: float, goal_is_active: bool, not_ready: Reason | None, now: float
+    ) -> None:
         if goal_is_active:
-            raise JogRefused("a goal is being carried out: cancel it first")
-        if not_ready:
+            raise JogRefused(because("jog.goal_active", remedy("cancel_first")))
+        if not_ready is not None:
             raise JogRefused(not_ready)
-        if self._interrupted_by:
-            raise JogRefused(
-                f"jogging was interrupted ({self._interrupted_by}), and nothing resumes by itself: "
-                f"let go for {SILENCE:g} s"
-            )
+        if self._interrupted_by is not None:
+            raise JogRefused(because("jog.interrupted", self._interrupted_by, remedy("let_go_for", time=SILENCE)))
         self._positions = np.array(standing_position(self._arm, present, age))
         self._velocity = np.zeros(len(self._arm.joints))
         self._limiter = VelocityLimiter(self._arm, self._world, self._braking)  # nothing of an earlier jog counts
@@ -156,7 +158,7 @@ class Jog:
         except BadJog as error:
             said = "" if str(error) in self._known or len(self._known) >= MOST_SAID else str(error)
             self._known |= {said} - {""}
-            return Wanted(np.zeros(len(positions)), 0.0, (no_command(str(error)),)), said
+            return Wanted(np.zeros(len(positions)), 0.0, (no_command(error.reason),)), said
 
     def _fading(self, positions: Array, now: float) -> Wanted:
         """Less of the last twist, so that the tool brakes on its line; of joints, and after a while, nothing."""
@@ -174,21 +176,19 @@ class Jog:
         return Wanted(min(1.0, share) * wanted.velocity, is_twist=True)
 
     def _require_followed(
-        self, present: JointState | None, age: float, goal_is_active: bool, not_ready: str, now: float
+        self, present: JointState | None, age: float, goal_is_active: bool, not_ready: Reason | None, now: float
     ) -> None:
         """Raises `JogRefused` where somebody else moves the arm, or nobody does."""
         if goal_is_active:
-            raise JogRefused("a goal has taken over")
+            raise JogRefused(because("jog.goal_took_over"))
         if present is None or age > FOLLOW:
-            raise JogRefused(not_ready or "no fresh joint_states: is the stepper_gateway running?")
+            raise JogRefused(not_ready or because("jog.no_states", remedy("see_gateway")))
         self._remember(now)
         astray = self._astray(present)
-        if not (astray or not_ready):
+        if not astray and not_ready is None:
             self._on_way = now
         elif now - self._on_way > GRACE:
-            raise JogRefused(
-                not_ready or f"{astray} does not follow its targets: see what `gemelo state` says of the device"
-            )
+            raise JogRefused(not_ready or because("jog.not_following", remedy("see_state"), joint=astray))
 
     def _remember(self, now: float) -> None:
         assert self._positions is not None
@@ -237,7 +237,8 @@ class Jog:
         if now - self._told < STATUS_PERIOD - 0.5 * PERIOD or self._positions is None:
             return None
         self._told = now
-        limits = tuple({limit.check: limit for limit in reversed(self._limits)}.values())[::-1]
+        newest = tuple({limit.check: limit for limit in reversed(self._limits)}.values())[::-1]
+        limits = tuple(worded(limit) for limit in newest)
         return JogStatus(
             stamp=stamp,
             active=True,
@@ -247,7 +248,7 @@ class Jog:
             manipulability=self._interpreter.twists.manipulability(self._positions),
         )
 
-    def _end(self, reason: str, now: float, stamp: int) -> JogOutput:
+    def _end(self, reason: Reason, now: float, stamp: int) -> JogOutput:
         """No more targets; what was led and is interrupted begins again only after a silence."""
         was_led, self._positions = self._positions is not None, None
         self._velocity = np.zeros(len(self._arm.joints))
@@ -255,7 +256,9 @@ class Jog:
         if not was_led and now - self._told < STATUS_PERIOD - 0.5 * PERIOD:
             return JogOutput()
         self._told = now
-        return JogOutput(status=JogStatus(stamp=stamp, scale=0.0, limited_by=reason), said=reason if was_led else "")
+        said = str(reason)
+        status = JogStatus(stamp=stamp, scale=0.0, limited_by=said, why=reason)
+        return JogOutput(status=status, said=said if was_led else "")
 
 
 def signed(output: JogOutput, client: str, told_to: str) -> tuple[JointTargets | None, JogStatus | None]:

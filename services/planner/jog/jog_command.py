@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JogCommand, JogLimit
+from gemelo.schemas.reasons import because, remedy
 from gemelo.services.planner.jog.jog_limits import no_command, singularity, speed_limit
 from gemelo.services.planner.jog.twist import TwistSolver
 from gemelo.services.planner.request.refusals import PlanRefused
@@ -23,8 +25,8 @@ Array = NDArray[np.float64]
 FASTEST_TWIST = 1e3  # [m/s] and [rad/s]: more is as absurd, and loses its digits
 
 
-class BadJog(ValueError):
-    """A command that cannot be followed; the text names the thing and the remedy."""
+class BadJog(ReasonedError, ValueError):
+    """A command that cannot be followed; the reason names the thing and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -51,19 +53,20 @@ class JogInterpreter:
         `BadJog`."""
         has_twist = bool(command.linear or command.angular)
         if command.name and has_twist:
-            raise BadJog("a jog command has joints and a twist: give one of them")
+            raise BadJog(because("jog.command.both", remedy("one_of_both")))
         return self._of_twist(command, positions) if has_twist else self._of_joints(command)
 
     def _of_joints(self, command: JogCommand) -> Wanted:
         names = self._arm.joint_names
         if len(command.name) != len(command.velocity):
-            raise BadJog(f"a jog command names {len(command.name)} joints and gives {len(command.velocity)} velocities")
+            counts = {"joints": len(command.name), "velocities": len(command.velocity)}
+            raise BadJog(because("jog.command.count", **counts))
         velocity = np.zeros(len(names))
         for name, value in zip(command.name, command.velocity, strict=True):
             if name not in names:
-                raise BadJog(f'{self._arm.name} has no joint "{name}"{suggestion(name, names)}')
+                raise BadJog(because("jog.command.unknown", nearest(name, names), robot=self._arm.name, joint=name))
             if command.name.count(name) > 1:
-                raise BadJog(f'a jog command names "{name}" twice')
+                raise BadJog(because("jog.command.twice", joint=name))
             velocity[names.index(name)] = value
         return self._clamped(velocity, 1.0, ())
 
@@ -71,7 +74,7 @@ class JogInterpreter:
         twist = self._in_base(command, positions)
         notes: tuple[JogLimit, ...] = ()
         if not self.twists.turns and np.any(twist[3:]):
-            notes = (no_command(f"{self._arm.name} cannot turn its tool as it likes: only the linear part counts"),)
+            notes = (no_command(because("jog.command.no_turn", robot=self._arm.name)),)
             twist[3:] = 0.0
         if not np.any(twist):
             return Wanted(np.zeros(len(self._speeds)), limits=notes)
@@ -84,16 +87,14 @@ class JogInterpreter:
         """(6,) along the base's axes."""
         for part, values in (("linear", command.linear), ("angular", command.angular)):
             if len(values) not in (0, 3):
-                raise BadJog(f"{part} has {len(values)} values: give 3")
+                raise BadJog(because("jog.command.values", part=part, count=len(values)))
         twist = np.array([*(command.linear or (0.0,) * 3), *(command.angular or (0.0,) * 3)])
         twist *= min(1.0, FASTEST_TWIST / max(FASTEST_TWIST, float(np.max(np.abs(twist)))))
         frames = (self._arm.base_frame, self._arm.tool_frame)
         if command.frame in ("", self._arm.base_frame):
             return twist
         if command.frame != self._arm.tool_frame:
-            raise BadJog(
-                f'a twist is given in the base or the tool, not in "{command.frame}": use {" or ".join(frames)}'
-            )
+            raise BadJog(because("jog.command.frame", remedy("use_one_of", names=frames), frame=command.frame))
         rotation = self._kinematics.tool(positions).rotation
         return np.concatenate((rotation @ twist[:3], rotation @ twist[3:]))
 
@@ -108,8 +109,8 @@ class JogInterpreter:
         return Wanted(velocity / most, scale / most, (*notes, limit))
 
 
-class JogRefused(ValueError):
-    """The arm cannot be jogged now; the text says why and what would do."""
+class JogRefused(ReasonedError, ValueError):
+    """The arm cannot be jogged now; the reason says why and what would do."""
 
 
 def standing_position(arm: ArmDescription, present: JointState | None, age: float) -> tuple[float, ...]:
@@ -117,4 +118,4 @@ def standing_position(arm: ArmDescription, present: JointState | None, age: floa
     try:
         return resolve_start(arm, None, present, age)
     except PlanRefused as refused:
-        raise JogRefused(f"{refused.refusal.message}; {refused.refusal.remedy}") from refused
+        raise JogRefused(refused.refusal.why or refused.refusal.message) from refused

@@ -10,6 +10,7 @@ import msgspec
 from gemelo.schemas.joints import JointState, JointTargets
 from gemelo.schemas.message import encode
 from gemelo.schemas.planning import JogCommand, JogInputs, JogStatus, JogTaken, JogTick, SceneVersion
+from gemelo.schemas.reasons import Reason
 
 MOST = 25  # inputs of one message; chosen: half a second of periods
 LARGE = 256 * 1024  # [bytes] of one message; chosen: a command may be as large as any message (bus/wire.py)
@@ -36,7 +37,8 @@ class JogLog:
         self._add(JogTaken(now=now, command=command, client=client, begins=begins), stamp)
 
     def ticked(
-        self, now: float, stamp: int, present: JointState | None, age: float, goal_is_active: bool, not_ready: str,
+        self, now: float, stamp: int, present: JointState | None, age: float, goal_is_active: bool,
+        not_ready: Reason | None,
         scene: SceneVersion, told_to: str, said: str,
     ) -> None:  # fmt: skip
         """A step of the jog at `now` [s] monotonic, `stamp` [ns] UNIX, with `present` of `age` [s]; and the `digest_of`
@@ -44,8 +46,8 @@ class JogLog:
         is_same, self._told = scene == self._told, scene
         tick = JogTick(
             now=now, stamp=stamp, present=present, age=age if present is not None else 0.0,  # infinite before the first
-            goal_is_active=goal_is_active, not_ready=not_ready, scene=None if is_same else scene, told_to=told_to,
-            said=said,
+            goal_is_active=goal_is_active, not_ready=str(not_ready or ""), scene=None if is_same else scene,
+            told_to=told_to, said=said, why=not_ready,
         )  # fmt: skip
         self._add(tick, stamp)
 
@@ -71,8 +73,16 @@ class JogLog:
 
 
 def digest_of(targets: JointTargets | None, status: JogStatus | None) -> str:
-    """A checksum of what was said in one period; empty where that was nothing."""
+    """A checksum of what was published in one period; empty where that was nothing."""
     if targets is None and status is None:
         return ""
-    said = b"".join(b"-" if each is None else encode(each) for each in (targets, status))
-    return hashlib.blake2b(said, digest_size=DIGEST).hexdigest()
+    published = (b"-" if targets is None else encode(targets), b"-" if status is None else _without_reasons(status))
+    return hashlib.blake2b(b"".join(published), digest_size=DIGEST).hexdigest()
+
+
+def _without_reasons(status: JogStatus) -> bytes:
+    """In msgpack; its sentences are made of its reasons, which older recordings do not have."""
+    fields = msgspec.to_builtins(status)
+    for part in (fields, *fields["limits"]):
+        del part["why"]
+    return msgspec.msgpack.encode(fields)

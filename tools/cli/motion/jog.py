@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 
 import gemelo
 from gemelo.schemas.planning import JogCommand, JogLimit, JogStatus
+from gemelo.schemas.reasons import because, plain
 from gemelo.schemas.topics import JOG_STATUS, JOINT_STATES
 from gemelo.tools.cli.bus.request_text import degrees, joints_text, millimetres
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.terminal import LiveBlock, two_stage_interrupt
 from gemelo.tools.cli.common.units import SPEED_OF, angular_speed, parse_joints, positive_seconds, show, speed
@@ -153,7 +155,7 @@ def jog_for(arm: Arm, command: JogCommand, seconds: float) -> ExitCode:
         raise CommandError(error) from error
     print(position.line)
     for limit in limits.values():
-        print(f"limited by {limit.message}")
+        print(_limited_by(limit))
     return code
 
 
@@ -185,11 +187,16 @@ def status_lines(status: JogStatus | None) -> list[str]:
     if status is None or not (status.active or status.limited_by):
         return ["at rest"]
     if not status.active:
-        return [f"refused: {status.limited_by}"]
+        return [sentence(because("refused.plan", status.why or plain(status.limited_by)))]
     share = f"{100.0 * status.scale:.0f} % of the asked speed"
     if not status.limits:
         return [share]
-    return [f"{share}, limited by", *(f"  {limit.message}" for limit in status.limits)]
+    return [share, *(f"  {_limited_by(limit)}" for limit in status.limits)]
+
+
+def _limited_by(limit: JogLimit) -> str:
+    """In the language of the command line; of an older planner its own sentence."""
+    return sentence(because("jog.limited", limit.why or plain(limit.message)))
 
 
 def _folded(lines: Iterable[str]) -> str:

@@ -8,6 +8,7 @@ from math import radians
 import gemelo
 from gemelo.libraries.arm.frames.transforms import from_rpy, multiply
 from gemelo.libraries.arm.model.description import Joint
+from gemelo.schemas.reasons import plain
 from gemelo.services.panel.model.jogging import JogWish
 from gemelo.services.panel.model.operator import Operator
 from gemelo.services.panel.model.readings import Readings
@@ -134,6 +135,6 @@ def jog_text(operator: Operator, words: Words) -> str:
     status = operator.bus.jog_status
     if status is None or not status.active:
         return ""
-    told = "<br>".join(esc(words.said(limit.message)) for limit in status.limits)
+    told = "<br>".join(esc(words.why(limit.why or plain(limit.message))) for limit in status.limits)
     share = esc(words("jogging", share=round(100 * status.scale)))
     return box(f"<b>{share}</b><br>{told}" if told else share, "#1c7ed6")
