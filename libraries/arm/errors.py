@@ -4,13 +4,44 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
 
 from gemelo.schemas.errors import ConfigurationError
-from gemelo.schemas.reasons import Remedy, remedy
+from gemelo.schemas.reasons import Reason, Remedy, because, plain, remedy
 
 
 class DescriptionError(ConfigurationError):
     """A robot's folder is wrong."""
+
+
+class Subject(NamedTuple):
+    """What a finding is of: a joint or link with its name, or the robot, the tree, a key, which have none."""
+
+    kind: str  # a word of the catalogue; empty where the line says it
+    name: str = ""
+    part: str = ""  # the element of it, as "<mimic>"
+
+    def around(self, what: Reason) -> Reason:
+        """What is wrong, with what it is wrong with."""
+        if self.part:
+            return because("finding.part", what, kind=self.kind, name=self.name, part=self.part)
+        if self.name.isdecimal():
+            return because("finding.numbered", what, kind=self.kind, number=self.name)
+        if self.name:
+            return because("finding.named", what, kind=self.kind, name=self.name)
+        return because("finding.of", what, kind=self.kind) if self.kind else what
+
+    def __str__(self) -> str:
+        """For example: joint "brazo_joint"."""
+        return str(self.around(plain(""))).removesuffix(": ")
+
+
+def wrong_file(path: Path | str, what: Reason, line: int = 0) -> DescriptionError:
+    """The error of a file, at a line (from 1) where that is known."""
+    if line:
+        return DescriptionError(because("file.line", what, file=str(path), line=line))
+    return DescriptionError(because("file.wrong", what, file=str(path)))
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str | None:

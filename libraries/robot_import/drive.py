@@ -73,7 +73,7 @@ def _ask(joint: UrdfJoint, number: int, questions: Questions, motor: str, driver
     board = questions.ask(*key("driver"), driver, driver_named)
     slides = joint.kind is JointKind.PRISMATIC
     steps = questions.ask(*key("microsteps"), str(board.usual), lambda text: _microsteps(text, board))
-    ratio = questions.ask(*key("ratio"), "1", lambda text: exact_ratio(text, "ratio"))
+    ratio = questions.ask(*key("ratio"), "1", exact_ratio)
     radius = questions.ask(*key("pinion_radius"), str(PINION_RADIUS), above_zero) if slides else None
     step_pin = questions.ask(*key("step_pin"), str(PINS[place][0]), _pin)
     dir_pin = questions.ask(*key("dir_pin"), str(PINS[place][1]), _pin)

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+import msgspec
 
 from gemelo.libraries.arm.checks.check import check
 from gemelo.libraries.arm.checks.findings import Finding, Severity, error
@@ -164,8 +166,8 @@ def _require_well(findings: Sequence[Finding]) -> None:
 
 def _in_folder(finding: Finding, building: Path, folder: Path) -> Finding:
     """The finding about `building` as one about `folder`, which takes its name."""
-    message, remedy = (text.replace(str(building), str(folder)) for text in (finding.message, finding.remedy))
-    return replace(finding, message=message, remedy=remedy)
+    old, new = (msgspec.json.encode(str(path))[1:-1] for path in (building, folder))
+    return msgspec.json.decode(msgspec.json.encode(finding).replace(old, new), type=Finding)
 
 
 def _show(findings: Sequence[Finding]) -> None:

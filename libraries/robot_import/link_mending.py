@@ -12,6 +12,7 @@ from gemelo.libraries.arm.checks.urdf import UNTOUCHED, principal_moments
 from gemelo.libraries.arm.model.urdf import UrdfLink
 from gemelo.libraries.robot_import.mended import Mended, links_of, meshes_of, subject_of
 from gemelo.libraries.robot_import.questions import Questions, yes_or_no
+from gemelo.schemas.reasons import Reason
 
 MOST_NAMED = 3
 
@@ -66,7 +67,7 @@ def unreadable(mended: Mended) -> None:
     """A mesh to look at that cannot be read is left out where the collision shapes can."""
     for link, _, item, geometry, mesh in meshes_of(mended):
         known = mended.facts(geometry)
-        if isinstance(known, str) and item.tag == "visual" and _touches_wholly(mended, link):
+        if isinstance(known, Reason) and item.tag == "visual" and _touches_wholly(mended, link):
             link.remove(item)
             message = f'mesh "{geometry.mesh}": {known}'
             mended.warn(mesh, subject_of(link), message, "left out: it is drawn with its <collision>")

@@ -11,10 +11,12 @@ from pathlib import Path
 from gemelo.libraries.arm.checks.findings import Finding, Severity, error, note, once, warning
 from gemelo.libraries.arm.checks.meshes import MeshFacts, check_meshes, facts_of
 from gemelo.libraries.arm.checks.urdf import check_urdf, fault_finding
+from gemelo.libraries.arm.errors import Subject
 from gemelo.libraries.arm.model.urdf import Geometry, UrdfLink, UrdfModel, model_of
 from gemelo.libraries.arm.model.xml_reader import XmlReader
 from gemelo.libraries.robot_import.questions import Questions, one_of
 from gemelo.libraries.robot_import.source import RobotSource
+from gemelo.schemas.reasons import Reason
 
 
 @dataclass
@@ -71,20 +73,22 @@ class Mended:
         found += [*check_urdf(model, Path(file), has_meshes=False), *check_meshes(model, file, self.facts, self.sized)]
         return sorted(once([*found, *self.notes]), key=lambda each: list(Severity).index(each.severity))
 
-    def facts(self, geometry: Geometry) -> MeshFacts | str | None:
+    def facts(self, geometry: Geometry) -> MeshFacts | Reason | None:
         """Of its mesh; None where it is none or its file is not there."""
         file = self.files.get(geometry.mesh or "")
         return None if file is None else _facts(file)
 
-    def say(self, element: ET.Element, subject: str, message: str, remedy: str) -> None:
+    def say(self, element: ET.Element, subject: Subject | str, message: Reason | str, remedy: str) -> None:
         """Notes what is mended."""
         self.notes.append(note(self.source.label, subject, message, remedy, self.xml.lines.get(element, 0)))
 
-    def fail(self, element: ET.Element, subject: str, message: str, remedy: str) -> None:
+    def fail(self, element: ET.Element, subject: Subject | str, message: Reason | str, remedy: str) -> None:
         """Says what has no one answer: an error."""
         self.errors.append(error(self.source.label, subject, message, remedy, self.xml.lines.get(element, 0)))
 
-    def choose(self, key: str, element: ET.Element, subject: str, message: str, words: Sequence[str]) -> str | None:
+    def choose(
+        self, key: str, element: ET.Element, subject: Subject | str, message: Reason | str, words: Sequence[str]
+    ) -> str | None:
         """Which of the words a person says to what has no one answer; None, after an error, where nobody is there."""
         question = f"{subject}: {message}: {' or '.join(words)}?"
         said = self.questions.ask_without_default(key, question, one_of(*words))
@@ -94,13 +98,13 @@ class Mended:
             self.fail(element, subject, message, f"{remedy}{others} into a file for `gemelo import --answers`")
         return said
 
-    def warn(self, element: ET.Element, subject: str, message: str, remedy: str) -> None:
+    def warn(self, element: ET.Element, subject: Subject | str, message: Reason | str, remedy: str) -> None:
         """Warns of what a default stands for that nobody has given."""
         self.notes.append(warning(self.source.label, subject, message, remedy, self.xml.lines.get(element, 0)))
 
 
 @lru_cache(maxsize=256)
-def _facts(file: Path) -> MeshFacts | str:
+def _facts(file: Path) -> MeshFacts | Reason:
     return facts_of(file)
 
 

@@ -10,7 +10,7 @@ from gemelo.libraries.arm.checks.units import (
     LARGEST_GYRATION,
     MOST_TURN,
     gyration,
-    in_millimetres_message,
+    in_millimetres_reason,
     is_drawn_in_millimetres,
 )
 from gemelo.libraries.arm.checks.urdf import principal_moments
@@ -47,7 +47,7 @@ def lengths(mended: Mended) -> None:
     """A URDF that is drawn in millimetres as a whole; its meshes are judged for themselves."""
     if not is_drawn_in_millimetres(mended.model):
         return
-    root, (message, line) = mended.xml.root, in_millimetres_message(mended.model)
+    root, (message, line) = mended.xml.root, in_millimetres_reason(mended.model)
     for parent in (*root.findall("joint"), *root.findall("link"), *root.findall("link/*")):
         for origin in parent.findall("origin"):
             _scaled(origin, "xyz", MILLIMETRE)

@@ -49,6 +49,8 @@ _SAME: dict[str, Written] = {
     "mm": _short(" mm", _thousand),
     "mm/s": _short(" mm/s", _thousand),
     "s": _unit("s", 3),
+    "mrad": _short(" mrad", _thousand),
+    "us": _short(" us", lambda value: 1e6 * value),
     "%": _unit("%", 0, _hundred),
     "steps": _unit("steps", 0),
     "steps/s": _unit("steps/s", 0),

@@ -143,7 +143,7 @@ def test_a_sensor_is_scaled_to_half_a_unit_of_the_wire(scale: float, offset: flo
         ('joint = "brazo_joint"', 'joint = "braso_joint"', ('input "home_q1"', "braso_joint", "brazo_joint")),
         ('joint = "brazo_joint"\n', "", ('input "home_q1"', "`joint`")),
         ('role = "estop"', 'role = "estop"\njoint = "brazo_joint"', ('input "seta"', "remove `joint`")),
-        ("slow = 0.05", "slow = 1e-9", ('joint "brazo_joint"', "homing.slow is 1e-09", "at least one step")),
+        ("slow = 0.05", "slow = 1e-9", ('joint "brazo_joint"', "homing.slow: it is 1e-09", "at least one step")),
         ("back_off = 0.1", "back_off = 1e9", ("homing.back_off", "32 bits")),
         ("scale = 0.01715", "scale = 40.0", ('sensor "ultra"', "scale", "32 bits")),
         ('wire_name = "q1"', 'wire_name = "q 1"', ('joint "brazo_joint"', '"q 1"', "letters")),

@@ -81,7 +81,7 @@ def test_a_valve_on_an_output_that_is_not_there_is_named_with_the_nearest(copy: 
 def test_a_pin_that_is_used_twice_is_found(copy: Path):
     edit(copy / "robot.toml", "pin = 14", "pin = 13")
     findings = [str(finding) for finding in check(copy)]
-    assert any("pin 13" in text and "the gripper's pin" in text for text in findings), findings
+    assert any("pin 13" in text and "[gripper] pin" in text for text in findings), findings
 
 
 def test_what_is_wrong_with_a_gripper_is_a_finding_of_the_check(copy: Path):

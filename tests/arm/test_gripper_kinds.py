@@ -100,4 +100,4 @@ def test_what_is_wrong_with_it_is_named_with_its_line(project: Path, robot: Path
     assert f"line {line}: [gripper] pinion_radius 0.008 m opens at 2989 us: choose a larger pinion" in done.stdout
     edit(robot / "robot.toml", "pinion_radius = 0.008", "pinion_radios = 0.016")
     done = run_in(project, "-m", "gemelo.tools.cli.main", "check", str(robot))
-    assert f'line {line}: unknown key `gripper.pinion_radios`; did you mean "pinion_radius"' in done.stdout
+    assert f'line {line}: unknown key `gripper.pinion_radios` -> did you mean "pinion_radius"' in done.stdout

@@ -62,8 +62,8 @@ def test_a_joint_may_say_its_speed_without_a_motor(tmp_path: Path):
         ),
         (
             f'[[joint]]\nname = "turn"\nwire_name = "q1"\n{MOTOR}[[joint]]\nname = "reach"\nwire_name = "q2"\n',
-            'joint "turn"\'s motor',
-            ("[device]", "[[driver]]", '[joint.motor] of joint "reach"'),
+            "[joint.motor] (turn)",
+            ("[device]", "[[driver]]", "[joint.motor] (reach)"),
         ),
         ('[[input]]\nname = "estop"\npin = 21\nrole = "estop"\n', "[[input]]", ("[device]",)),
     ],

@@ -86,17 +86,18 @@ ODD = {
     ),
     "a parent that is no link": (
         (*LINKS, joint("one", "bas", "a"), SECOND),
-        'error: line 6: joint "one": its parent "bas" is no link; did you mean "base"? -> write the name of a link in '
-        "<parent>",
+        'error: line 6: joint "one": its parent "bas" is no link -> did you mean "base"?, or write the name of a link '
+        "in <parent>",
     ),
     "a joint without a name": (
         (*LINKS, FIRST, SECOND.replace('name="two" ', "")),
-        "error: line 7: a <joint>: attribute `name` of <joint> is missing -> add it",
+        "error: line 7: <joint>: attribute `name` of <joint> is missing -> add it",
     ),
     "a scale of one number": (
         (LINKS[0], '<link name="a"><visual><geometry><mesh filename="a.stl" scale="0.001"/></geometry></visual></link>',
          LINKS[2], FIRST, SECOND),
-        'error: line 4: link "a", <mesh>: "0.001" must be three numbers -> write "0.001 0.001 0.001"',
+        'error: line 4: link "a", <mesh>: `scale` of <mesh>: "0.001" must be three numbers -> write "0.001 0.001 '
+        '0.001"',
     ),
     "two shapes in one": (
         (LINKS[0], LINKS[1].replace("<geometry>", '<geometry><sphere radius="1"/>'), LINKS[2], FIRST, SECOND),
@@ -104,7 +105,7 @@ ODD = {
     ),
     "a leader that is no joint": (
         (*LINKS, FIRST, SECOND.replace("</joint>", '<mimic joint="none"/></joint>')),
-        'error: line 7: joint "two": mimics "none", which is no joint; did you mean "one"? -> name the joint that '
+        'error: line 7: joint "two": mimics "none", which is no joint -> did you mean "one"?, or name the joint that '
         "has the motor in <mimic>",
     ),
     "two limits": (
@@ -118,7 +119,7 @@ ODD = {
     ),
     "a link within another": (
         (LINKS[0], LINKS[1].replace("</link>", '\n<link name="c"/></link>'), LINKS[2], FIRST, SECOND),
-        'error: line 5: link "c": it stands within link "a", where nothing reads it -> move it behind link "a"',
+        'error: line 5: link "c": it stands within link "a", where nothing reads it -> move it behind that one',
     ),
     "an endless joint with limits": (
         (*LINKS, joint("one", "base", "a", kind="continuous"), SECOND),
@@ -191,7 +192,7 @@ def test_a_decimal_comma_is_no_comma_between_numbers(tmp_path: Path):
     ("text", "expected"),
     [
         ("<sdf version='1.6'/>", r"the root element is <sdf>, it must be <robot>: export it as URDF"),
-        ("<robot><link", r"not XML: unclosed token: line 1, column 7: correct that place, or export it again"),
+        ("<robot><link", r"not XML: unclosed token: line 1, column 8: correct that place, or export it again"),
     ],
 )
 def test_what_is_no_urdf_says_what_would_do(tmp_path: Path, text: str, expected: str):

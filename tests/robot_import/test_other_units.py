@@ -80,7 +80,7 @@ def test_a_urdf_in_millimetres_becomes_the_same_arm_in_metres_and_says_so_once(t
     assert_equal(metres.model, mended.model)
     assert said_of(metres) == []
     (said,) = said_of(mended)
-    assert 'arm.urdf, line 9: robot: its joints span 980 m, the origin of joint "slide" is 300 m' in said
+    assert 'arm.urdf, line 9: robot: its joints span 980 m, <origin> of joint "slide" is 300 m' in said
     assert "it is in millimetres -> all lengths by 0.001" in said
     assert link_transforms(mended.model, {"turn": 0.0, "slide": 0.1})["two"][0] == pytest.approx((0.0, 0.0, 0.63))
 
@@ -114,7 +114,7 @@ def test_one_length_in_millimetres_among_metres_is_named_with_its_line_and_what_
     )  # fmt: skip
     said = [str(each) for each in mend(find_source(far)).findings()]
     assert said == [
-        'error: far.urdf, line 8: joint "two": the origin is 400 m -> is that in mm? then write xyz="0 0 0.4"',
+        'error: far.urdf, line 8: joint "two": <origin> is 400 m -> is that in mm? then write xyz="0 0 0.4"',
         'error: far.urdf, line 5: link "c": <box> is 200 m -> is that in mm? then write 6e-05 x 6e-05 x 0.2',
         'warning: far.urdf, line 6: link "d": <box> is 6 m -> is that in mm? then write 6e-05 x 6e-05 x 0.006',
     ]

@@ -8,14 +8,15 @@ from pathlib import Path
 
 import msgspec
 
-from gemelo.libraries.arm.errors import DescriptionError, suggestion
-from gemelo.libraries.arm.model.robot_file import read_robot_data, read_text, where_of
+from gemelo.libraries.arm.errors import nearest, wrong_file
+from gemelo.libraries.arm.model.robot_file import read_robot_data, read_text, type_mistake
 from gemelo.schemas.cell import CameraFile, MeasuredCamera
+from gemelo.schemas.reasons import because, remedy
 
 CAMERA_FILE = "camera.toml"
 MOUNT_BOARD = "mount_board"  # in the planning scene: the tags on the arm, while `gemelo camera mount` shows them
 HEADER = "# Measured by `gemelo camera calibrate` and `gemelo camera mount`: measure again instead of editing it.\n"
-REMEDY = "measure it again: gemelo camera calibrate, gemelo camera mount"
+REMEDY = remedy("measure_camera_again")
 
 
 def load_measured(path: Path, cameras: Sequence[str]) -> dict[str, MeasuredCamera]:
@@ -29,11 +30,11 @@ def measured_of(path: Path, text: str, cameras: Sequence[str]) -> dict[str, Meas
     try:
         file = msgspec.convert(data, CameraFile)
     except msgspec.ValidationError as error:
-        raise DescriptionError(f"{path}{where_of(error, text)}: {error}; {REMEDY}") from error
+        line, what = type_mistake(error, text)
+        raise wrong_file(path, because("camera.measured", what, REMEDY), line) from error
     for camera in file.camera:
         if camera.name not in cameras:
-            hint = suggestion(camera.name, cameras)
-            raise DescriptionError(f'{path}: cell.toml has no camera "{camera.name}"{hint}')
+            raise wrong_file(path, because("camera.not_in_cell", nearest(camera.name, cameras), camera=camera.name))
         _require_sizes(path, camera)
     return {camera.name: camera for camera in file.camera}
 
@@ -49,11 +50,11 @@ def write_measured(path: Path, cameras: Sequence[MeasuredCamera]) -> None:
 def _require_sizes(path: Path, camera: MeasuredCamera) -> None:
     lens = camera.calibration
     if lens is not None and (len(lens.intrinsics) != 9 or len(lens.distortion) not in (0, 5)):
-        said = f"{len(lens.intrinsics)} intrinsics and {len(lens.distortion)} of distortion, not 9 and 5"
-        raise DescriptionError(f'{path}: camera "{camera.name}" has {said}; {REMEDY}')
+        counts = {"intrinsics": len(lens.intrinsics), "distortion": len(lens.distortion)}
+        raise wrong_file(path, because("camera.measured.sizes", REMEDY, camera=camera.name, **counts))
     mount = camera.mount
     if mount is not None and abs(sum(value * value for value in mount.rotation) - 1.0) > 1e-3:
-        raise DescriptionError(f'{path}: camera "{camera.name}": its rotation is no unit quaternion; {REMEDY}')
+        raise wrong_file(path, because("camera.measured.rotation", REMEDY, camera=camera.name))
 
 
 def _table(camera: MeasuredCamera) -> str:

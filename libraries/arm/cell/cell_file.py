@@ -10,9 +10,9 @@ from typing import TypeVar
 import msgspec
 
 from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE, measured_of
-from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.errors import Subject, nearest, wrong_file
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
-from gemelo.libraries.arm.model.robot_file import line_of, read_robot_data, read_text, where_of
+from gemelo.libraries.arm.model.robot_file import line_of, read_robot_data, read_text, type_mistake
 from gemelo.libraries.toml_lines import Where
 from gemelo.schemas.cell import (
     CameraRecord,
@@ -31,6 +31,7 @@ from gemelo.schemas.cell import (
     Thing,
 )
 from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.reasons import Reason, because, remedy
 
 TAG_COUNTS = {
     TagFamily.APRILTAG_36H11: 587,
@@ -46,6 +47,7 @@ KINDS = {
     "place": ("pose", "tag"),
 }
 
+Fault = tuple[Where, Reason]  # where it stands, and what is wrong
 Tagged = TagRecord | TagThing | TagPlace
 N = TypeVar("N", bound=CameraRecord | Thing | Place)
 
@@ -93,7 +95,7 @@ class Cell:
             if each.name == name:
                 return each
         names = [each.name for each in among]
-        raise DescriptionError(f'{self.path}: there is no [[{what}]] "{name}"{suggestion(name, names)}')
+        raise wrong_file(self.path, because("cell.none", nearest(name, names), kind=what, name=name))
 
 
 def deployed_cell(deployment: Deployment) -> Cell:
@@ -121,23 +123,26 @@ def cell_of(texts: CellTexts, arm: ArmDescription, *, is_here: bool = True) -> C
     try:
         file = msgspec.convert(data, CellFile)
     except msgspec.ValidationError as error:
-        raise DescriptionError(f"{path}{where_of(error, text)}: {error}{_choices(str(error))}") from error
+        line, what = type_mistake(error, text)
+        if known := _choices(str(error)):
+            what = because("cell.kind", what, remedy("known_are", names=known))
+        raise wrong_file(path, what, line) from error
     cell = Cell(path, file.camera, file.tag, file.thing, file.place, file.table)
     for keys, fault in _faults(cell, arm, is_here):
-        raise DescriptionError(f"{path}, line {line_of(keys, text) or 1}: {fault}")
+        raise wrong_file(path, fault, line_of(keys, text) or 1)
     names = [each.name for each in cell.cameras]
     measured = measured_of(path.with_name(CAMERA_FILE), texts.cameras, names) if texts.cameras else {}
     return Cell(path, file.camera, file.tag, file.thing, file.place, file.table, measured)
 
 
-def _faults(cell: Cell, arm: ArmDescription, is_here: bool) -> Iterator[tuple[Where, str]]:
-    """Where each fault stands, and its sentence."""
+def _faults(cell: Cell, arm: ArmDescription, is_here: bool) -> Iterator[Fault]:
+    """Where each fault stands, and what is wrong."""
     for what, named in (("camera", cell.cameras), ("thing", cell.things), ("place", cell.places)):
         yield from _repeated(what, [each.name for each in named])
     for number, camera in enumerate(cell.cameras):
         yield from _camera_faults(("camera", number), camera, cell, arm)
     for number, tag in enumerate(cell.tags):
-        yield from _parent_faults(("tag", number), f"the tag {tag.id}", tag.parent, arm)
+        yield from _parent_faults(("tag", number), Subject("tag", str(tag.id)), tag.parent, arm)
     for number, thing in enumerate(cell.things):
         yield from _thing_faults(("thing", number), thing, arm)
         if is_here:
@@ -145,68 +150,67 @@ def _faults(cell: Cell, arm: ArmDescription, is_here: bool) -> Iterator[tuple[Wh
     yield from _tag_faults(cell)
 
 
-def _repeated(what: str, names: list[str]) -> Iterator[tuple[Where, str]]:
+def _repeated(what: str, names: list[str]) -> Iterator[Fault]:
     for number, name in enumerate(names):
         if name in names[:number]:
-            yield (what, number, "name"), f'there are two [[{what}]] "{name}": give each a name of its own'
+            yield (what, number, "name"), because("cell.name.twice", kind=what, name=name)
 
 
-def _camera_faults(keys: Where, camera: CameraRecord, cell: Cell, arm: ArmDescription) -> Iterator[tuple[Where, str]]:
-    yield from _parent_faults(keys, f'camera "{camera.name}"', camera.parent, arm)
+def _camera_faults(keys: Where, camera: CameraRecord, cell: Cell, arm: ArmDescription) -> Iterator[Fault]:
+    yield from _parent_faults(keys, Subject("camera", camera.name), camera.parent, arm)
     length = sum((a - b) ** 2 for a, b in zip(camera.position, camera.look_at, strict=True)) ** 0.5
     if length < NEAREST_LOOK:
-        yield (*keys, "look_at"), f'camera "{camera.name}" looks at the point where it stands: look_at is another one'
+        yield (*keys, "look_at"), because("cell.camera.look_at", camera=camera.name)
     yield from _source_faults((*keys, "source"), camera.name, camera.source, cell)
 
 
-def _source_faults(keys: Where, name: str, source: Source, cell: Cell) -> Iterator[tuple[Where, str]]:
+def _source_faults(keys: Where, name: str, source: Source, cell: Cell) -> Iterator[Fault]:
     if isinstance(source, FolderSource | FileSource) and not source.path:
-        yield (*keys, "path"), f'camera "{name}": write the path of what it plays'
+        yield (*keys, "path"), because("cell.camera.path", camera=name)
     distortion = getattr(source, "distortion", ())
     if len(distortion) not in (0, 5):
-        said = f"distortion has {len(distortion)} numbers: write k1, k2, p1, p2, k3, or leave it out"
-        yield (*keys, "distortion"), f'camera "{name}": {said}'
+        yield (*keys, "distortion"), because("cell.camera.distortion", camera=name, count=len(distortion))
 
 
-def _parent_faults(keys: Where, what: str, parent: str, arm: ArmDescription) -> Iterator[tuple[Where, str]]:
+def _parent_faults(keys: Where, of: Subject, parent: str, arm: ArmDescription) -> Iterator[Fault]:
     if parent and parent not in arm.model.link_names:
-        known = suggestion(parent, arm.model.link_names)
-        yield (*keys, "parent"), f'{what}: {arm.name} has no link "{parent}"{known}'
+        known = nearest(parent, arm.model.link_names)
+        yield (*keys, "parent"), of.around(because("cell.parent", known, robot=arm.name, link=parent))
 
 
-def _thing_faults(keys: Where, thing: Thing, arm: ArmDescription) -> Iterator[tuple[Where, str]]:
+def _thing_faults(keys: Where, thing: Thing, arm: ArmDescription) -> Iterator[Fault]:
     if arm.gripper is not None:
         width, most = grasp_width(thing), arm.gripper.open
         if width >= most:
             key = "grasp_width" if thing.grasp_width is not None else "box"
-            remedy = "give a grasp_width across a narrower side"
-            yield (
-                (*keys, key),
-                f'thing "{thing.name}" is {width:g} m between the jaws, which open to {most:g} m: {remedy}',
-            )
+            yield (*keys, key), because("cell.thing.wide", thing=thing.name, width=width, limit=most)
 
 
-def _model_faults(keys: Where, thing: Thing, cell: Cell) -> Iterator[tuple[Where, str]]:
+def _model_faults(keys: Where, thing: Thing, cell: Cell) -> Iterator[Fault]:
     if isinstance(thing, OnnxThing) and not cell.path_of(thing.model).is_file():
-        yield (*keys, "model"), f'thing "{thing.name}": there is no file {cell.path_of(thing.model)}'
+        yield (*keys, "model"), because("cell.thing.model", thing=thing.name, file=str(cell.path_of(thing.model)))
 
 
-def _tag_faults(cell: Cell) -> Iterator[tuple[Where, str]]:
+def _tag_faults(cell: Cell) -> Iterator[Fault]:
     known: dict[tuple[TagFamily, int], str] = {}
     records: list[tuple[Where, str, object]] = [
         *((("tag", number), f"[[tag]] {number + 1}", tag) for number, tag in enumerate(cell.tags)),
-        *((("thing", number), f'thing "{each.name}"', each) for number, each in enumerate(cell.things)),
-        *((("place", number), f'place "{each.name}"', each) for number, each in enumerate(cell.places)),
+        *((("thing", number), f'[[thing]] "{each.name}"', each) for number, each in enumerate(cell.things)),
+        *((("place", number), f'[[place]] "{each.name}"', each) for number, each in enumerate(cell.places)),
     ]
-    for keys, what, record in records:
+    for keys, owner, record in records:
         if not isinstance(record, TagRecord | TagThing | TagPlace):
             continue
         most, other = TAG_COUNTS[record.family] - 1, known.get((record.family, record.id))
         if record.id > most:
-            yield (*keys, "id"), f"{what}: {record.family} has the tags 0 to {most}, not {record.id}"
+            family = str(record.family)
+            what = because("cell.tag.range", owner=owner, family=family, tag=record.id, limit=most)
+            yield (*keys, "id"), what
         elif other:
-            yield (*keys, "id"), f"{what} has the tag {record.id} of {record.family}, and so has {other}: print another"
-        known[(record.family, record.id)] = what
+            family = str(record.family)
+            what = because("cell.tag.twice", owner=owner, family=family, tag=record.id, other=other)
+            yield (*keys, "id"), what
+        known[(record.family, record.id)] = owner
 
 
 def grasp_width(thing: Thing) -> float:
@@ -226,8 +230,8 @@ def height_of_frame(thing: Thing) -> float:
     return thing.box[2] / 2.0
 
 
-def _choices(error: str) -> str:
+def _choices(error: str) -> tuple[str, ...]:
     """The kinds that a table can have, where its `kind` is none of them."""
     if not error.endswith(".kind`") and "field `kind`" not in error:
-        return ""
-    return next((f"; known are {', '.join(KINDS[what])}" for what in KINDS if f".{what}" in error), "")
+        return ()
+    return next((tuple(KINDS[what]) for what in KINDS if f".{what}" in error), ())

@@ -16,7 +16,7 @@ from gemelo.libraries.arm.checks.motors import check_motors, check_pull_out
 from gemelo.libraries.arm.checks.srdf import check_srdf
 from gemelo.libraries.arm.checks.urdf import check_urdf, fault_finding
 from gemelo.libraries.arm.device.device_config import device_config
-from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import DescriptionError, Subject
 from gemelo.libraries.arm.kinematics.chain import link_transforms
 from gemelo.libraries.arm.model.description import DEFAULT_URDF, ROBOT_FILE, ArmDescription, load_arm
 from gemelo.libraries.arm.model.robot_file import (
@@ -25,18 +25,19 @@ from gemelo.libraries.arm.model.robot_file import (
     not_finite,
     parse_toml,
     read_text,
+    type_mistake,
     typed_robot,
     unknown_keys,
-    where_of,
 )
 from gemelo.libraries.arm.model.srdf import read_srdf
 from gemelo.libraries.arm.model.urdf import UrdfModel, survey_urdf
-from gemelo.libraries.arm.model.virtual_drive import NO_MOTORS, TO_DRIVE, lacks_motors, with_virtual_drive
+from gemelo.libraries.arm.model.virtual_drive import TO_DRIVE, lacks_motors, with_virtual_drive
+from gemelo.schemas.reasons import Remedy, because, remedy
 from gemelo.schemas.robot import RobotFile
 
 __all__ = ["Finding", "Severity", "check"]
 
-TYPES_REMEDY = "write a value of that type and range; docs/my_own_arm.md says what each key is"
+NOWHERE = Subject("")  # of a whole line
 TOLERANCE = 1e-9  # [m]
 
 
@@ -47,42 +48,47 @@ def check(folder: Path) -> list[Finding]:
         text = read_text(folder / ROBOT_FILE)
         data = parse_toml(folder / ROBOT_FILE, text)
     except DescriptionError as problem:
-        return [error(ROBOT_FILE, "file", str(problem), f"a robot is a folder with a {ROBOT_FILE}")]
+        whole = because("robot.unreadable", problem.reason, remedy("folder_with_robot_file"))
+        return [error(ROBOT_FILE, Subject("file"), whole)]
     findings = [*_unknown_keys(data, text), *_not_finite(data, text)]
     urdf_path = folder / str(data.get("urdf", DEFAULT_URDF))
     try:
         model, faults = survey_urdf(urdf_path)
     except DescriptionError as problem:
-        return [*findings, error(urdf_path.name, "file", str(problem))]
+        return [*findings, error(urdf_path.name, Subject("file"), problem.reason)]
     findings += [fault_finding(fault, urdf_path.name) for fault in faults]
     try:
         is_bare = lacks_motors(data, folder / ROBOT_FILE)
         robot = typed_robot(with_virtual_drive(_known(data), model) if is_bare else _known(data))
     except DescriptionError as problem:
-        return [*findings, error(ROBOT_FILE, "motors", str(problem), TO_DRIVE)]
+        whole = because("robot.unreadable", problem.reason, TO_DRIVE)
+        return [*findings, error(ROBOT_FILE, Subject("motors"), whole)]
     except msgspec.ValidationError as problem:
-        subject = where_of(problem, text).removeprefix(", ") or "types"
-        return [*findings, error(ROBOT_FILE, subject, str(problem), TYPES_REMEDY)]
+        line, what = type_mistake(problem, text)
+        whole = because("robot.unreadable", what, remedy("value_of_that_type"))
+        return [*findings, error(ROBOT_FILE, NOWHERE if line else Subject("types"), whole, line=line)]
     if not_finite(data):
         return findings
     findings += _files(folder, robot, model)
     if not any(finding.severity is Severity.ERROR for finding in findings):
         findings += _cross_checks(folder)
     if is_bare:
-        findings.append(note(ROBOT_FILE, "robot", NO_MOTORS, TO_DRIVE))
+        findings.append(note(ROBOT_FILE, Subject("robot"), because("robot.no_motors", TO_DRIVE)))
     return sorted(once(findings), key=lambda finding: list(Severity).index(finding.severity))
 
 
 def _unknown_keys(data: dict[str, object], text: str) -> list[Finding]:
-    return [
-        error(ROBOT_FILE, f"line {key.line}", f"unknown key `{dotted(key.path)}`{key.hint}", "correct or remove it")
-        for key in unknown_keys(data, text)
-    ]
+    return [error(ROBOT_FILE, NOWHERE, key.reason, line=key.line) for key in unknown_keys(data, text)]
 
 
 def _not_finite(data: dict[str, object], text: str) -> list[Finding]:
     return [
-        error(ROBOT_FILE, f"line {line_of(key, text)}", f"`{dotted(key)}` is {value}", "write a number that is finite")
+        error(
+            ROBOT_FILE,
+            NOWHERE,
+            because("file.value.not_finite", key=dotted(key), value=value),
+            line=line_of(key, text),
+        )
         for key, value in not_finite(data)
     ]
 
@@ -114,7 +120,7 @@ def _files(folder: Path, robot: RobotFile, model: UrdfModel) -> list[Finding]:
     try:
         findings += check_srdf(read_srdf(folder / robot.srdf), robot, model)
     except DescriptionError as problem:
-        findings.append(error(robot.srdf, "file", str(problem)))
+        findings.append(error(robot.srdf, Subject("file"), problem.reason))
     return findings
 
 
@@ -124,7 +130,7 @@ def _cross_checks(folder: Path) -> list[Finding]:
         arm = load_arm(folder)
         device_config(arm)
     except DescriptionError as problem:
-        return [error(ROBOT_FILE, "robot", str(problem))]
+        return [error(ROBOT_FILE, Subject("robot"), problem.reason)]
     # The meshes themselves only where yourdfpy has opened them all.
     return check_with_yourdfpy(arm) or check_meshes(arm.model, arm.urdf_path.name, mesh_facts(arm.urdf_path.parent))
 
@@ -135,13 +141,13 @@ def check_with_yourdfpy(arm: ArmDescription) -> list[Finding]:
     try:
         import yourdfpy  # slow to load: trimesh comes with it
     except ModuleNotFoundError:
-        remedy = "install the extra `view` to have the meshes opened"
-        return [warning(file, "meshes", "not opened, because yourdfpy is not installed", remedy)]
+        return [warning(file, Subject("meshes"), because("mesh.no_reader_installed", remedy("install_view")))]
     logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)  # what it would warn of, the other checks say with lines
     try:
         other = yourdfpy.URDF.load(str(arm.urdf_path))
     except Exception as problem:  # of any mesh format's reader
-        return [error(file, "meshes", f"yourdfpy cannot load it: {problem}", _suspects(arm.folder))]
+        whole = because("mesh.not_loaded", _suspects(arm.folder), problem=str(problem))
+        return [error(file, Subject("meshes"), whole)]
     middle = [(joint.lower + joint.upper) / 2 if math.isfinite(joint.lower) else 0.0 for joint in arm.joints]
     other.update_cfg(dict(zip(arm.joint_names, middle, strict=True)))
     theirs = other.get_transform(arm.tool_frame, arm.base_frame)[:3, 3]
@@ -150,10 +156,10 @@ def check_with_yourdfpy(arm: ArmDescription) -> list[Finding]:
     ours = [b - a for a, b in zip(base, tool, strict=True)]
     off = max(abs(a - b) for a, b in zip(ours, theirs, strict=True))
     if off > TOLERANCE:
-        return [error(file, f'link "{arm.tool_frame}"', f"is {off:.3g} m from where yourdfpy puts it")]
+        return [error(file, Subject("link", arm.tool_frame), because("urdf.other_place", distance=off))]
     return []
 
 
-def _suspects(folder: Path) -> str:
-    names = sorted(path.name for path in folder.glob("meshes/*"))
-    return f"export the mesh again; in meshes/: {', '.join(names)}" if names else "correct the URDF"
+def _suspects(folder: Path) -> Remedy:
+    names = tuple(sorted(path.name for path in folder.glob("meshes/*")))
+    return remedy("export_one_again", names=names) if names else remedy("correct_urdf")

@@ -6,6 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+import msgspec
+
+from gemelo.libraries.arm.errors import Subject
+from gemelo.schemas.reasons import PLAIN, Reason, Remedy, because, plain, say
+
 
 class Severity(StrEnum):
     """An error must be corrected before the arm moves; a warning is reported only; a note is nothing wrong."""
@@ -17,40 +22,80 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One mistake: its subject, a sentence with the value, and the remedy."""
+    """One mistake: its subject, and what is wrong with the value and the remedies."""
 
     severity: Severity
     file: str
-    subject: str  # for example: joint "brazo_joint"
-    message: str
-    remedy: str = ""
+    of: Subject
+    what: Reason
     line: int = 0  # of the file, from 1; 0 where it is of no line
     also: tuple[int, ...] = ()  # further lines of the same mistake
 
-    def __str__(self) -> str:
-        remedy = f" -> {self.remedy}" if self.remedy else ""
-        line = f", line {self.line}" if self.line else ""
+    @property
+    def subject(self) -> str:
+        """In English."""
+        return str(self.of)
+
+    @property
+    def message(self) -> str:
+        """What is wrong, in English, without the remedy."""
+        return str(without_remedies(self.what))
+
+    @property
+    def remedy(self) -> str:
+        """In English; empty where none is known."""
+        return say(because("finding.remedy", *self.what.remedies)) if self.what.remedies else ""
+
+    @property
+    def reason(self) -> Reason:
+        """All of it, with its place."""
+        found, remedies = self.of.around(without_remedies(self.what)), self.what.remedies
+        where = {"severity": str(self.severity), "file": self.file}
         if self.also:
-            line = f", lines {', '.join(map(str, (self.line, *self.also[:-1])))} and {self.also[-1]}"
-        return f"{self.severity}: {self.file}{line}: {self.subject}: {self.message}{remedy}"
+            before = ", ".join(map(str, (self.line, *self.also[:-1])))
+            code = "finding.at_lines.mend" if remedies else "finding.at_lines"
+            return because(code, found, *remedies, **where, lines_before=before, last=self.also[-1])
+        if self.line:
+            code = "finding.at_line.mend" if remedies else "finding.at_line"
+            return because(code, found, *remedies, **where, line=self.line)
+        return because("finding.in_file.mend" if remedies else "finding.in_file", found, *remedies, **where)
+
+    def __str__(self) -> str:
+        return str(self.reason)
+
+
+def without_remedies(reason: Reason) -> Reason:
+    """The reason alone."""
+    return msgspec.structs.replace(reason, remedies=())
 
 
 def once(findings: Iterable[Finding]) -> list[Finding]:
     """Each mistake once, at its first place, with all its lines: most are in <visual> and in <collision>."""
-    found: dict[Finding, list[int]] = {}
+    found: dict[bytes, tuple[Finding, list[int]]] = {}
     for each in findings:
-        lines = found.setdefault(replace(each, line=0, also=()), [])
+        key = msgspec.json.encode(replace(each, line=0, also=()))
+        _, lines = found.setdefault(key, (each, []))
         lines += [line for line in (each.line, *each.also) if line not in lines]
-    return [replace(each, line=lines[0], also=tuple(lines[1:])) for each, lines in found.items()]
+    return [replace(each, line=lines[0], also=tuple(lines[1:])) for each, lines in found.values()]
 
 
-def error(file: str, subject: str, message: str, remedy: str = "", line: int = 0) -> Finding:
-    return Finding(Severity.ERROR, file, subject, message, remedy, line)
+def error(file: str, subject: Subject | str, what: Reason | str, remedy: str = "", line: int = 0) -> Finding:
+    return _found(Severity.ERROR, file, subject, what, remedy, line)
 
 
-def note(file: str, subject: str, message: str, remedy: str = "", line: int = 0) -> Finding:
-    return Finding(Severity.NOTE, file, subject, message, remedy, line)
+def note(file: str, subject: Subject | str, what: Reason | str, remedy: str = "", line: int = 0) -> Finding:
+    return _found(Severity.NOTE, file, subject, what, remedy, line)
 
 
-def warning(file: str, subject: str, message: str, remedy: str = "", line: int = 0) -> Finding:
-    return Finding(Severity.WARNING, file, subject, message, remedy, line)
+def warning(file: str, subject: Subject | str, what: Reason | str, remedy: str = "", line: int = 0) -> Finding:
+    return _found(Severity.WARNING, file, subject, what, remedy, line)
+
+
+def _found(
+    severity: Severity, file: str, subject: Subject | str, what: Reason | str, remedy: str, line: int
+) -> Finding:
+    """Texts are sentences, subjects and remedies that have no code."""
+    why = plain(what) if isinstance(what, str) else what
+    if remedy:
+        why = msgspec.structs.replace(why, remedies=(*why.remedies, Remedy(code=PLAIN, values={"text": remedy})))
+    return Finding(severity, file, Subject(subject) if isinstance(subject, str) else subject, why, line)

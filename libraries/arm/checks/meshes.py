@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gemelo.libraries.arm.checks.findings import Finding, error, warning
+from gemelo.libraries.arm.errors import Subject
 from gemelo.libraries.arm.model.urdf import Geometry, UrdfLink, UrdfModel
+from gemelo.schemas.reasons import Reason, because, remedy
 
 if TYPE_CHECKING:
     import trimesh
@@ -24,9 +26,9 @@ MOST_TRIANGLES = 500_000  # of a file: beyond it a viewer is slow, and shapes ar
 FLAT = 1e-3  # thickness as a share of the longest side below which a mesh bounds no volume
 LIGHTEST, HEAVIEST = 15.0, 20_000.0  # [kg/m^3] light foam, tungsten: no part of an arm is beyond
 COLLADA_UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([0-9.eE+-]+)")
-LFS_POINTER, IS_POINTER = b"version https://git-lfs", "it is not the mesh, but a pointer to it of Git LFS"
+LFS_POINTER, IS_POINTER = b"version https://git-lfs", because("mesh.pointer")
 ALONE, MOST_KNOWN = (".stl", ".ply", ".glb"), 256  # formats of one file; of how many files facts are kept
-MILLIMETRE_REMEDY = 'write scale="0.001 0.001 0.001"'
+IN_MM = "mesh.millimetres"
 
 
 @dataclass(frozen=True)
@@ -49,15 +51,15 @@ class MeshFacts:
         return self.thickness < FLAT * self.longest
 
 
-_KNOWN: dict[tuple[str, bytes], MeshFacts | str] = {}  # by format and content
-Facts = Callable[[Geometry], MeshFacts | str | None]
+_KNOWN: dict[tuple[str, bytes], MeshFacts | Reason] = {}  # by format and content
+Facts = Callable[[Geometry], MeshFacts | Reason | None]
 
 
 def mesh_facts(folder: Path) -> Facts:
     """Of the meshes of a robot's folder, each file read once."""
-    known: dict[str, MeshFacts | str] = {}
+    known: dict[str, MeshFacts | Reason] = {}
 
-    def facts(geometry: Geometry) -> MeshFacts | str | None:
+    def facts(geometry: Geometry) -> MeshFacts | Reason | None:
         if geometry.mesh is None:
             return None
         if geometry.mesh not in known:
@@ -83,7 +85,7 @@ def scene_of(file: Path) -> trimesh.Scene:
     return scene
 
 
-def facts_of(file: Path) -> MeshFacts | str:
+def facts_of(file: Path) -> MeshFacts | Reason:
     """Of a mesh file, or why it cannot be read; a copy of a file that stands alone is not read again."""
     if _is_pointer(file):
         return IS_POINTER
@@ -97,18 +99,18 @@ def facts_of(file: Path) -> MeshFacts | str:
     return _KNOWN[key]
 
 
-def _read_facts(file: Path) -> MeshFacts | str:
+def _read_facts(file: Path) -> MeshFacts | Reason:
     try:
         mesh = scene_of(file).to_mesh()
     except ImportError as problem:
-        return f"there is no reader for {file.suffix}: {problem}"
+        return because("mesh.no_reader", ending=file.suffix, problem=str(problem))
     except Exception as problem:  # whatever its many readers raise for a damaged file
-        return f"it cannot be read: {problem or 'it is damaged'}"
+        return because("mesh.unreadable", problem=str(problem)) if str(problem) else because("mesh.damaged")
     if not len(mesh.faces):
-        return "it holds no triangle"
+        return because("mesh.empty")
     used = np.asarray(mesh.vertices, dtype=float)[np.unique(mesh.faces)]
     if not np.isfinite(used).all():
-        return "a corner of it is not finite"
+        return because("mesh.not_finite")
     longest = float(np.ptp(used, axis=0).max())
     box = tuple(used.min(axis=0).tolist()), tuple(used.max(axis=0).tolist()), len(mesh.faces)
     try:
@@ -143,8 +145,8 @@ def check_meshes(model: UrdfModel, file: str, facts: Facts, sized: Container[str
         for geometry in (*link.visuals, *link.collisions):
             if geometry.mesh is not None and geometry.mesh not in seen:
                 seen.add(geometry.mesh)
-                found = _mesh(geometry, facts(geometry), f'link "{link.name}"', file)
-                findings += [each for each in found if geometry.mesh not in sized or each.remedy != MILLIMETRE_REMEDY]
+                found = _mesh(geometry, facts(geometry), Subject("link", link.name), file)
+                findings += [each for each in found if geometry.mesh not in sized or each.what.code != IN_MM]
         findings += _density(link, file, facts)
     return findings
 
@@ -154,22 +156,24 @@ def is_in_millimetres(geometry: Geometry, facts: MeshFacts) -> bool:
     return facts.longest * max(map(abs, geometry.scale)) > IN_MILLIMETRES
 
 
-def _mesh(geometry: Geometry, facts: MeshFacts | str | None, subject: str, file: str) -> list[Finding]:
+def _mesh(geometry: Geometry, facts: MeshFacts | Reason | None, subject: Subject, file: str) -> list[Finding]:
     if facts is None:
         return []
-    mesh, line = f'mesh "{geometry.mesh}"', geometry.line
-    if isinstance(facts, str):
-        remedy = "give `git lfs pull` where it is from" if facts == IS_POINTER else "export it again, as .stl or .obj"
-        return [error(file, subject, f"{mesh}: {facts}", remedy, line)]
+    mesh, line = geometry.mesh or "", geometry.line
+    if isinstance(facts, Reason):
+        mend = remedy("git_lfs_pull") if facts == IS_POINTER else remedy("export_as_stl")
+        return [error(file, subject, because("mesh.wrong", facts, mend, mesh=mesh), line=line)]
     longest = facts.longest * max(map(abs, geometry.scale))
     if is_in_millimetres(geometry, facts):
-        return [error(file, subject, f"{mesh} is {longest:.4g} m long: it is in millimetres", MILLIMETRE_REMEDY, line)]
+        mend = remedy("write_line", text='scale="0.001 0.001 0.001"')
+        return [error(file, subject, because(IN_MM, mend, mesh=mesh, length=longest), line=line)]
     if longest < SMALLEST:
-        return [warning(file, subject, f"{mesh} is {1000.0 * longest:.3g} mm long", "see its scale", line)]
+        what = because("mesh.small", remedy("see_its_scale"), mesh=mesh, length=longest)
+        return [warning(file, subject, what, line=line)]
     if facts.is_flat:
-        thickness = 1000.0 * facts.thickness * max(map(abs, geometry.scale))  # [mm]
-        message = f"{mesh} bounds no volume: it is {thickness:.2g} mm thick"
-        return [warning(file, subject, message, "export the solid, or leave it out", line)]
+        thickness = facts.thickness * max(map(abs, geometry.scale))
+        what = because("mesh.flat", remedy("export_the_solid"), mesh=mesh, thickness=thickness)
+        return [warning(file, subject, what, line=line)]
     return []
 
 
@@ -181,10 +185,9 @@ def _density(link: UrdfLink, file: str, facts: Facts) -> list[Finding]:
     density = link.inertial.mass / volume
     if LIGHTEST <= density <= HEAVIEST:
         return []
-    message = (
-        f"{link.inertial.mass:g} kg in {1e6 * volume:.4g} cm^3 are {density:.3g} kg/m^3: no material has that density"
-    )
-    return [warning(file, f'link "{link.name}"', message, "correct its mass, or the unit of its meshes", link.line)]
+    mend, mass = remedy("correct_mass_or_unit"), link.inertial.mass
+    what = because("mesh.density", mend, mass=mass, volume=1e6 * volume, density=density)
+    return [warning(file, Subject("link", link.name), what, line=link.line)]
 
 
 def link_volume(link: UrdfLink, facts: Facts) -> float:

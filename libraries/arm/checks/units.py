@@ -7,9 +7,13 @@ import statistics
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import msgspec
+
 from gemelo.libraries.arm.checks.findings import Finding, Severity, error, warning
 from gemelo.libraries.arm.checks.meshes import IN_MILLIMETRES
+from gemelo.libraries.arm.errors import Subject
 from gemelo.libraries.arm.model.urdf import Inertial, Origin, UrdfModel
+from gemelo.schemas.reasons import Reason, Value, because, remedy
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 FARTHEST = 50.0  # [m] all joints together: in millimetres every arm above 5 cm is beyond it, in metres none
@@ -17,14 +21,13 @@ NO_LENGTH = 1e-6  # [m] below which an origin is where its parent is
 MOST_TURN = 1.001 * math.tau  # [rad] of an rpy: two turns say nothing that one does not
 HEAVIEST = 1000.0  # [kg] of all links: only the largest industrial arms are above
 LARGEST_GYRATION = IN_MILLIMETRES  # [m] radius of gyration: beyond it no link's mass is
-MILLIMETRES_REMEDY = "`gemelo import` writes it in metres; or multiply its lengths by 0.001"
 
 
 class Length(NamedTuple):
-    """One length of a URDF: what has it, its name there, its size [m], how to write it if it is in millimetres."""
+    """One length of a URDF: what has it, its element there, its size [m], how to write it if it is in millimetres."""
 
-    subject: str
-    name: str
+    of: Subject
+    element: str
     size: float
     meant: str
     line: int
@@ -37,9 +40,8 @@ def check_units(model: UrdfModel, file: str) -> list[Finding]:
     weights = [link.inertial.mass if link.inertial else 0.0 for link in model.links]
     if sum(weights) > HEAVIEST:
         heaviest = model.links[weights.index(max(weights))]
-        message = f'its links weigh {sum(weights):.4g} kg in all, "{heaviest.name}" {max(weights):.4g} kg'
-        remedy = "are these grams? then divide every <mass> by 1000"
-        found.append(warning(file, "robot", message, remedy, heaviest.line))
+        what = because("urdf.mass.all", remedy("grams"), mass=sum(weights), link=heaviest.name, heaviest=max(weights))
+        found.append(warning(file, Subject("robot"), what, line=heaviest.line))
     return found
 
 
@@ -50,12 +52,14 @@ def is_drawn_in_millimetres(model: UrdfModel) -> bool:
     return usual and sum(joints) + max(shapes, default=0.0) > FARTHEST
 
 
-def in_millimetres_message(model: UrdfModel) -> tuple[str, int]:
+def in_millimetres_reason(model: UrdfModel) -> tuple[Reason, int]:
     """What says so, and the line of its longest length."""
     joints, longest = list(joint_lengths(model)), max(_all_lengths(model), key=lambda each: each.size)
-    span = f"its joints span {sum(each.size for each in joints):.4g} m, " if joints else ""
-    message = f"{span}{longest.name} of {longest.subject} is {longest.size:.4g} m: it is in millimetres"
-    return message, longest.line
+    element, kind, name = longest.element, longest.of.kind, longest.of.name
+    thing: dict[str, Value] = {"element": element, "kind": kind, "name": name, "length": longest.size}
+    if not joints:
+        return because("urdf.millimetres", **thing), longest.line
+    return because("urdf.millimetres.span", span=sum(each.size for each in joints), **thing), longest.line
 
 
 def gyration(inertial: Inertial, highest: float) -> float:
@@ -68,7 +72,7 @@ def joint_lengths(model: UrdfModel) -> Iterator[Length]:
     for joint in model.joints:
         size = math.hypot(*joint.origin.xyz)
         if size > NO_LENGTH:
-            yield Length(f'joint "{joint.name}"', "the origin", size, _xyz(joint.origin), joint.line)
+            yield Length(Subject("joint", joint.name), "<origin>", size, _xyz(joint.origin), joint.line)
 
 
 def shape_lengths(model: UrdfModel) -> Iterator[Length]:
@@ -77,20 +81,21 @@ def shape_lengths(model: UrdfModel) -> Iterator[Length]:
         for shape in (*link.visuals, *link.collisions):
             if shape.size:
                 meant = " x ".join(f"{0.001 * value:.6g}" for value in shape.size)
-                yield Length(f'link "{link.name}"', f"<{shape.shape}>", max(shape.size), meant, shape.line)
+                yield Length(Subject("link", link.name), f"<{shape.shape}>", max(shape.size), meant, shape.line)
 
 
 def _lengths(model: UrdfModel, file: str) -> Iterator[Finding]:
     if is_drawn_in_millimetres(model):
-        message, line = in_millimetres_message(model)
-        yield error(file, "robot", message, MILLIMETRES_REMEDY, line)
+        what, line = in_millimetres_reason(model)
+        whole = msgspec.structs.replace(what, remedies=(remedy("import_or_scale"),))
+        yield error(file, Subject("robot"), whole, line=line)
         return
     for each in _all_lengths(model):
         if each.size > IN_MILLIMETRES:
             severity = Severity.ERROR if each.size > FARTHEST else Severity.WARNING
-            message = f"{each.name} is {each.size:.4g} m"
-            remedy = f"is that in mm? then write {each.meant}"
-            yield Finding(severity, file, each.subject, message, remedy, each.line)
+            mend = remedy("in_mm_then_write", text=each.meant)
+            what = because("urdf.length", mend, element=each.element, length=each.size)
+            yield Finding(severity, file, each.of, what, each.line)
 
 
 def _all_lengths(model: UrdfModel) -> Iterator[Length]:
@@ -100,21 +105,21 @@ def _all_lengths(model: UrdfModel) -> Iterator[Length]:
         for role, shapes in (("visual", link.visuals), ("collision", link.collisions)):
             for shape in shapes:
                 origin, size = shape.origin, math.hypot(*shape.origin.xyz)
-                yield Length(f'link "{link.name}"', f"the origin of <{role}>", size, _xyz(origin), shape.line)
+                yield Length(Subject("link", link.name), f"<{role}> <origin>", size, _xyz(origin), shape.line)
 
 
 def _turns(model: UrdfModel, file: str) -> Iterator[Finding]:
     """Of every joint and shape that is turned by more than a turn."""
-    turned = [(f'joint "{joint.name}"', joint.origin, joint.line) for joint in model.joints]
+    turned = [(Subject("joint", joint.name), joint.origin, joint.line) for joint in model.joints]
     for link in model.links:
         shapes = (*link.visuals, *link.collisions)
-        turned += [(f'link "{link.name}"', shape.origin, shape.line) for shape in shapes]
+        turned += [(Subject("link", link.name), shape.origin, shape.line) for shape in shapes]
     for subject, origin, line in turned:
         if max(map(abs, origin.rpy)) > MOST_TURN:
             written = " ".join(f"{value:.6g}" for value in origin.rpy)
             meant = " ".join(f"{math.radians(value):.6g}" for value in origin.rpy)
-            message = f'rpy="{written}" is more than a turn'
-            yield warning(file, subject, message, f'are these degrees? then write rpy="{meant}"', line)
+            what = because("urdf.rpy", remedy("in_degrees_then_write", text=f'rpy="{meant}"'), rpy=written)
+            yield warning(file, subject, what, line=line)
 
 
 def _xyz(origin: Origin) -> str:

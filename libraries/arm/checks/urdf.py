@@ -6,6 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from gemelo.libraries.arm.checks.findings import Finding, error, warning
 from gemelo.libraries.arm.checks.units import LARGEST_GYRATION, check_units, gyration
-from gemelo.libraries.arm.errors import nearest_name, suggestion
+from gemelo.libraries.arm.errors import Subject, nearest, nearest_name
 from gemelo.libraries.arm.model.description import ROUNDING
 from gemelo.libraries.arm.model.urdf import (
     NO_SHAPE,
@@ -26,16 +27,15 @@ from gemelo.libraries.arm.model.urdf import (
     UrdfModel,
 )
 from gemelo.libraries.arm.model.xml_reader import XmlFault
+from gemelo.schemas.reasons import Reason, Remedy, because, remedy
 
-UNTOUCHED = "can be seen but not touched: it has no <collision>"
-COLLISION_REMEDY = "add a box or a cylinder, or let `gemelo collision fit --meshes` fit some"
+UNTOUCHED = because("urdf.link.untouched")
 MESHES = (".stl", ".obj", ".dae", ".glb", ".gltf", ".ply")
 SHAPES = ("box", "cylinder", "sphere", "mesh")
 MOST_TRAVEL = {JointKind.REVOLUTE: 4.01 * math.tau, JointKind.PRISMATIC: 5.0}  # [rad] or [m]
 LEAST_TURN = 0.99 * math.tau  # [rad] of a continuous joint: limits of a whole turn say nothing
 MOST_VELOCITY = {JointKind.REVOLUTE: 50.0, JointKind.CONTINUOUS: 50.0, JointKind.PRISMATIC: 10.0}  # [rad/s] or [m/s]
-FRAME_REMEDY = "leave <inertial> out where the link is a mere frame, else give a mass above 0"
-LEADER_REMEDY = "name the joint that has the motor in <mimic>"
+LEADER = remedy("name_the_leader")
 PLACEHOLDER_EFFORTS = (100.0, 300.0, 1000.0)  # what exporters write when nobody thought about it
 
 
@@ -64,7 +64,7 @@ def check_urdf(model: UrdfModel, path: Path, has_meshes: bool = True) -> list[Fi
 
 def fault_finding(fault: XmlFault, file: str) -> Finding:
     """What could not be read, as a finding."""
-    return error(file, fault.where, fault.message, fault.remedy, fault.line)
+    return error(file, fault.of, fault.what, line=fault.line)
 
 
 def _tree(model: UrdfModel, file: str) -> list[Finding]:
@@ -77,21 +77,20 @@ def _tree(model: UrdfModel, file: str) -> list[Finding]:
             lines[thing.name].append(thing.line)
         for name, found in lines.items():
             if len(found) > 1 and name:
-                subject, message = f'{what} "{name}"', f"is there {len(found)} times"
-                findings.append(_at(found, file, subject, message, "names are unique: rename or remove one"))
+                twice = because("urdf.name.twice", remedy("rename_or_remove"), count=len(found))
+                findings.append(_at(found, file, Subject(what, name), twice))
     above = defaultdict[str, list[UrdfJoint]](list)
     for joint in model.joints:
         above[joint.child].append(joint)
     for name, joints in above.items():
         if len(joints) > 1 and name:
-            message = f"is the child of {len(joints)} joints: {_quoted(joints)}"
-            remedy = "a link has one parent: remove one of these joints, as no loop is followed"
-            findings.append(_at([joint.line for joint in joints], file, f'link "{name}"', message, remedy))
+            several = because("urdf.link.parents", remedy("one_parent"), count=len(joints), joints=_names(joints))
+            findings.append(_at([joint.line for joint in joints], file, Subject("link", name), several))
     roots = [link for link in model.links if link.name not in above]
     if len(roots) > 1:
-        message = f"has {len(roots)} roots ({', '.join(root.name for root in roots)})"
-        remedy = "join them with a fixed joint, or remove what is no part of the arm"
-        findings.append(_at([root.line for root in roots], file, "tree", message, remedy))
+        links = tuple(root.name for root in roots)
+        several = because("urdf.roots", remedy("join_or_remove"), count=len(roots), links=links)
+        findings.append(_at([root.line for root in roots], file, Subject("tree"), several))
     return [*findings, *_rings(model, above, file)]
 
 
@@ -109,19 +108,18 @@ def _rings(model: UrdfModel, above: dict[str, list[UrdfJoint]], file: str) -> It
             continue
         ring = passed[passed.index(above[link][-1]) :][::-1]
         said |= {joint.name for joint in passed}
-        message = f"is not connected to a root: its joints form a ring, {_quoted(ring)}"
-        remedy = "correct <parent> or <child> of the joint that closes it, or remove that joint"
-        yield _at([joint.line for joint in ring], file, f'link "{link}"', message, remedy)
+        what = because("urdf.ring", remedy("open_the_ring"), joints=_names(ring))
+        yield _at([joint.line for joint in ring], file, Subject("link", link), what)
 
 
-def _at(lines: list[int], file: str, subject: str, message: str, remedy: str) -> Finding:
+def _at(lines: list[int], file: str, subject: Subject, what: Reason) -> Finding:
     """An error in several lines."""
     first, *others = sorted(set(lines))
-    return replace(error(file, subject, message, remedy, first), also=tuple(others))
+    return replace(error(file, subject, what, line=first), also=tuple(others))
 
 
-def _quoted(joints: list[UrdfJoint]) -> str:
-    return ", ".join(f'"{joint.name}"' for joint in joints)
+def _names(joints: list[UrdfJoint]) -> tuple[str, ...]:
+    return tuple(joint.name for joint in joints)
 
 
 def _connected(model: UrdfModel, roots: list[str]) -> set[str]:
@@ -140,10 +138,9 @@ def _references(joint: UrdfJoint, model: UrdfModel, file: str) -> list[Finding]:
     findings = []
     for role, link in (("parent", joint.parent), ("child", joint.child)):
         if link and link not in model.link_names:
-            hint = suggestion(link, model.link_names)
-            message = f'its {role} "{link}" is no link{hint}'
-            remedy = f"write the name of a link in <{role}>"
-            findings.append(error(file, f'joint "{joint.name}"', message, remedy, joint.line))
+            near = nearest(link, model.link_names)
+            what = because("urdf.joint.no_link", near, remedy("name_a_link", role=role), role=role, link=link)
+            findings.append(error(file, Subject("joint", joint.name), what, line=joint.line))
     return [*findings, *_mimic(joint, model, file)]
 
 
@@ -151,25 +148,29 @@ def _mimic(joint: UrdfJoint, model: UrdfModel, file: str) -> list[Finding]:
     """A joint follows one that has a motor of its own."""
     if joint.mimic is None or joint.kind is JointKind.FIXED:
         return []
-    subject, name = f'joint "{joint.name}"', joint.mimic.joint
+    subject, name = Subject("joint", joint.name), joint.mimic.joint
     if name not in model.joint_names:
-        message = f'mimics "{name}", which is no joint{suggestion(name, model.joint_names)}'
-        return [error(file, subject, message, LEADER_REMEDY, joint.line)]
+        near = nearest(name, model.joint_names)
+        return [error(file, subject, because("urdf.mimic.none", near, LEADER, leader=name), line=joint.line)]
     leader = model.joint(name)
     if leader.kind is JointKind.FIXED or leader.mimic is not None:
-        how = "is fixed" if leader.kind is JointKind.FIXED else "follows another itself"
-        how = "is this very joint" if name == joint.name else how
-        return [error(file, subject, f'mimics "{name}", which {how}', LEADER_REMEDY, joint.line)]
+        what = because("urdf.mimic.follows", LEADER, leader=name)
+        if leader.kind is JointKind.FIXED:
+            what = because("urdf.mimic.fixed", LEADER, leader=name)
+        if name == joint.name:
+            what = because("urdf.mimic.itself", LEADER)
+        return [error(file, subject, what, line=joint.line)]
     reach = follower_range(joint, leader)
     if reach is None:
         return []
-    message = f'follows "{name}" from {reach.low:.6g} to {reach.high:.6g}, beyond its own limits'
-    message += f" {reach.lower:g} to {reach.upper:g}"
-    if reach.narrow is None:
-        remedy = f'correct its <limit> or <mimic>: within it "{name}" has no travel'
-        return [error(file, subject, message, remedy, joint.line)]
-    remedy = f'narrow the limits of "{name}" to {reach.narrow[0]:.6g} and {reach.narrow[1]:.6g}, or correct <mimic>'
-    return [warning(file, subject, message, remedy, joint.line)]
+    mend = remedy("correct_limit_or_mimic", joint=name)
+    if reach.narrow is not None:
+        mend = remedy("narrow_limits", joint=name, lower=reach.narrow[0], upper=reach.narrow[1])
+    what = because(
+        "urdf.mimic.beyond", mend, leader=name, low=reach.low, high=reach.high, lower=reach.lower, upper=reach.upper
+    )
+    made = error if reach.narrow is None else warning
+    return [made(file, subject, what, line=joint.line)]
 
 
 def follower_range(joint: UrdfJoint, leader: UrdfJoint) -> FollowerRange | None:
@@ -191,113 +192,112 @@ def follower_range(joint: UrdfJoint, leader: UrdfJoint) -> FollowerRange | None:
 
 
 def _link(link: UrdfLink, path: Path, has_meshes: bool) -> list[Finding]:
-    subject = f'link "{link.name}"'
+    subject = Subject("link", link.name)
     findings = [] if link.inertial is None else _inertial(link.inertial, subject, path.name, link.line)
     for role, shapes in (("visual", link.visuals), ("collision", link.collisions)):
         for geometry in shapes:
             if has_meshes or geometry.mesh is None:
                 findings += _geometry(geometry, role, subject, path)
     if has_meshes and link.visuals and not link.collisions:
-        findings.append(warning(path.name, subject, UNTOUCHED, COLLISION_REMEDY, link.line))
+        what = because("urdf.link.untouched", remedy("add_collision"))
+        findings.append(warning(path.name, subject, what, line=link.line))
     return findings
 
 
-def _geometry(geometry: Geometry, role: str, subject: str, path: Path) -> list[Finding]:
+def _geometry(geometry: Geometry, role: str, subject: Subject, path: Path) -> list[Finding]:
     if geometry.shape == NO_SHAPE:
         return []
     if geometry.shape not in SHAPES:
-        remedy = "write <cylinder>" if geometry.shape == "capsule" else f"use {', '.join(SHAPES)}"
-        message = f"<{geometry.shape}> in <{role}> is not URDF and would be ignored"
-        return [error(path.name, subject, message, remedy, geometry.line)]
+        mend = remedy("write_line", text="<cylinder>") if geometry.shape == "capsule" else remedy("use", names=SHAPES)
+        what = because("urdf.shape.unknown", mend, shape=geometry.shape, role=role)
+        return [error(path.name, subject, what, line=geometry.line)]
     if geometry.mesh is None:
         return []
     if geometry.mesh.startswith("package://"):
         return [_package(geometry.mesh, subject, path, geometry.line)]
     if not (path.parent / geometry.mesh.removeprefix("file://")).is_file():
-        message = f'mesh "{geometry.mesh}" is not there{_near_mesh(geometry.mesh, path.parent)}'
-        return [error(path.name, subject, message, "put the file there", geometry.line)]
+        near = _near_mesh(geometry.mesh, path.parent)
+        what = because("mesh.none", *near, remedy("put_file_there"), mesh=geometry.mesh)
+        return [error(path.name, subject, what, line=geometry.line)]
     return []
 
 
-def _near_mesh(reference: str, folder: Path) -> str:
-    """A hint at the file that may be meant: one that differs in folder or ending alone, else one of a like name."""
+def _near_mesh(reference: str, folder: Path) -> tuple[Remedy, ...]:
+    """The file that may be meant: one that differs in folder or ending alone, else one of a like name."""
     files = [each for each in folder.glob("**/*") if each.suffix.lower() in MESHES]
     same = [each for each in files if each.stem.lower() == Path(reference).stem.lower()]
     if same:
-        return f'; did you mean "{same[0].relative_to(folder)}"?'
+        return (remedy("did_you_mean", name=str(same[0].relative_to(folder))),)
     near = nearest_name(Path(reference).name, [each.name for each in files])
-    return next((f'; did you mean "{each.relative_to(folder)}"?' for each in files if each.name == near), "")
+    found = (remedy("did_you_mean", name=str(each.relative_to(folder))) for each in files if each.name == near)
+    return tuple(islice(found, 1))
 
 
-def _package(reference: str, subject: str, path: Path, line: int) -> Finding:
+def _package(reference: str, subject: Subject, path: Path, line: int) -> Finding:
     """A package:// path means nothing without ROS: say where the file is, if it is in this folder."""
     name = reference.rsplit("/", 1)[-1]
     found = sorted(path.parent.rglob(name))
-    remedy = (
-        f'write filename="{found[0].relative_to(path.parent)}"'
+    mend = (
+        remedy("write_line", text=f'filename="{found[0].relative_to(path.parent)}"')
         if found
-        else f"put {name} into this folder and write its path relative to {path.name}"
+        else remedy("put_into_folder", name=name, file=path.name)
     )
-    return error(path.name, subject, f'mesh "{reference}" is a ROS package path', remedy, line)
+    return error(path.name, subject, because("mesh.package", mend, mesh=reference), line=line)
 
 
 def _limits(joint: UrdfJoint, file: str) -> list[Finding]:
-    subject, limit, line = f'joint "{joint.name}"', joint.limit, joint.line
+    subject, limit, line = Subject("joint", joint.name), joint.limit, joint.line
     if limit is None:
-        return [error(file, subject, "has no <limit>", "give lower, upper, effort and velocity", line)]
+        return [error(file, subject, because("urdf.limit.none", remedy("give_limits")), line=line)]
     findings = _travel(joint.kind, limit, subject, file, line)
     for name, value in (("velocity", limit.velocity), ("effort", limit.effort)):
         if not value > 0.0:
-            findings.append(error(file, subject, f"its {name} limit is {value:g}", "give a value above 0", line))
+            what = because("urdf.limit.zero", remedy("above_zero"), quantity=name, value=value)
+            findings.append(error(file, subject, what, line=line))
     if limit.velocity > MOST_VELOCITY[joint.kind]:
         slides = joint.kind is JointKind.PRISMATIC
-        message = f"its velocity limit of {limit.velocity:g} {'m/s' if slides else 'rad/s'} is implausible"
-        asked = "are these mm/s?" if slides else "are these degrees per second?"
-        findings.append(warning(file, subject, message, asked, line))
+        mend, unit = (remedy("mm_per_s"), "m/s") if slides else (remedy("degrees_per_s"), "rad/s")
+        what = because("urdf.limit.velocity", mend, value=limit.velocity, unit=unit)
+        findings.append(warning(file, subject, what, line=line))
     if limit.effort in PLACEHOLDER_EFFORTS:
-        message = f"effort {limit.effort:g} looks like an exporter's placeholder"
-        findings.append(warning(file, subject, message, "give the motor's own", line))
+        what = because("urdf.limit.effort", remedy("motors_own"), value=limit.effort)
+        findings.append(warning(file, subject, what, line=line))
     return findings
 
 
-def _travel(kind: JointKind, limit: Limit, subject: str, file: str, line: int) -> list[Finding]:
+def _travel(kind: JointKind, limit: Limit, subject: Subject, file: str, line: int) -> list[Finding]:
     travel = limit.upper - limit.lower
     if kind is JointKind.CONTINUOUS:
         if not 0.0 < travel < LEAST_TURN:
             return []
-        message = f"is continuous, which turns beyond its limits {limit.lower:g} to {limit.upper:g}"
-        return [warning(file, subject, message, 'write type="revolute" where it must stay within them', line)]
+        what = because("urdf.limit.continuous", remedy("make_revolute"), lower=limit.lower, upper=limit.upper)
+        return [warning(file, subject, what, line=line)]
     if not travel > 0.0:
-        message = f"limits {limit.lower:g} to {limit.upper:g} leave no travel"
-        return [error(file, subject, message, "give lower < upper", line)]
+        what = because("urdf.limit.no_travel", remedy("lower_below_upper"), lower=limit.lower, upper=limit.upper)
+        return [error(file, subject, what, line=line)]
     if travel > MOST_TRAVEL[kind]:
-        slides = kind is JointKind.PRISMATIC
-        message = f"travel of {travel:.4g} {'m is beyond 5 m' if slides else 'rad is beyond four turns'}"
-        return [warning(file, subject, message, "are these mm?" if slides else "are these degrees?", line)]
+        what = because("urdf.travel.turns", remedy("degrees"), travel=travel)
+        if kind is JointKind.PRISMATIC:
+            what = because("urdf.travel.metres", remedy("millimetres"), travel=travel)
+        return [warning(file, subject, what, line=line)]
     return []
 
 
-def _inertial(inertial: Inertial, subject: str, file: str, line: int) -> list[Finding]:
+def _inertial(inertial: Inertial, subject: Subject, file: str, line: int) -> list[Finding]:
     """A real body: positive mass, positive principal moments, none above the sum of the other two."""
     if not inertial.mass > 0.0:
-        return [error(file, subject, f"its mass is {inertial.mass:g} kg", FRAME_REMEDY, line)]
+        what = because("urdf.mass", remedy("leave_inertial_out"), mass=inertial.mass)
+        return [error(file, subject, what, line=line)]
     low, middle, high = principal_moments(inertial)
     if low <= 0.0:
-        message = f"a principal moment of inertia is {low:.3g} kg m^2"
-        return [error(file, subject, message, "they are all above 0", line)]
+        what = because("urdf.inertia.negative", remedy("all_above_zero"), value=low)
+        return [error(file, subject, what, line=line)]
     if low + middle < high * (1.0 - 1e-6):
-        return [
-            error(
-                file,
-                subject,
-                f"principal moments {low:.3g} + {middle:.3g} < {high:.3g} kg m^2: no body has such inertia",
-                "compute them from the shape; for a box m/12 (b^2 + c^2)",
-                line,
-            )
-        ]
-    if gyration(inertial, high) > LARGEST_GYRATION:
-        message = f"its mass would lie {gyration(inertial, high):.3g} m from its centre by its inertia"
-        return [warning(file, subject, message, "is <inertia> in kg mm^2 or g mm^2? write it in kg m^2", line)]
+        what = because("urdf.inertia.no_body", remedy("compute_inertia"), low=low, middle=middle, high=high)
+        return [error(file, subject, what, line=line)]
+    if (radius := gyration(inertial, high)) > LARGEST_GYRATION:
+        what = because("urdf.inertia.far", remedy("inertia_in_metres"), radius=radius)
+        return [warning(file, subject, what, line=line)]
     return []
 
 

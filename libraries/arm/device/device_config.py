@@ -8,7 +8,8 @@ from fractions import Fraction
 
 from msgspec import UNSET, UnsetType
 
-from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.errors import DescriptionError, Subject
+from gemelo.libraries.arm.errors import nearest as near_name
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.libraries.arm.model.gripper import pulse_speed
 from gemelo.libraries.arm.model.virtual_drive import MAX_NAME
@@ -25,6 +26,7 @@ from gemelo.schemas.device_config import (
     ServoConfig,
 )
 from gemelo.schemas.grippers.gripper import PulseDrive
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.robot import DigitalOutput, Homing, HomingDirection, Input, PinLevel, Sensor
 
 # Knots are rounded to 1/256 step and sampled from profiles that touch their limits.
@@ -41,7 +43,7 @@ def device_config(arm: ArmDescription) -> DeviceConfig:
     _require_counts(arm)
     device = arm.device
     return DeviceConfig(
-        name=device_name(device.name, "[device] name"),
+        name=device_name(device.name, Subject("device")),
         joints=tuple(_joint(joint, arm) for joint in arm.joints),
         tick_hz=device.tick_hz,
         queue_capacity=device.queue_capacity,
@@ -64,15 +66,15 @@ def reference_steps(arm: ArmDescription) -> tuple[int, ...]:
 
 
 def _joint(joint: Joint, arm: ArmDescription) -> JointConfig:
-    where, motor = f'joint "{joint.name}"', joint.drive.motor
+    where, motor = Subject("joint", joint.name), joint.drive.motor
     _require_tick(joint, arm.device.tick_hz)
     scale = joint.steps.per_unit * Q8 * HEADROOM
     return JointConfig(
-        name=device_name(joint.wire_name, f"{where}: wire_name"),
+        name=device_name(joint.wire_name, where._replace(part="wire_name")),
         lower_q8=_limit_q8(joint, joint.lower),
         upper_q8=_limit_q8(joint, joint.upper),
-        max_velocity_q8=int32(math.ceil(joint.velocity * scale), f"{where}: its velocity limit"),
-        max_acceleration_q8=int32(math.ceil(joint.acceleration * scale), f"{where}: its acceleration limit"),
+        max_velocity_q8=int32(math.ceil(joint.velocity * scale), where._replace(part="velocity")),
+        max_acceleration_q8=int32(math.ceil(joint.acceleration * scale), where._replace(part="acceleration")),
         inverted=motor.inverted,
         dir_setup_us=math.ceil(joint.driver.dir_setup_us),
         step_pin=pin_or_unused(motor.step_pin),
@@ -97,20 +99,21 @@ def _servo(arm: ArmDescription) -> ServoConfig | UnsetType:
 
 
 def _homing(homing: Homing, joint: Joint, arm: ArmDescription) -> HomingConfig:
-    where = f'joint "{joint.name}": homing'
+    where = Subject("joint", joint.name)
     names = [switch.name for switch in arm.inputs]
     if homing.switch not in names:
-        raise DescriptionError(f'{where}.switch "{homing.switch}" is no [[input]]{suggestion(homing.switch, names)}')
+        what = because("robot.homing.no_switch", near_name(homing.switch, names), switch=homing.switch)
+        raise DescriptionError(where.around(what))
     return HomingConfig(
         input=names.index(homing.switch),
         group=homing.group,
         direction=1 if homing.direction is HomingDirection.UPPER else -1,
-        fast_q8=_steps_q8(joint, homing.fast, f"{where}.fast"),
-        slow_q8=_steps_q8(joint, homing.slow, f"{where}.slow"),
-        back_off_q8=_steps_q8(joint, homing.back_off, f"{where}.back_off"),
-        position_q8=int32(joint.steps.to_q8(homing.position), f"{where}.position"),
-        max_travel_q8=_steps_q8(joint, _max_travel(homing, joint), f"{where}.max_travel"),
-        timeout_ms=int32(math.ceil(homing.timeout * 1000.0), f"{where}.timeout"),
+        fast_q8=_steps_q8(joint, homing.fast, where._replace(part="homing.fast")),
+        slow_q8=_steps_q8(joint, homing.slow, where._replace(part="homing.slow")),
+        back_off_q8=_steps_q8(joint, homing.back_off, where._replace(part="homing.back_off")),
+        position_q8=int32(joint.steps.to_q8(homing.position), where._replace(part="homing.position")),
+        max_travel_q8=_steps_q8(joint, _max_travel(homing, joint), where._replace(part="homing.max_travel")),
+        timeout_ms=int32(math.ceil(homing.timeout * 1000.0), where._replace(part="homing.timeout")),
     )
 
 
@@ -119,17 +122,14 @@ def _max_travel(homing: Homing, joint: Joint) -> float:
     if homing.max_travel is not None:
         return homing.max_travel
     if math.isinf(joint.upper - joint.lower):
-        raise DescriptionError(
-            f'joint "{joint.name}" turns without limits, so homing.max_travel has no default: write how far it may '
-            "turn on the way to its switch"
-        )
+        raise DescriptionError(Subject("joint", joint.name).around(because("robot.homing.no_max_travel")))
     return (joint.upper - joint.lower) * DEFAULT_TRAVEL_FACTOR
 
 
 def _sensor_hz(rate: int) -> int:
     if 1000 % rate:
         lower = next(divisor for divisor in range(rate, 0, -1) if 1000 % divisor == 0)
-        raise DescriptionError(f"[device] sensor_hz is {rate}, which does not divide 1000: write {lower}")
+        raise DescriptionError(because("robot.device.sensor_hz", value=rate, nearest=lower))
     return rate
 
 
@@ -137,30 +137,28 @@ def _require_counts(arm: ArmDescription) -> None:
     parts = {"joint": arm.joints, "input": arm.inputs, "output": arm.outputs, "sensor": arm.sensors}
     for kind, things in parts.items():
         if len(things) > MAX_COUNTS[kind]:
-            raise DescriptionError(f"{len(things)} [[{kind}]] are more than the {MAX_COUNTS[kind]} that a device has")
+            raise DescriptionError(because("robot.device.many", count=len(things), kind=kind, limit=MAX_COUNTS[kind]))
 
 
 def _require_tick(joint: Joint, tick_hz: int) -> None:
     tick_us = 1e6 / tick_hz
     needed_us = max(joint.driver.step_high_us, joint.driver.step_low_us)
     if tick_us < needed_us:
-        raise DescriptionError(
-            f'joint "{joint.name}": a tick of {tick_us:g} us is shorter than the {needed_us:g} us '
-            f"that its driver {joint.driver.name} needs; lower [device] tick_hz"
-        )
+        what = because("robot.device.tick", tick=tick_us * 1e-6, needed=needed_us * 1e-6, driver=joint.driver.name)
+        raise DescriptionError(Subject("joint", joint.name).around(what))
 
 
 def _limit_q8(joint: Joint, position: float) -> int:
     if math.isinf(position):
         return UNLIMITED_Q8 if position > 0 else -UNLIMITED_Q8
-    return int32(joint.steps.to_q8(position), f'joint "{joint.name}": its limit {position:g} {joint.unit}')
+    return int32(joint.steps.to_q8(position), Subject("joint", joint.name, "limit"))
 
 
-def _steps_q8(joint: Joint, value: float, where: str) -> int:
+def _steps_q8(joint: Joint, value: float, where: Subject) -> int:
     """[1/256 step] of a travel or speed that is not zero."""
     q8 = joint.steps.to_q8(value)
     if q8 < 1:
-        raise DescriptionError(f"{where} is {value:g}, less than 1/256 step: write at least one step")
+        raise DescriptionError(where.around(because("robot.wire.too_small", value=value)))
     return int32(q8, where)
 
 
@@ -172,7 +170,7 @@ def _text_scale(scale: StepScale) -> int:
 
 def input_config(switch: Input, arm: ArmDescription) -> InputConfig:
     """A switch; raises `DescriptionError` for a joint that is not there."""
-    where = f'input "{switch.name}"'
+    where = Subject("input", switch.name)
     return InputConfig(
         name=device_name(switch.name, where),
         pin=switch.pin,
@@ -183,24 +181,25 @@ def input_config(switch: Input, arm: ArmDescription) -> InputConfig:
     )
 
 
-def _joint_index(switch: Input, arm: ArmDescription, where: str) -> int:
+def _joint_index(switch: Input, arm: ArmDescription, where: Subject) -> int:
     if switch.role is InputRole.ESTOP:
         if switch.joint:
-            raise DescriptionError(f'{where}: an e-stop belongs to all joints, not to "{switch.joint}": remove `joint`')
+            what = because("robot.estop.joint", remedy("remove_key", key="joint"), joint=switch.joint)
+            raise DescriptionError(where.around(what))
         return UNUSED
     if not switch.joint:
-        raise DescriptionError(f"{where}: write the `joint` that this {switch.role} switch belongs to")
+        what = because("robot.switch.no_joint", remedy("write_key", key="joint"), role=str(switch.role))
+        raise DescriptionError(where.around(what))
     if switch.joint not in arm.joint_names:
-        raise DescriptionError(
-            f'{where}: there is no joint "{switch.joint}"{suggestion(switch.joint, arm.joint_names)}'
-        )
+        what = because("robot.joint.none", near_name(switch.joint, arm.joint_names), joint=switch.joint)
+        raise DescriptionError(where.around(what))
     return arm.joint_names.index(switch.joint)
 
 
 def output_config(output: DigitalOutput) -> OutputConfig:
     """A digital output."""
     return OutputConfig(
-        name=device_name(output.name, f'output "{output.name}"'),
+        name=device_name(output.name, Subject("output", output.name)),
         pin=output.pin,
         inverted=output.active is PinLevel.LOW,
         at_boot=output.at_boot,
@@ -210,14 +209,14 @@ def output_config(output: DigitalOutput) -> OutputConfig:
 
 def sensor_config(sensor: Sensor) -> SensorConfig:
     """A reading, its scale in 1/1000 of its unit."""
-    where = f'sensor "{sensor.name}"'
+    where = Subject("sensor", sensor.name)
     return SensorConfig(
         name=device_name(sensor.name, where),
         kind=sensor.kind,
         pin=sensor.pin,
         trigger_pin=pin_or_unused(sensor.trigger_pin),
-        scale_q16=int32(nearest(Fraction(sensor.scale) * 65_536_000), f"{where}: scale"),
-        offset_milli=int32(nearest(Fraction(sensor.offset) * 1000), f"{where}: offset"),
+        scale_q16=int32(nearest(Fraction(sensor.scale) * 65_536_000), where._replace(part="scale")),
+        offset_milli=int32(nearest(Fraction(sensor.offset) * 1000), where._replace(part="offset")),
     )
 
 
@@ -226,17 +225,17 @@ def nearest(value: Fraction) -> int:
     return math.floor(value + Fraction(1, 2))
 
 
-def int32(value: int, where: str) -> int:
+def int32(value: int, where: Subject) -> int:
     """`value`, if the wire's integers hold it; raises `DescriptionError`."""
     if not -(2**31) <= value < 2**31:
-        raise DescriptionError(f"{where} is {value} on the wire, which does not fit its 32 bits: make it smaller")
+        raise DescriptionError(where.around(because("robot.wire.range", value=value)))
     return value
 
 
-def device_name(text: str, where: str) -> str:
+def device_name(text: str, where: Subject) -> str:
     """`text`, if the firmware takes it as a name; raises `DescriptionError`."""
     if not NAME.fullmatch(text):
-        raise DescriptionError(f'{where} "{text}" is not 1 to {MAX_NAME} letters, digits, "_" or "-"')
+        raise DescriptionError(where.around(because("robot.device.name", name=text, limit=MAX_NAME)))
     return text
 
 

@@ -10,9 +10,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import wrong_file
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.model.urdf import UrdfJoint
+from gemelo.schemas.reasons import because
 
 Vector = NDArray[np.float64]
 
@@ -78,9 +79,8 @@ def _driver_of(arm: ArmDescription, joint: UrdfJoint) -> tuple[int, float, float
         offset += multiplier * joint.mimic.offset
         multiplier *= joint.mimic.multiplier
         if joint.mimic.joint in seen or joint.mimic.joint not in arm.model.joint_names:
-            raise DescriptionError(
-                f'{arm.urdf_path}: joint "{joint.name}" mimics "{joint.mimic.joint}": no such driver'
-            )
+            what = because("urdf.mimic.no_driver", joint=joint.name, leader=joint.mimic.joint)
+            raise wrong_file(arm.urdf_path, what)
         joint = arm.model.joint(joint.mimic.joint)
         seen.add(joint.name)
     return arm.joint_names.index(arm.joint(joint.name).name), multiplier, offset

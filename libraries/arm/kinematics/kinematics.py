@@ -9,11 +9,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import wrong_file
 from gemelo.libraries.arm.kinematics.joint_mapping import JointMapping
 from gemelo.libraries.arm.kinematics.self_collisions import SelfCollisionChecker
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.frames import Transform
+from gemelo.schemas.reasons import because
 
 Array = NDArray[np.float64]
 Positions = Sequence[float] | Array
@@ -98,7 +99,7 @@ class Kinematics:
     def _fixed_base(self) -> pin.SE3:
         frame = self._model.frames[frame_of_link(self._model, self.arm.base_frame)]
         if frame.parentJoint != 0:
-            raise DescriptionError(f'{self.arm.robot_path}: base_frame "{self.arm.base_frame}" moves with the joints')
+            raise wrong_file(self.arm.robot_path, because("robot.frame.moves", frame=self.arm.base_frame))
         return frame.placement.copy()
 
 

@@ -10,10 +10,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import wrong_file
 from gemelo.libraries.arm.kinematics.convex_meshes import convex_or_same
 from gemelo.libraries.arm.kinematics.joint_mapping import JointMapping
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.reasons import because, remedy
 
 Array = NDArray[np.float64]
 LinkPair = tuple[str, str]
@@ -97,15 +98,11 @@ def read_collision_geometry(arm: ArmDescription, model: pin.Model) -> pin.Geomet
         model, str(arm.urdf_path), pin.GeometryType.COLLISION, package_dirs=[str(arm.folder)]
     )
     if expected == 0:
-        raise DescriptionError(
-            f"{arm.urdf_path}: no link has a <collision>, so nothing would ever touch; "
-            f"`gemelo collision fit {arm.folder} --meshes --write` makes some from the meshes"
-        )
+        fit = remedy("fit_collisions", folder=str(arm.folder))
+        raise wrong_file(arm.urdf_path, because("urdf.collision.none", fit))
     if geometry.ngeoms != expected:
-        raise DescriptionError(
-            f"{arm.urdf_path}: {geometry.ngeoms} of {expected} collision shapes could be loaded; use box, cylinder, "
-            "sphere or mesh (<capsule> is not URDF)"
-        )
+        what = because("urdf.collision.not_loaded", remedy("use_shapes"), loaded=geometry.ngeoms, count=expected)
+        raise wrong_file(arm.urdf_path, what)
     for shape in geometry.geometryObjects:
         shape.geometry = convex_or_same(shape.geometry)
     return geometry

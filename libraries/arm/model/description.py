@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import msgspec
 
-from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.errors import DescriptionError, nearest, wrong_file
 from gemelo.libraries.arm.model.gripper import require_gripper
-from gemelo.libraries.arm.model.robot_file import read_robot_data, read_text, typed_robot, where_of
+from gemelo.libraries.arm.model.robot_file import read_robot_data, read_text, type_mistake, typed_robot
 from gemelo.libraries.arm.model.srdf import SrdfModel, read_srdf
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint, UrdfModel, read_urdf
-from gemelo.libraries.arm.model.virtual_drive import NO_MOTORS, TO_DRIVE, lacks_motors, with_virtual_drive
+from gemelo.libraries.arm.model.virtual_drive import TO_DRIVE, lacks_motors, with_virtual_drive
 from gemelo.libraries.arm.motors.relative_moves import loop_of, ramp_of
 from gemelo.libraries.arm.motors.speed import speed_limits
 from gemelo.libraries.arm.motors.steps import StepScale, step_scale
 from gemelo.schemas.deployment import DeviceKind
 from gemelo.schemas.grippers.kinds import Gripper
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.schemas.robot import (
     CLEARANCE,
     DeviceRecord,
@@ -33,6 +34,8 @@ from gemelo.schemas.robot import (
     StepperJoint,
     Transmission,
 )
+
+Wrong = Callable[[Reason], DescriptionError]  # the error of one joint of a file
 
 ROBOT_FILE = "robot.toml"
 DEFAULT_URDF = "robot.urdf"
@@ -109,7 +112,8 @@ class ArmDescription:
         for joint in self.joints:
             if joint.name == name:
                 return joint
-        raise DescriptionError(f'{self.name} has no joint "{name}"{suggestion(name, self.joint_names)}')
+        near = nearest(name, self.joint_names)
+        raise DescriptionError(because("robot.joint.unknown", near, robot=self.name, joint=name))
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -141,7 +145,8 @@ def load_arm(folder: Path) -> ArmDescription:
     try:
         robot = typed_robot(with_virtual_drive(data, model) if bare else data)
     except msgspec.ValidationError as error:
-        raise DescriptionError(f"{robot_path}{where_of(error, text)}: {error}") from error
+        line, what = type_mistake(error, text)
+        raise wrong_file(robot_path, what, line) from error
     srdf_path = robot_path.with_name(robot.srdf)
     srdf = read_srdf(srdf_path)
     _require_frames(robot, model, robot_path)
@@ -194,25 +199,24 @@ def _heard_joint(joint: Joint, device: DeviceRecord) -> Joint:
 def require_motors(arm: ArmDescription, device: DeviceKind) -> None:
     """Raises `DescriptionError` for an arm without motors at a real device, with what robot.toml lacks."""
     if device is not DeviceKind.VIRTUAL and not arm.has_motors:
-        raise DescriptionError(
-            f'{arm.robot_path}: {NO_MOTORS}, so device = "{device}" has nothing to drive: {TO_DRIVE}; '
-            'or start it with device = "virtual"'
-        )
+        what = because("robot.no_motors.device", TO_DRIVE, remedy("start_virtual"), device=str(device))
+        raise wrong_file(arm.robot_path, what)
 
 
 def _joint(drive: StepperJoint, drivers: dict[str, Driver], model: UrdfModel, path: Path) -> Joint:
-    where = f'{path}: joint "{drive.name}"'
+    wrong = partial(_wrong_joint, path, drive.name)
     if drive.name not in model.joint_names:
-        raise DescriptionError(f"{where} is not in the URDF{suggestion(drive.name, model.joint_names)}")
+        raise wrong(because("robot.joint.not_in_urdf", nearest(drive.name, model.joint_names)))
     if drive.motor.driver not in drivers:
-        raise DescriptionError(f'{where}: there is no [[driver]] "{drive.motor.driver}"')
+        known = nearest(drive.motor.driver, drivers)
+        raise wrong(because("robot.driver.none", known, driver=drive.motor.driver))
     urdf = model.joint(drive.name)
-    _require_transmission(drive, urdf, where)
+    _require_transmission(drive, urdf, wrong)
     try:
         scale, speed = step_scale(drive), speed_limits(drive)
     except DescriptionError as error:
-        raise DescriptionError(f"{path}: {error}") from error
-    lower, upper, velocity = _limits(urdf, drive, where)
+        raise wrong_file(path, error.reason) from error
+    lower, upper, velocity = _limits(urdf, drive, wrong)
     return Joint(
         name=drive.name,
         wire_name=drive.wire_name,
@@ -229,24 +233,30 @@ def _joint(drive: StepperJoint, drivers: dict[str, Driver], model: UrdfModel, pa
     )
 
 
-def _require_transmission(drive: StepperJoint, urdf: UrdfJoint, where: str) -> None:
+def _wrong_joint(path: Path, name: str, what: Reason) -> DescriptionError:
+    return wrong_file(path, because("robot.joint", what, joint=name))
+
+
+def _require_transmission(drive: StepperJoint, urdf: UrdfJoint, wrong: Wrong) -> None:
     """A metre is not a radian: a sliding joint has a rack, a turning one has none."""
-    if urdf.kind is JointKind.FIXED or urdf.mimic is not None:
-        raise DescriptionError(
-            f"{where} has a motor, but is {'fixed' if urdf.mimic is None else 'a mimic'} in the URDF"
-        )
+    if urdf.mimic is not None:
+        raise wrong(because("robot.joint.follows"))
+    if urdf.kind is JointKind.FIXED:
+        raise wrong(because("robot.joint.fixed"))
     slides = urdf.kind is JointKind.PRISMATIC
     if slides != (drive.transmission is Transmission.RACK_AND_PINION):
         needed = Transmission.RACK_AND_PINION if slides else Transmission.ROTARY
-        raise DescriptionError(f'{where} is {urdf.kind} in the URDF, so transmission must be "{needed}"')
+        kind, given = str(urdf.kind), str(drive.transmission)
+        other = remedy("write_transmission", transmission=str(needed))
+        raise wrong(because("robot.transmission", other, kind=kind, transmission=given))
 
 
-def _limits(urdf: UrdfJoint, drive: StepperJoint, where: str) -> tuple[float, float, float]:
+def _limits(urdf: UrdfJoint, drive: StepperJoint, wrong: Wrong) -> tuple[float, float, float]:
     """Lower, upper and velocity, within the mechanics; `gemelo check` says more about limits that are odd."""
     if urdf.limit is None:
-        raise DescriptionError(f"{where}: the URDF has no <limit> for it")
+        raise wrong(because("robot.joint.no_limit"))
     if not urdf.limit.velocity > 0.0:
-        raise DescriptionError(f"{where}: the URDF's velocity limit is {urdf.limit.velocity}, it must be above 0")
+        raise wrong(because("robot.joint.velocity_limit", value=urdf.limit.velocity))
     if urdf.kind is JointKind.CONTINUOUS:
         return -math.inf, math.inf, urdf.limit.velocity
     lower, upper = urdf.limit.lower, urdf.limit.upper
@@ -255,28 +265,29 @@ def _limits(urdf: UrdfJoint, drive: StepperJoint, where: str) -> tuple[float, fl
     if drive.mechanical_upper is not None:
         upper = min(upper, drive.mechanical_upper)
     if not lower < upper:
-        raise DescriptionError(f"{where}: the limits {lower} to {upper} leave no travel")
+        raise wrong(because("robot.joint.no_travel", lower=lower, upper=upper))
     return lower, upper, urdf.limit.velocity
 
 
 def _require_frames(robot: RobotFile, model: UrdfModel, path: Path) -> None:
     for key, frame in (("base_frame", robot.base_frame), ("tool_frame", robot.tool_frame)):
         if frame not in model.link_names:
-            raise DescriptionError(f'{path}: {key} "{frame}" is no link{suggestion(frame, model.link_names)}')
+            near = nearest(frame, model.link_names)
+            raise wrong_file(path, because("robot.frame.key", near, key=key, frame=frame))
 
 
 def _require_joints(joints: tuple[Joint, ...], model: UrdfModel, path: Path) -> None:
     """Every moving joint has exactly one motor, and every wire name is used once."""
     if not joints:
-        raise DescriptionError(f"{path}: there is no [[joint]]")
-    for names in ([j.name for j in joints], [j.wire_name for j in joints]):
+        raise wrong_file(path, because("robot.joints.none"))
+    for key, names in (("name", [j.name for j in joints]), ("wire_name", [j.wire_name for j in joints])):
         for name in names:
-            if names.count(name) > 1:
-                raise DescriptionError(f'{path}: joint "{name}" is there {names.count(name)} times')
+            if (count := names.count(name)) > 1:
+                raise _wrong_joint(path, name, because("robot.joint.twice", key=key, count=count))
     driven = {joint.name for joint in joints}
     for urdf in model.joints:
         if urdf.kind is not JointKind.FIXED and urdf.mimic is None and urdf.name not in driven:
-            raise DescriptionError(f'{path}: the URDF\'s joint "{urdf.name}" moves, but has no [[joint]] here')
+            raise _wrong_joint(path, urdf.name, because("robot.joint.no_motor", remedy("add_joint_or_fix")))
 
 
 def _named_states(srdf: SrdfModel, group: str, joints: tuple[Joint, ...], path: Path) -> dict[str, tuple[float, ...]]:
@@ -285,9 +296,9 @@ def _named_states(srdf: SrdfModel, group: str, joints: tuple[Joint, ...], path: 
     for state in srdf.states:
         if state.group != group:
             continue
-        missing = [joint.name for joint in joints if joint.name not in state.values]
+        missing = tuple(joint.name for joint in joints if joint.name not in state.values)
         if missing:
-            raise DescriptionError(f'{path}: state "{state.name}" has no value for {", ".join(missing)}')
+            raise wrong_file(path, because("srdf.state.missing", state=state.name, joints=missing))
         states[state.name] = tuple(state.values[joint.name] for joint in joints)
     return states
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.errors import nearest, wrong_file
 from gemelo.libraries.arm.model.robot_file import line_of
 from gemelo.schemas.device_config import SensorKind
 from gemelo.schemas.grippers.gripper import Drive, PulseDrive
-from gemelo.schemas.robot import RobotFile, Sensor
+from gemelo.schemas.reasons import Reason, because, plain
+from gemelo.schemas.robot import RobotFile
+
+Fault = tuple[str, Reason]  # the key that is wrong, and why
 
 METRES = {"mm": 0.001, "m": 1.0}  # [m] of a sensor's unit
 LEAST_PULSES = 100  # [us] between open and closed: a servo cannot tell less apart from noise
@@ -20,51 +23,48 @@ def require_gripper(robot: RobotFile, path: Path, text: str) -> None:
     gripper = robot.gripper
     if gripper is None:
         return
-    key, reason = gripper.fault()
+    key, own = gripper.fault()
+    found: Fault | None = (key, plain(own)) if own else None
     if gripper.open <= gripper.closed:
-        key, reason = "open", f"{gripper.open:g} m is not wider than closed, {gripper.closed:g} m: write the wider one"
-    elif not reason:
-        key, reason = _drive_fault(gripper.drive, robot)
-    if reason:
-        raise DescriptionError(f"{path}, line {line_of(('gripper', key), text)}: [gripper] {key} {reason}")
+        found = "open", because("robot.gripper.closed", open=gripper.open, closed=gripper.closed)
+    elif found is None:
+        found = _drive_fault(gripper.drive, robot)
+    if found is not None:
+        key, why = found
+        raise wrong_file(path, because("robot.gripper", why, key=key), line_of(("gripper", key), text) or 1)
 
 
-def _drive_fault(drive: Drive, robot: RobotFile) -> tuple[str, str]:
-    """The key that is wrong and why; both empty if none is."""
+def _drive_fault(drive: Drive, robot: RobotFile) -> Fault | None:
+    """The key that is wrong and why."""
     if isinstance(drive, PulseDrive):
         return _pulse_fault(drive, robot)
     names = [output.name for output in robot.output]
     if drive.output not in names:
-        return "output", f'"{drive.output}" is no [[output]]{suggestion(drive.output, names)}'
-    return "", ""
+        return "output", because("robot.gripper.no_output", nearest(drive.output, names), output=drive.output)
+    return None
 
 
-def _pulse_fault(drive: PulseDrive, robot: RobotFile) -> tuple[str, str]:
+def _pulse_fault(drive: PulseDrive, robot: RobotFile) -> Fault | None:
     if abs(drive.open_us - drive.closed_us) < LEAST_PULSES:
-        return "open_us", (
-            f"{drive.open_us} us and closed_us {drive.closed_us} us are nearer than {LEAST_PULSES} us: "
-            "write the pulses that open and close it"
-        )
+        pulses = {"open": drive.open_us, "closed": drive.closed_us, "limit": LEAST_PULSES}
+        return "open_us", because("robot.gripper.pulses", **pulses)
     if not LEAST_PULSE_SPEED <= pulse_speed(drive) <= MOST_PULSE_SPEED:
         metres = (drive.open - drive.closed) / abs(drive.open_us - drive.closed_us)
-        return "speed", (
-            f"{drive.speed:g} m/s is {pulse_speed(drive):.0f} us/s of pulse: write "
-            f"{LEAST_PULSE_SPEED * metres:.2g} to {MOST_PULSE_SPEED * metres:.2g} m/s"
-        )
+        return "speed", because(
+            "robot.gripper.speed", speed=drive.speed, pulses=pulse_speed(drive),
+            least=LEAST_PULSE_SPEED * metres, most=MOST_PULSE_SPEED * metres,
+        )  # fmt: skip
     if not drive.sensor:
-        return "", ""
+        return None
     names = [sensor.name for sensor in robot.sensor]
     if drive.sensor not in names:
-        return "sensor", f'"{drive.sensor}" is no [[sensor]]{suggestion(drive.sensor, names)}'
-    return "sensor", _sensor_fault(robot.sensor[names.index(drive.sensor)])
-
-
-def _sensor_fault(sensor: Sensor) -> str:
+        return "sensor", because("robot.gripper.no_sensor", nearest(drive.sensor, names), sensor=drive.sensor)
+    sensor = robot.sensor[names.index(drive.sensor)]
     if sensor.kind is not SensorKind.ANALOG:
-        return f'"{sensor.name}" is of kind {sensor.kind}: the wire of a servo\'s potentiometer is analog'
+        return "sensor", because("robot.gripper.sensor_kind", sensor=sensor.name, kind=str(sensor.kind))
     if sensor.unit not in METRES:
-        return f'"{sensor.name}" reads in "{sensor.unit}": the opening is a length, write unit = "mm" and its scale'
-    return ""
+        return "sensor", because("robot.gripper.sensor_unit", sensor=sensor.name, unit=sensor.unit)
+    return None
 
 
 def pulse_speed(drive: PulseDrive) -> float:

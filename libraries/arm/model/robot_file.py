@@ -12,10 +12,11 @@ from typing import get_args, get_origin, get_type_hints
 
 import msgspec
 
-from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.errors import nearest, wrong_file
 from gemelo.libraries.arm.motors.speed import chosen_tick
-from gemelo.libraries.toml_lines import Where, nearest_line, toml_lines
+from gemelo.libraries.toml_lines import Where, nearest_line, syntax_mistake, toml_lines
 from gemelo.schemas import text_file
+from gemelo.schemas.reasons import Reason, Remedy, because
 from gemelo.schemas.robot import RobotFile
 
 TAG_FIELD = "kind"  # of tables of which there are several kinds
@@ -27,7 +28,12 @@ class UnknownKey:
 
     path: Where
     line: int  # 0 where it was not found
-    hint: str
+    near: Remedy  # what was probably meant
+
+    @property
+    def reason(self) -> Reason:
+        """Without its place."""
+        return because("file.key.unknown_at", self.near, key=dotted(self.path))
 
 
 def read_robot_data(path: Path, text: str, kind: type[msgspec.Struct] = RobotFile) -> dict[str, object]:
@@ -37,9 +43,9 @@ def read_robot_data(path: Path, text: str, kind: type[msgspec.Struct] = RobotFil
     """
     data = parse_toml(path, text)
     for unknown in unknown_keys(data, text, kind):
-        raise DescriptionError(f"{path}, line {unknown.line}: unknown key `{dotted(unknown.path)}`{unknown.hint}")
+        raise wrong_file(path, unknown.reason, unknown.line)
     for key, value in not_finite(data):
-        raise DescriptionError(f"{path}, line {line_of(key, text)}: `{dotted(key)}` is {value}: it must be finite")
+        raise wrong_file(path, because("file.value.not_finite", key=dotted(key), value=value), line_of(key, text))
     return data
 
 
@@ -57,11 +63,11 @@ def read_text(path: Path) -> str:
     try:
         return text_file.read_text(path)
     except FileNotFoundError as error:
-        raise DescriptionError(f"{path}: there is no such file") from error
+        raise wrong_file(path, because("file.none")) from error
     except text_file.NotUtf8 as error:
-        raise DescriptionError(f"{path}: {error}") from error
+        raise wrong_file(path, error.reason) from error
     except OSError as error:
-        raise DescriptionError(f"{path}: cannot be read: {error}") from error
+        raise wrong_file(path, because("file.unreadable", error=error.strerror or str(error))) from error
 
 
 def parse_toml(path: Path, text: str) -> dict[str, object]:
@@ -69,12 +75,13 @@ def parse_toml(path: Path, text: str) -> dict[str, object]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise DescriptionError(f"{path}: not TOML: {error}") from error
+        line, what = syntax_mistake(error, text)
+        raise wrong_file(path, what, line) from error
 
 
 def unknown_keys(data: dict[str, object], text: str, kind: type[msgspec.Struct] = RobotFile) -> list[UnknownKey]:
     """Every key of `data` that the types do not have."""
-    return [UnknownKey(path, line_of(path, text), hint) for path, hint in _walk(data, kind, ())]
+    return [UnknownKey(path, line_of(path, text), near) for path, near in _walk(data, kind, ())]
 
 
 def not_finite(data: object, path: Where = ()) -> list[tuple[Where, float]]:
@@ -90,12 +97,22 @@ def not_finite(data: object, path: Where = ()) -> list[tuple[Where, float]]:
             return []
 
 
-def where_of(error: msgspec.ValidationError, text: str) -> str:
-    """ ", line 14" of the key that a wrong type or a value out of bounds stands at; empty where it is not found."""
-    place = re.search(r"`\$\.(.+)`$", str(error))
-    words = re.findall(r"\w+", place[1]) if place else []
+def type_mistake(error: msgspec.ValidationError, text: str) -> tuple[int, Reason]:
+    """The line of the key that a wrong type or a value out of bounds stands at, 0 where it is not found, and what is
+    wrong."""
+    problem, _, at = str(error).partition(" - at ")
+    key = at.strip("`").removeprefix("$").removeprefix(".")
+    words = re.findall(r"\w+", key)
     line = line_of(tuple(int(word) if word.isdecimal() else word for word in words), text) if words else 0
-    return f", line {line}" if line else ""
+    if found := re.fullmatch(r"Expected `(.+)`, got `(.+)`", problem):
+        return line, because("file.value.type", key=key, expected=found[1], given=found[2])
+    if found := re.fullmatch(r"Expected `(.+?)` (.+)", problem):
+        return line, because("file.value.bound", key=key, expected=found[1], bound=found[2])
+    if found := re.fullmatch(r"Object missing required field `(.+)`", problem):
+        return line, because("file.value.missing", key=key, field=found[1])
+    if found := re.fullmatch(r"Invalid enum value (.+)", problem):
+        return line, because("file.value.enum", key=key, value=found[1])
+    return line, because("file.value.wrong", key=key, problem=problem)
 
 
 def dotted(path: Where) -> str:
@@ -129,7 +146,7 @@ def _tag_of(kind: object) -> dict[str, object]:
     return {config.tag_field: config.tag} if config is not None and config.tag is not None else {}
 
 
-def _walk(data: object, kind: object, path: Where) -> list[tuple[Where, str]]:
+def _walk(data: object, kind: object, path: Where) -> list[tuple[Where, Remedy]]:
     if get_origin(kind) is tuple and isinstance(data, list):
         item = get_args(kind)[0]
         return [found for index, entry in enumerate(data) for found in _walk(entry, item, (*path, index))]
@@ -137,10 +154,10 @@ def _walk(data: object, kind: object, path: Where) -> list[tuple[Where, str]]:
     if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct) and isinstance(data, dict)):
         return []
     types = get_type_hints(kind) | _tag_of(kind)
-    found: list[tuple[Where, str]] = []
+    found: list[tuple[Where, Remedy]] = []
     for key, value in data.items():
         if key in types:
             found += _walk(value, types[key], (*path, key))
         else:
-            found.append(((*path, key), suggestion(key, types)))
+            found.append(((*path, key), nearest(key, types)))
     return found

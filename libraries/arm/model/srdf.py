@@ -6,9 +6,11 @@ import math
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
+from xml.parsers import expat
 
-from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import DescriptionError, wrong_file
 from gemelo.libraries.arm.model.robot_file import read_text
+from gemelo.schemas.reasons import because
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,9 @@ def read_srdf(path: Path) -> SrdfModel:
     try:
         root = ET.fromstring(read_text(path))
     except ET.ParseError as error:
-        raise DescriptionError(f"{path}: not XML: {error}") from error
+        line, column = error.position
+        what = because("file.xml.syntax", problem=expat.ErrorString(error.code), line=line, column=column + 1)
+        raise wrong_file(path, what) from error
     try:
         return SrdfModel(
             name=root.get("name", ""),
@@ -54,7 +58,7 @@ def read_srdf(path: Path) -> SrdfModel:
             disabled=tuple((_need(e, "link1"), _need(e, "link2")) for e in root.findall("disable_collisions")),
         )
     except DescriptionError as error:
-        raise DescriptionError(f"{path}: {error}") from error
+        raise wrong_file(path, error.reason) from error
 
 
 def _group(element: ET.Element) -> Group:
@@ -74,14 +78,14 @@ def _state(element: ET.Element) -> NamedState:
         try:
             value = values[_need(joint, "name")] = float(text)
         except ValueError as error:
-            raise DescriptionError(f'state "{name}": "{text}" is not a number') from error
+            raise DescriptionError(because("srdf.state.number", state=name, text=text)) from error
         if not math.isfinite(value):
-            raise DescriptionError(f'state "{name}": {text} is not finite')
+            raise DescriptionError(because("srdf.state.finite", state=name, text=text))
     return NamedState(name, _need(element, "group"), values)
 
 
 def _need(element: ET.Element, name: str) -> str:
     value = element.get(name)
     if not value:
-        raise DescriptionError(f"attribute `{name}` of <{element.tag}> is missing")
+        raise DescriptionError(because("urdf.attribute.missing", attribute=name, tag=element.tag))
     return value

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 
-from gemelo.libraries.arm.errors import DescriptionError, nearest_name
+from gemelo.libraries.arm.errors import DescriptionError, Subject, nearest_name, wrong_file
 from gemelo.libraries.arm.model.robot_file import read_text
 from gemelo.libraries.arm.model.xml_reader import Triple as Triple
 from gemelo.libraries.arm.model.xml_reader import XmlFault, XmlReader, joined, parse_xml
+from gemelo.schemas.reasons import because, remedy
 
 Color = tuple[int, int, int]  # red, green and blue, 0 to 255
 Colors = dict[str, Color | None]  # by the name of their <material>
@@ -149,7 +150,7 @@ def read_urdf(path: Path) -> UrdfModel:
     """The URDF in `path`; raises `DescriptionError` naming the file and every element that is wrong."""
     model, faults = survey_urdf(path)
     if faults:
-        raise DescriptionError(f"{path}: {joined(faults)}")
+        raise wrong_file(path, joined(faults))
     return model
 
 
@@ -158,7 +159,7 @@ def survey_urdf(path: Path) -> tuple[UrdfModel, list[XmlFault]]:
     try:
         return urdf_of(read_text(path))
     except DescriptionError as error:
-        raise error if str(path) in str(error) else DescriptionError(f"{path}: {error}") from error
+        raise error if str(path) in error.reason.values.values() else wrong_file(path, error.reason) from error
 
 
 def urdf_of(text: str) -> tuple[UrdfModel, list[XmlFault]]:
@@ -169,7 +170,7 @@ def urdf_of(text: str) -> tuple[UrdfModel, list[XmlFault]]:
 def model_of(xml: XmlReader) -> tuple[UrdfModel, list[XmlFault]]:
     """As `urdf_of`, of elements that are parsed."""
     if xml.root.tag != "robot":
-        raise DescriptionError(f"the root element is <{xml.root.tag}>, it must be <robot>: export it as URDF")
+        raise DescriptionError(because("urdf.root", tag=xml.root.tag))
     colors = {material.get("name", ""): _color(material) for material in xml.root.findall("material")}
     links = tuple(_link(xml, element, colors) for element in xml.root.findall("link"))
     joints = tuple(_joint(xml, element) for element in xml.root.findall("joint"))
@@ -180,23 +181,23 @@ def model_of(xml: XmlReader) -> tuple[UrdfModel, list[XmlFault]]:
 def _require_single(xml: XmlReader) -> None:
     """Faults of what would be passed over: a second, other element, and a link or a joint within another one."""
     for outer in (each for each in xml.root if each.tag in ("link", "joint")):
-        where = f'{outer.tag} "{outer.get("name", "")}"'
+        where = Subject(outer.tag, outer.get("name", ""))
         for element in outer.iter():
             for tag in SINGLE.get(element.tag, ()):
                 several = element.findall(tag)
                 if len({ET.tostring(each).strip() for each in several}) > 1:
                     for each in several:
-                        xml.fault(each, where, f"<{tag}> is there {len(several)} times, and they differ", "leave one")
+                        what = because("urdf.element.several", remedy("leave_one"), tag=tag, count=len(several))
+                        xml.fault(each, where, what)
             if element is not outer and element.tag in ("link", "joint"):
-                inner = f'{element.tag} "{element.get("name", "")}"'
-                xml.fault(
-                    element, inner, f"it stands within {where}, where nothing reads it", f"move it behind {where}"
-                )
+                inner = Subject(element.tag, element.get("name", ""))
+                what = because("urdf.element.within", remedy("move_behind"), kind=where.kind, name=where.name)
+                xml.fault(element, inner, what)
 
 
 def _link(xml: XmlReader, element: ET.Element, colors: Colors) -> UrdfLink:
-    name = xml.text(element, "name", "a <link>")
-    where, inertial = f'link "{name}"', element.find("inertial")
+    name = xml.text(element, "name", Subject("<link>"))
+    where, inertial = Subject("link", name), element.find("inertial")
     return UrdfLink(
         name=name,
         inertial=None if inertial is None else _inertial(xml, inertial, where),
@@ -209,8 +210,8 @@ def _link(xml: XmlReader, element: ET.Element, colors: Colors) -> UrdfLink:
 
 
 def _joint(xml: XmlReader, element: ET.Element) -> UrdfJoint:
-    name = xml.text(element, "name", "a <joint>")
-    where = f'joint "{name}"'
+    name = xml.text(element, "name", Subject("<joint>"))
+    where = Subject("joint", name)
     kind = _kind(xml, element, where)
     return UrdfJoint(
         name=name,
@@ -225,79 +226,78 @@ def _joint(xml: XmlReader, element: ET.Element) -> UrdfJoint:
     )
 
 
-def _kind(xml: XmlReader, element: ET.Element, where: str) -> JointKind:
+def _kind(xml: XmlReader, element: ET.Element, where: Subject) -> JointKind:
     """Fixed, where it is none that is known."""
     kind = element.get("type", "")
     if kind in set(JointKind):
         return JointKind(kind)
     near = nearest_name(kind.lower(), JointKind) or JointKind.REVOLUTE
     free = kind in ("floating", "planar")
-    remedy = "make it fixed, or of several revolute and prismatic ones" if free else f'write type="{near}"'
-    xml.fault(element, where, f'type "{kind}" is not one of {", ".join(JointKind)}', remedy)
+    mend = remedy("fix_or_split") if free else remedy("write_line", text=f'type="{near}"')
+    xml.fault(element, where, because("urdf.joint.type", mend, type=kind, known=tuple(map(str, JointKind))))
     return JointKind.FIXED
 
 
-def _axis(xml: XmlReader, element: ET.Element | None, kind: JointKind, where: str) -> Triple:
+def _axis(xml: XmlReader, element: ET.Element | None, kind: JointKind, where: Subject) -> Triple:
     """Of length one; a fixed joint's has no meaning, and exporters write zero there."""
     if element is None or kind is JointKind.FIXED:
         return DEFAULT_AXIS
     axis = xml.triple(element, "xyz", DEFAULT_AXIS, where)
     length = math.sqrt(sum(value * value for value in axis))
     if length < 1e-9:
-        xml.fault(element, where, "the axis is zero", 'write the direction that it turns about, as xyz="0 0 1"')
+        xml.fault(element, where, because("urdf.axis.zero", remedy("write_axis")))
         return DEFAULT_AXIS
     return axis[0] / length, axis[1] / length, axis[2] / length
 
 
-def _limit(xml: XmlReader, element: ET.Element | None, where: str) -> Limit | None:
+def _limit(xml: XmlReader, element: ET.Element | None, where: Subject) -> Limit | None:
     if element is None:
         return None
     return Limit(*(xml.number(element, key, where, 0.0) for key in ("lower", "upper", "effort", "velocity")))
 
 
-def _mimic(xml: XmlReader, element: ET.Element | None, where: str) -> Mimic | None:
+def _mimic(xml: XmlReader, element: ET.Element | None, where: Subject) -> Mimic | None:
     if element is None:
         return None
-    joint = xml.text(element, "joint", f"{where}, <mimic>")
+    joint = xml.text(element, "joint", where._replace(part="<mimic>"))
     return Mimic(joint, xml.number(element, "multiplier", where, 1.0), xml.number(element, "offset", where, 0.0))
 
 
-def _inertial(xml: XmlReader, element: ET.Element, where: str) -> Inertial:
+def _inertial(xml: XmlReader, element: ET.Element, where: Subject) -> Inertial:
     mass = xml.number(xml.child(element, "mass", where), "value", where)
     tensor = xml.child(element, "inertia", where)
     ixx, ixy, ixz, iyy, iyz, izz = (xml.number(tensor, k, where) for k in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
     return Inertial(mass, (ixx, ixy, ixz, iyy, iyz, izz), _origin(xml, element, where))
 
 
-def _geometry(xml: XmlReader, element: ET.Element, where: str) -> Geometry:
-    geometry, line = xml.child(element, "geometry", f"{where}, <{element.tag}>"), xml.lines.get(element, 0)
+def _geometry(xml: XmlReader, element: ET.Element, where: Subject) -> Geometry:
+    geometry, line = xml.child(element, "geometry", where._replace(part=f"<{element.tag}>")), xml.lines.get(element, 0)
     if len(geometry) != 1:
         if xml.lines.get(geometry):
-            remedy = f"give each a <{element.tag}> of its own" if len(geometry) else "add a box, or leave it out"
-            xml.fault(element, where, f"a <geometry> has {len(geometry)} shapes, it must have one", remedy)
+            mend = remedy("own_element", tag=element.tag) if len(geometry) else remedy("add_a_box")
+            xml.fault(element, where, because("urdf.geometry.shapes", mend, count=len(geometry)))
         return Geometry(NO_SHAPE, line=line)
     shape, origin = geometry[0], _origin(xml, element, where)
     if shape.tag == "mesh":
-        scale = xml.triple(shape, "scale", (1.0, 1.0, 1.0), f"{where}, <mesh>")
-        return Geometry("mesh", xml.text(shape, "filename", f"{where}, <mesh>"), origin, scale, line=line)
+        scale = xml.triple(shape, "scale", (1.0, 1.0, 1.0), where._replace(part="<mesh>"))
+        return Geometry("mesh", xml.text(shape, "filename", where._replace(part="<mesh>")), origin, scale, line=line)
     return Geometry(shape.tag, origin=origin, size=_sizes(xml, shape, where), line=line)
 
 
-def _sizes(xml: XmlReader, shape: ET.Element, where: str) -> tuple[float, ...]:
+def _sizes(xml: XmlReader, shape: ET.Element, where: Subject) -> tuple[float, ...]:
     """[m] of a box, a cylinder or a ball, as far as they can be read."""
     sizes: list[float] = []
     for name, count in SIZES.get(shape.tag, {}).items():
-        text = xml.text(shape, name, f"{where}, <{shape.tag}>")
+        text = xml.text(shape, name, where._replace(part=f"<{shape.tag}>"))
         if _are_sizes(text.split(), count):
             sizes += map(float, text.split())
         elif text:
-            wanted = "a number" if count == 1 else f"{count} numbers"
-            xml.fault(
-                shape,
-                where,
-                f'`{name}` of <{shape.tag}> is "{text}", not {wanted} above 0',
-                "leave it out, or correct it",
-            )
+            size = {"attribute": name, "tag": shape.tag, "text": text}
+            mend = remedy("leave_out_or_correct")
+            if count == 1:
+                xml.fault(shape, where, because("urdf.size.one", mend, **size))
+            else:
+                xml.fault(shape, where, because("urdf.size.several", mend, **size, count=count))
     return tuple(sizes)
 
 
@@ -308,7 +308,7 @@ def _are_sizes(words: list[str], count: int) -> bool:
         return False
 
 
-def _origin(xml: XmlReader, element: ET.Element, where: str) -> Origin:
+def _origin(xml: XmlReader, element: ET.Element, where: Subject) -> Origin:
     origin = element.find("origin")
     return Origin(xml.triple(origin, "xyz", ZERO, where), xml.triple(origin, "rpy", ZERO, where))
 

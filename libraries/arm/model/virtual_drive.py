@@ -10,14 +10,15 @@ from collections.abc import Iterator
 from hashlib import sha256
 from pathlib import Path
 
-from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import wrong_file
 from gemelo.libraries.arm.model.urdf import JointKind, Limit, UrdfJoint, UrdfModel
+from gemelo.schemas.reasons import because, remedy
 
 MAX_NAME = 31  # bytes of a device, the firmware's
 MARK = 4  # letters that tell two names apart which are cut
 VIRTUAL_DRIVER = "virtual"  # the name of the generated [[driver]]
-NO_MOTORS = "no motors: to plan and look at only"
-TO_DRIVE = "for a real arm write [device], a [[driver]] and a [joint.motor] for every joint"
+TO_DRIVE = remedy("write_motors")
+NO_MOTORS = because("robot.no_motors")
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 MOST_RATE = 32_000.0  # [steps/s] of a joint at full speed: room below half of the highest tick
@@ -36,20 +37,15 @@ def lacks_motors(data: Table, path: Path) -> bool:
     there = [f"[{key}]" if key == "device" else f"[[{key}]]" for key in ("device", "driver") if data.get(key)]
     there += [f"[[{key}]]" for key in ("input", "output", "sensor") if data.get(key)]
     there += ["[gripper]"] if data.get("gripper") else []
-    there += [
-        f'joint "{joint.get("name")}"\'s {key}' for joint in joints for key in ("motor", "homing") if key in joint
-    ]
+    there += [f"[joint.{key}] ({joint.get('name')})" for joint in joints for key in ("motor", "homing") if key in joint]
     if not there:
         return True
-    missing = [word for key, word in (("device", "[device]"), ("driver", "a [[driver]]")) if not data.get(key)]
-    missing += [f'[joint.motor] of joint "{joint.get("name")}"' for joint in joints if "motor" not in joint]
-    missing += [] if joints else ["a [[joint]] for every joint that moves"]
+    missing = [word for key, word in (("device", "[device]"), ("driver", "[[driver]]")) if not data.get(key)]
+    missing += [f"[joint.motor] ({joint.get('name')})" for joint in joints if "motor" not in joint]
+    missing += [] if joints else ["[[joint]]"]
     if not missing:
         return False
-    raise DescriptionError(
-        f"{path}: it has {_few(there)}, but not {_few(missing)}: write these too, or leave out everything of motors, "
-        "drivers and pins for an arm to plan and look at only"
-    )
+    raise wrong_file(path, because("robot.motors.half", present=_few(there), missing=_few(missing)))
 
 
 def with_virtual_drive(data: Table, model: UrdfModel) -> Table:
@@ -124,6 +120,6 @@ def _tables(value: object) -> Iterator[Table]:
         yield from (each for each in value if isinstance(each, dict))
 
 
-def _few(words: list[str]) -> str:
+def _few(words: list[str]) -> tuple[str, ...]:
     """The first three of them."""
-    return ", ".join(words[:3]) + (f" and {len(words) - 3} more" if len(words) > 3 else "")
+    return (*words[:3], "...") if len(words) > 3 else tuple(words)

@@ -13,6 +13,7 @@ from bisect import bisect_right
 from fractions import Fraction
 from typing import NamedTuple
 
+from gemelo.libraries.arm.errors import DescriptionError, Subject
 from gemelo.libraries.arm.motors.speed import speed_limits
 from gemelo.libraries.arm.motors.steps import exact_ratio, step_scale
 from gemelo.schemas.robot import DeviceRecord, Sketch, StepperJoint
@@ -80,8 +81,12 @@ def loop_of(device: DeviceRecord) -> Loop:
 def ramp_of(drive: StepperJoint) -> Ramp:
     """The sketch's figures for a joint of robot.toml; raises `DescriptionError`."""
     own, speeds = drive.sketch or Sketch(), speed_limits(drive)
-    where = f'joint "{drive.name}": sketch.steps_per_turn'
-    ratio = exact_ratio(own.steps_per_turn, where) if own.steps_per_turn else step_scale(drive).steps_per_turn
+    try:
+        ratio = exact_ratio(own.steps_per_turn) if own.steps_per_turn else step_scale(drive).steps_per_turn
+    except DescriptionError as error:
+        if not own.steps_per_turn:
+            raise
+        raise DescriptionError(Subject("joint", drive.name, "sketch.steps_per_turn").around(error.reason)) from error
     return Ramp(
         drive.wire_name,
         ratio,

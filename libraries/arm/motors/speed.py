@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.motors.steps import StepScale, step_scale
+from gemelo.schemas.reasons import because
 from gemelo.schemas.robot import Driver, RobotFile, StepperJoint
 
 RANGES = {  # of what a builder can mean
@@ -42,7 +43,8 @@ def speed_limits(drive: StepperJoint) -> SpeedLimits:
     for key, (least, most) in RANGES.items():
         value = getattr(drive, key)
         if not least <= value <= most:
-            raise DescriptionError(f'joint "{drive.name}": {key} is {value}, it must be {least:g} to {most:g}')
+            what = because("robot.joint.range", key=key, value=value, least=least, most=most)
+            raise DescriptionError(because("robot.joint", what, joint=drive.name))
     scale = step_scale(drive)
     rate = step_rate(drive.max_speed_rpm, scale)
     velocity = drive.max_speed_rpm / 60.0 * scale.travel_per_turn

@@ -8,6 +8,7 @@ from fractions import Fraction
 from functools import cached_property
 
 from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.robot import StepperJoint, Transmission
 
 TAU = 2.0 * math.pi
@@ -68,10 +69,18 @@ class StepScale:
 
 def step_scale(drive: StepperJoint) -> StepScale:
     """The scale of one joint of robot.toml; raises `DescriptionError` naming the joint."""
-    where = f'joint "{drive.name}": motor.gear_ratio'
-    if drive.motor.pulses_per_turn <= 0:
-        raise DescriptionError(f'joint "{drive.name}": motor.pulses_per_turn is {drive.motor.pulses_per_turn}, not > 0')
-    return StepScale(drive.motor.pulses_per_turn * exact_ratio(drive.motor.gear_ratio, where), travel_per_turn(drive))
+    pulses = drive.motor.pulses_per_turn
+    if pulses <= 0:
+        raise _wrong(drive.name, because("robot.motor.pulses_per_turn", value=pulses))
+    try:
+        ratio = exact_ratio(drive.motor.gear_ratio)
+    except DescriptionError as error:
+        raise _wrong(drive.name, error.reason) from error
+    return StepScale(pulses * ratio, travel_per_turn(drive))
+
+
+def _wrong(joint: str, what: Reason) -> DescriptionError:
+    return DescriptionError(because("robot.joint", what, joint=joint))
 
 
 def travel_per_turn(drive: StepperJoint) -> float:
@@ -79,29 +88,26 @@ def travel_per_turn(drive: StepperJoint) -> float:
     match drive.transmission:
         case Transmission.ROTARY:
             if drive.pinion_radius is not None:
-                raise DescriptionError(
-                    f'joint "{drive.name}": pinion_radius belongs to transmission = "rack_and_pinion", not "rotary"'
-                )
+                raise _wrong(drive.name, because("robot.motor.no_pinion"))
             return TAU
         case Transmission.RACK_AND_PINION:
             if drive.pinion_radius is None or not 1e-4 <= drive.pinion_radius <= 10.0:
-                raise DescriptionError(
-                    f'joint "{drive.name}": rack_and_pinion needs pinion_radius of 0.0001 to 10 m, '
-                    f"it is {drive.pinion_radius}"
-                )
+                if drive.pinion_radius is None:
+                    raise _wrong(drive.name, because("robot.motor.pinion_missing"))
+                raise _wrong(drive.name, because("robot.motor.pinion", value=drive.pinion_radius))
             return TAU * drive.pinion_radius
 
 
-def exact_ratio(text: str, where: str) -> Fraction:
-    """ "46.656" or "380/21" as a positive ratio (dimensionless); raises `DescriptionError` naming `where`."""
+def exact_ratio(text: str) -> Fraction:
+    """ "46.656" or "380/21" as a positive ratio (dimensionless); raises `DescriptionError`."""
     try:
         if "e" in text.lower():
             raise ValueError("an exponent may be longer than any memory")
         ratio = Fraction(text.replace(" ", ""))
     except (ValueError, ZeroDivisionError) as error:
-        raise DescriptionError(f'{where}: "{text}" is neither a decimal nor a fraction like "380/21"') from error
+        raise DescriptionError(because("robot.gear_ratio.number", text=text)) from error
     if ratio <= 0:
-        raise DescriptionError(f"{where}: a ratio of {text} is not positive; turn the direction with `inverted`")
+        raise DescriptionError(because("robot.gear_ratio.negative", text=text))
     if not MIN_RATIO <= ratio <= MAX_RATIO:
-        raise DescriptionError(f"{where}: a ratio of {text} is not within 1/1000000000 to 1000000000")
+        raise DescriptionError(because("robot.gear_ratio.range", text=text))
     return ratio

@@ -8,8 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gemelo.schemas.reasons import because
 from gemelo.schemas.text_file import read_text
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, require_folder, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.common.units import positive_length
 from gemelo.tools.cli.parser import Options, Parser, positive_integer
@@ -50,9 +52,10 @@ def print_findings(folder: Path, xacro: Mapping[str, str]) -> ExitCode:
 
     findings = _findings(folder, xacro)
     for finding in findings:
-        print(finding)
+        print(sentence(finding.reason))
     errors, warnings = (sum(each.severity is kind for each in findings) for kind in (Severity.ERROR, Severity.WARNING))
-    print(f"{folder}: {errors} errors, {warnings} warnings" if errors or warnings else f"{folder}: all is well")
+    found = because("finding.count", folder=str(folder), errors=errors, warnings=warnings)
+    print(sentence(found if errors or warnings else because("finding.none", folder=str(folder))))
     return ExitCode.FAILED if errors else ExitCode.OK
 
 
@@ -71,7 +74,7 @@ def _findings(folder: Path, xacro: Mapping[str, str]) -> list[Finding]:
     from gemelo.libraries.arm.errors import DescriptionError
     from gemelo.libraries.robot_import.importing import ImportOptions, source_findings
 
-    print(f"{folder} has no {ROBOT_FILE}: as `gemelo import {folder}` reads it, which mends what is a note")
+    print(sentence(because("finding.as_import", folder=str(folder), file=ROBOT_FILE)))
     try:
         return source_findings(ImportOptions(folder, Path(), yes=True, xacro=xacro))
     except DescriptionError as error:
