@@ -60,6 +60,7 @@ class CancelResponse(Message, frozen=True, kw_only=True):
 
     canceling: tuple[str, ...] = ()
     reason: str = ""
+    why: Reason | None = None  # `reason` as data
 
 
 class ResultRequest(Message, frozen=True, kw_only=True):

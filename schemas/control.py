@@ -7,6 +7,7 @@ recorded nor published, and in no answer.
 from __future__ import annotations
 
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import Reason
 
 
 class ControlState(Message, frozen=True, kw_only=True):
@@ -23,6 +24,7 @@ class ControlState(Message, frozen=True, kw_only=True):
     members: tuple[str, ...] = ()  # addresses of the nodes that may move the arm: the holder's, and who has its secret
     given: bool = False  # nobody holds it because the last holder has given it back, and not lost it
     pending: str = ""  # why nobody may move the arm at this moment, as a sentence; empty if somebody may
+    why: Reason | None = None  # `pending` as data
 
 
 class ControlTake(Message, frozen=True, kw_only=True):
@@ -54,3 +56,4 @@ class ControlAnswer(Message, frozen=True, kw_only=True):
     reason: str = ""  # why not: the holder, since when, from where, and the remedy
     epoch: int = 0  # of the hold, as in `ControlState`
     number: int = 0
+    why: Reason | None = None  # `reason` as data

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import IntEnum, StrEnum
 
 from gemelo.schemas.message import Message, Vector
+from gemelo.schemas.reasons import Reason
 
 
 class DeviceMode(IntEnum):
@@ -57,6 +58,8 @@ class DeviceStatus(Message, frozen=True, kw_only=True):
     heap_least: int = 0  # [bytes] the least that was free since its start
     stack_least: int = 0  # [bytes] the least that was left of a task's stack
     stack_task: str = ""  # whose stack that was
+    why: Reason | None = None  # `reason` as data
+    warning_why: Reason | None = None  # `warning` as data
 
 
 class DeviceState(Message, frozen=True, kw_only=True):
@@ -97,6 +100,7 @@ class DeviceEvent(Message, frozen=True, kw_only=True):
     event: str = ""
     detail: str = ""
     client: str = ""  # the node that it is about; empty: everybody
+    why: Reason | None = None  # `detail` as data, where it is no word of the device itself
 
 
 class DeviceCommandKind(IntEnum):
@@ -187,6 +191,7 @@ class DeviceCommandResponse(Message, frozen=True, kw_only=True):
     reason: str = ""
     mode: DeviceMode = DeviceMode.BOOT
     check: str = ""  # "control": somebody else holds it, and the device was not asked
+    why: Reason | None = None  # `reason` as data
 
 
 class DeviceConfiguration(Message, frozen=True, kw_only=True):
@@ -198,6 +203,7 @@ class DeviceConfiguration(Message, frozen=True, kw_only=True):
     device_crc32: int = 0  # of what the device works with; 0: none, or not known
     accepted: bool = False  # the device works with `text`
     reason: str = ""  # why not, with the remedy
+    why: Reason | None = None  # `reason` as data
 
 
 class ConfigureRequest(Message, frozen=True, kw_only=True):
@@ -210,6 +216,7 @@ class ConfigureResponse(Message, frozen=True, kw_only=True):
     accepted: bool = False
     reason: str = ""
     crc32: int = 0
+    why: Reason | None = None  # `reason` as data
 
 
 class SensorReadings(Message, frozen=True, kw_only=True):
@@ -259,6 +266,7 @@ class InjectResponse(Message, frozen=True, kw_only=True):
 
     accepted: bool = False
     reason: str = ""
+    why: Reason | None = None  # `reason` as data
 
 
 class EchoRequest(Message, frozen=True, kw_only=True):
@@ -272,6 +280,7 @@ class EchoResponse(Message, frozen=True, kw_only=True):
     round_trip: float = 0.0  # [s] gateway to device and back, without the device's own thinking time
     waiting: float = 0.0  # [s] that time: of a board that reads lines, until the next one was due
     reason: str = ""  # why there is no answer
+    why: Reason | None = None  # `reason` as data
 
 
 class CommandChunk(Message, frozen=True, kw_only=True):

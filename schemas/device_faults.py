@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from gemelo.schemas.device import DeviceFault
-
-AGAIN = "`gemelo reset`, `gemelo home`"
+from gemelo.schemas.reasons import Reason, because, remedy
 
 
 class FaultDescription(NamedTuple):
@@ -17,53 +16,45 @@ class FaultDescription(NamedTuple):
     remedy: str
 
 
-_ABOUT = {
-    DeviceFault.TICK_OVERRUN: (
-        "the step pulses waited more than 3 ms for the path",
-        f"{AGAIN}; if it comes again, lower [device] tick_hz in robot.toml",
-    ),
-    DeviceFault.INTERNAL: (
-        "the firmware found something that cannot be",
-        "write down what `gemelo device status` says, then restart the device",
-    ),
-    DeviceFault.LIMIT_SWITCH: (
-        "its limit switch was pressed",
-        f"see what it ran into (a torn wire looks the same), then {AGAIN}",
-    ),
-    DeviceFault.HOMING_TIMEOUT: (
-        "it took longer than homing.timeout to find its place",
-        f"see that it moves freely, or raise homing.timeout or homing.fast in robot.toml, then {AGAIN}",
-    ),
-    DeviceFault.SWITCH_NOT_FOUND: (
-        "it travelled homing.max_travel and its home switch did not close",
-        "press the switch by hand under `gemelo device monitor`; see that homing.direction in robot.toml is right, "
-        f"then {AGAIN}",
-    ),
-    DeviceFault.SWITCH_STUCK: (
-        "it moved off its home switch and the switch stays pressed",
-        f"free the switch, or look for a torn wire or a wrong `active` in robot.toml, then {AGAIN}",
-    ),
-    DeviceFault.EMERGENCY_STOP: (
-        "the emergency stop is or was pressed; the drivers are off",
-        "when the danger is over: release it, `gemelo reset`, `gemelo device arm`, `gemelo home`",
-    ),
+_MEANINGS: dict[int, tuple[str, str]] = {  # the code of its meaning, and that of its remedy
+    DeviceFault.TICK_OVERRUN: ("fault.tick_overrun", "fault_tick_overrun"),
+    DeviceFault.INTERNAL: ("fault.internal", "fault_internal"),
+    DeviceFault.LIMIT_SWITCH: ("fault.limit_switch", "fault_limit_switch"),
+    DeviceFault.HOMING_TIMEOUT: ("fault.homing_timeout", "fault_homing_timeout"),
+    DeviceFault.SWITCH_NOT_FOUND: ("fault.switch_not_found", "fault_switch_not_found"),
+    DeviceFault.SWITCH_STUCK: ("fault.switch_stuck", "fault_switch_stuck"),
+    DeviceFault.EMERGENCY_STOP: ("fault.emergency_stop", "fault_emergency_stop"),
 }
+_NEWER = ("fault.newer", "fault_newer")  # that a newer firmware has
+
+
+def fault_reason(fault: int, joint: str = "") -> Reason | None:
+    """The fault with that number on the wire, with the joint, its meaning and its remedy; None for no fault."""
+    if fault == DeviceFault.NONE:
+        return None
+    meaning = _meaning(fault)
+    if joint:
+        return because("fault.at_joint", meaning, fault=_name(fault), joint=joint)
+    return because("fault.present", meaning, fault=_name(fault))
+
+
+def fault_text(fault: int, joint: str = "") -> str:
+    """The same as a sentence; empty for no fault."""
+    return str(fault_reason(fault, joint) or "")
 
 
 def explain(fault: int) -> FaultDescription | None:
     """The fault with that number on the wire; None for none."""
     if fault == DeviceFault.NONE:
         return None
-    if fault not in _ABOUT:
-        return FaultDescription(f"FAULT {fault}", "a fault that only a newer gemelo knows", "update gemelo")
-    meaning, remedy = _ABOUT[DeviceFault(fault)]
-    return FaultDescription(DeviceFault(fault).name, meaning, remedy)
+    meaning = _meaning(fault)
+    return FaultDescription(_name(fault), str(because(meaning.code)), str(because("fault.remedy", *meaning.remedies)))
 
 
-def fault_text(fault: int, joint: str = "") -> str:
-    """One sentence with the joint and the remedy; empty for no fault."""
-    about = explain(fault)
-    if about is None:
-        return ""
-    where = f' at joint "{joint}"' if joint else ""
-    return f"{about.name}{where}: {about.meaning}; {about.remedy}"
+def _meaning(fault: int) -> Reason:
+    code, mend = _MEANINGS.get(fault, _NEWER)
+    return because(code, remedy(mend))
+
+
+def _name(fault: int) -> str:
+    return DeviceFault(fault).name if fault in DeviceFault._value2member_map_ else f"FAULT {fault}"

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from gemelo.schemas.device import DeviceState, DeviceStatus
+from gemelo.schemas.reasons import Reason, because, plain
 
 OLD = 2.0  # [s] of a round trip, beyond which it says nothing of the link as it is; it is measured twice a second
-UNKNOWN = "no reason is known"
 
 
 def is_old(age: float) -> bool:
@@ -31,10 +31,21 @@ def deaf_for(status: DeviceStatus, now: int) -> float:
     return max(1.0, (now - status.deaf_since) * 1e-9) if status.deaf_since else 0.0
 
 
+def why_not_usable(status: DeviceStatus, now: int) -> Reason:
+    """Why the device is not usable at `now` [ns UNIX], with how long it has not received anything."""
+    why = status.why or (plain(status.reason) if status.reason else because("device.unexplained"))
+    deaf = deaf_for(status, now)
+    return because("device.for_time", why, time=deaf) if deaf else why
+
+
+def warning_of(status: DeviceStatus) -> Reason | None:
+    """What a person has to mend though the device is usable; None where there is nothing."""
+    return status.warning_why or (plain(status.warning) if status.warning else None)
+
+
 def reason_text(status: DeviceStatus, now: int) -> str:
-    """Why the device is not usable at `now` [ns UNIX], with how long it has not heard."""
-    reason, deaf = status.reason or UNKNOWN, deaf_for(status, now)
-    return f"{reason} (for {deaf:.0f} s)" if deaf else reason
+    """As `why_not_usable`, in a sentence."""
+    return str(why_not_usable(status, now))
 
 
 def offline_text(status: DeviceStatus, now: int) -> str:

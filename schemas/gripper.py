@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import Reason
 
 
 class GripperCommandGoal(Message, frozen=True, kw_only=True):
@@ -31,6 +32,7 @@ class GripperCommandResult(Message, frozen=True, kw_only=True):
     reached_goal: bool = False
     measured: bool = False  # a sensor reads the opening; False: position is what was commanded
     error_string: str = ""
+    why: Reason | None = None  # `error_string` as data
 
 
 class GripperState(Message, frozen=True, kw_only=True):

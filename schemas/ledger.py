@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 
 from gemelo.schemas.message import Message, Vector
+from gemelo.schemas.reasons import Reason
 
 
 class VerifiedBy(StrEnum):
@@ -42,6 +43,7 @@ class StepLedger(Message, frozen=True, kw_only=True):
     tool_bound: float = 0.0  # [m] that it is off at most, at `level`
     level: float = 0.95  # the confidence of both bounds
     open_loop: bool = False  # the device does not say what it has executed: nothing here is measured
+    why: Reason | None = None  # `reason` as data
 
 
 class StoppingDistance(Message, frozen=True, kw_only=True):
@@ -54,3 +56,4 @@ class StoppingDistance(Message, frozen=True, kw_only=True):
     duration: float = 0.0  # [s] until it rests, at most
     reaction: float = 0.0  # [s] of that until the device notices
     round_trip: float = 0.0  # [s] the longest of late, which the device's last heartbeat may have taken
+    why: Reason | None = None  # `reason` as data

@@ -6,6 +6,7 @@ import math
 from enum import IntEnum
 
 from gemelo.schemas.message import Message, Vector
+from gemelo.schemas.reasons import Reason
 
 MOST_POINTS = (
     100_000  # of a trajectory; chosen: half an hour at the gateway's own knots, and the device follows no more
@@ -105,3 +106,4 @@ class FollowJointTrajectoryResult(Message, frozen=True, kw_only=True):
     final_error: Vector = ()  # [steps] goal - executed at the end; commanded - executed where another goal followed
     duration: float = 0.0  # [s] from acceptance to result
     verified: bool = True  # false: all was sent, and what was executed is not known; the executed steps are empty then
+    why: Reason | None = None  # `error_string` as data

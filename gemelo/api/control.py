@@ -168,7 +168,9 @@ class Control:
 
     def _require(self, answer: ControlAnswer, what: str) -> ControlAnswer:
         if not answer.accepted:
-            raise Refused(f"{what} control refused: {answer.reason}", check="control", reason=answer.reason)
+            raise Refused(
+                f"{what} control refused: {answer.reason}", check="control", reason=answer.why or answer.reason
+            )
         return answer
 
 

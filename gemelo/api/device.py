@@ -165,7 +165,7 @@ class Device:
             again = "; the drivers are off now: arm.device.arm()" if state.armed else ""
             raise Refused(
                 f"the device refused the configuration: {answer.reason}{again}", check="configuration",
-                reason=answer.reason,
+                reason=answer.why or answer.reason,
             )  # fmt: skip
         if state.armed:
             self.arm()
@@ -190,7 +190,7 @@ class Device:
         answer = self._session.call(DEVICE_INJECT, request, TO_ANSWER)
         self._session.changed()
         if not answer.accepted:
-            raise Refused(f"refused: {answer.reason}", check="device", reason=answer.reason)
+            raise Refused(f"refused: {answer.reason}", check="device", reason=answer.why or answer.reason)
 
     def command(self, wanted: DeviceCommand | StopKind, what: str = "") -> DeviceMode:
         """As `send`; the mode that the device answered with.
@@ -216,7 +216,9 @@ class Device:
         if not answer.accepted:
             mode = f" (device mode {answer.mode.name})" if f"mode {answer.mode.name}" not in answer.reason else ""
             check, mode = (answer.check, "") if answer.check else ("device", mode)
-            raise Refused(f"{what} refused: {answer.reason}{mode}", check=check, subject=what, reason=answer.reason)
+            raise Refused(
+                f"{what} refused: {answer.reason}{mode}", check=check, subject=what, reason=answer.why or answer.reason
+            )
         if isinstance(wanted, ArmCommand):
             lead = max(joint.driver.enable_lead_ms for joint in self._session.description.joints) * 1e-3
             self._session.wait_for(lambda: False, lead)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from gemelo.api.arguments import Grip
 from gemelo.api.errors import Aborted, BadArgument, Canceled, Interrupted, Lost, Refused, reason_of
-from gemelo.api.motion import check_of
+from gemelo.api.motion import check_of, why_ended
 from gemelo.api.scene import Scene
 from gemelo.api.session import Session
 from gemelo.api.targets import number
@@ -108,7 +108,7 @@ class Gripping:
         request = InjectRequest(kind=InjectKind.OBJECT, value=width if width > position else 0.0)
         answer = self._session.call(DEVICE_INJECT, request, TO_ANSWER)
         if not answer.accepted and width <= position:
-            raise Refused(f"refused: {answer.reason}", check="device", reason=answer.reason)
+            raise Refused(f"refused: {answer.reason}", check="device", reason=answer.why or answer.reason)
 
     def _carried_out(
         self, goal: GripperCommandGoal, on_progress: OnGripping | None, is_cancelled: IsCancelled | None
@@ -125,9 +125,10 @@ class Gripping:
             raise Lost(reason_of(handle.lost), has_begun=True)
         status, result = handle.outcome.status, handle.outcome.result
         if status is not GoalStatusCode.SUCCEEDED:
-            reason = result.error_string or "no reason was given"
+            why = why_ended(result)
             kind = Canceled if status is GoalStatusCode.CANCELED else Aborted
-            raise kind(f"gripper {status.name.lower()} at {result.position * 1000.0:.1f} mm: {reason}", status)
+            message = because("ended.gripper", why, status=status.name, position=result.position)
+            raise kind(message, status, reason=why)
         return result
 
     def _sent(self, goal: GripperCommandGoal) -> Handle:

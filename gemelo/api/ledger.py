@@ -102,7 +102,7 @@ class Requirement:
                 value=ledger.arm_confidence,
                 limit=self.level,
                 remedy="arm.verify()" if not ledger.open_loop else "",
-                reason=ledger.reason,
+                reason=ledger.why or ledger.reason,
             )
 
     @contextmanager

@@ -13,13 +13,14 @@ from gemelo.libraries.runtime import errors as runtime
 from gemelo.libraries.runtime.actions.client import ActionClient
 from gemelo.libraries.runtime.actions.goal_handle import ActionOutcome, GoalHandle
 from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.gripper import GripperCommandResult
 from gemelo.schemas.motion import (
     FollowErrorCode,
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
 )
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
 
 Handle = GoalHandle[FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
@@ -27,6 +28,11 @@ Client = ActionClient[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, 
 
 OnMotion = Callable[["Motion"], object]
 
+ENDED = {
+    GoalStatusCode.ABORTED: "ended.aborted",
+    GoalStatusCode.CANCELED: "ended.canceled",
+    GoalStatusCode.PREEMPTED: "ended.preempted",
+}
 BRAKING = 10.0  # [s] that a cancelled motion may take to come to rest before it counts as lost
 
 
@@ -232,8 +238,9 @@ class Motion:
         if status is GoalStatusCode.SUCCEEDED or (status is GoalStatusCode.CANCELED and self._wants_cancel):
             return self
         kind = Canceled if status is GoalStatusCode.CANCELED else Aborted
-        reason = f"{status.name.lower()} after {result.duration:.2f} s: {result.error_string or 'no reason was given'}"
-        raise kind(reason, status, result.error_code, self.stopped_at, result)
+        why = why_ended(result)
+        message = because(ENDED.get(status, "ended.aborted"), why, time=result.duration)
+        raise kind(message, status, result.error_code, self.stopped_at, result, reason=why)
 
     def _require_outcome(self) -> ActionOutcome[FollowJointTrajectoryResult]:
         """How it ended; raises `Lost` where the gateway was lost before."""
@@ -254,6 +261,13 @@ class Motion:
         )
         why = f": {result.error_string}" if result.error_string else ""
         return f"{about} in {result.duration:.2f} s{why}, final error [steps] {errors}>"
+
+
+def why_ended(result: FollowJointTrajectoryResult | GripperCommandResult) -> Reason:
+    """Why a goal ended before its end; of an older gateway, which sends no data, its sentence."""
+    if result.why is not None:
+        return result.why
+    return plain(result.error_string) if result.error_string else because("ended.unexplained")
 
 
 def check_of(refused: runtime.GoalRefused, usual: str) -> str:

@@ -254,7 +254,7 @@ class Node:
     def serve_action(
         self, action: Action[G, F, R], on_goal: OnGoal[G], on_cancel: OnCancel, read: ReadGoal[G] | None = None
     ) -> ActionServer[G, F, R]:
-        """Serves an action: `on_goal(goal_id, goal)` accepts or refuses, `on_cancel(goal_id)` says "" or why not.
+        """Serves an action: `on_goal(goal_id, goal)` accepts or refuses, `on_cancel(goal_id)` returns None or why not.
 
         `read` decodes goals in pieces, between which the loop goes on.
         """

@@ -3,8 +3,8 @@
 `languages/es/goal.po` has the Spanish of all codes `goal.*`. An entry's msgid is the code; its msgctxt is empty, or
 names the front end that has words of its own for it (`page`), or is `explain`: what the code means, or all codes that
 begin with it. A template has the names of the reason's values in braces, and behind a colon the unit of one:
-`{depth:m}`. The reasons behind it are `{causes}`, or `{lines}` where each has a line of its own; what would do is
-`{remedies}`, which else follows the sentence.
+`{depth:m}`. The reasons behind it are `{causes}`, `{cause_1}` and `{cause_2}` one by one, or `{lines}` where each has a
+line of its own; what would do is `{remedies}`, which else follows the sentence.
 
 `compiled.py` makes one file of a language's, which takes 1 ms to read. (Fluent's runtime takes some 100 ms to import
 and 0.3 ms for each message, and so does Babel, on which it stands.)

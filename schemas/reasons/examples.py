@@ -13,7 +13,7 @@ import msgspec
 
 from gemelo.schemas.reasons.catalogue import ENGLISH, template
 from gemelo.schemas.reasons.reason import Reason
-from gemelo.schemas.reasons.sentences import PLAIN, Value
+from gemelo.schemas.reasons.sentences import PLAIN, WITHIN, Value
 from gemelo.schemas.reasons.units import in_si_units
 
 FILE = Path(__file__).with_name("examples.json")
@@ -44,7 +44,7 @@ def examples() -> dict[str, Reason]:
 def _names(text: str) -> dict[str, Value]:
     values: dict[str, Value] = {}
     for _, name, spec, _ in string.Formatter().parse(text):
-        if name and name not in ("causes", "lines", "remedies"):
+        if name and name not in WITHIN:
             values.setdefault(name, 1 if spec and _is_number(spec) else name)
         if spec and "{" in spec:
             values |= dict.fromkeys((each for _, each, _, _ in string.Formatter().parse(spec) if each), "rad")

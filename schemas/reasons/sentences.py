@@ -15,6 +15,7 @@ from gemelo.schemas.reasons.units import in_display_units, in_si_units
 Value = bool | int | float | str | tuple[str | float, ...] | dict[str, float]
 FILE = "file."  # begins the codes of what is wrong in a file
 NOTHING = "-"  # the text of a remedy that a front end does not have
+WITHIN = frozenset(("causes", "cause_1", "cause_2", "lines", "remedies"))  # of a template, besides the reason's values
 PLAIN = "plain"  # the code of a sentence that has none of its own
 
 
@@ -72,10 +73,11 @@ class _Writer(string.Formatter):
     def sentence(self, reason: Explained, has_remedies: bool = True) -> str:
         """With what would do behind it, where the template has no other place for that."""
         writer = self._of_file if reason.code.startswith(FILE) else self
-        causes = [writer.sentence(cause) for cause in reason.causes]
+        causes = [writer._within(cause) for cause in reason.causes]
         remedies = self.remedies(reason) if has_remedies else ""
         found = self._template(reason.code)
         within = {"causes": "; ".join(causes), "lines": "\n".join(causes), "remedies": remedies}
+        within |= {f"cause_{number}": cause for number, cause in enumerate(causes, start=1)}
         text = self._filled(reason, found, within)
         return text if not remedies or "{remedies}" in (found or "") else f"{text}; {remedies}"
 
@@ -83,6 +85,11 @@ class _Writer(string.Formatter):
         """What would do; empty where nothing is known."""
         texts = (self._filled(each, self._template(each.code), {}) for each in reason.remedies)
         return self._either([text for text in texts if text != NOTHING])
+
+    def _within(self, cause: Explained) -> str:
+        """As it stands in another sentence: with a small first letter, where that is of its template."""
+        said, first = self.sentence(cause), (self._template(cause.code) or "")[:2]
+        return said[0].lower() + said[1:] if first.istitle() and said.startswith(first) else said
 
     def _filled(self, what: Coded, found: str | None, within: Mapping[str, str]) -> str:
         """A code that no catalogue has, as a newer program may send it, is given as it is, with its values."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.reasons import Reason
 from gemelo.services.stepper_gateway.control.control_handler import ControlHandler
 from gemelo.services.stepper_gateway.device.command_handler import CommandHandler
 from gemelo.services.stepper_gateway.device.echoes import Echoes
@@ -41,14 +42,14 @@ class Components:
         self.echoes = Echoes(self.device)
         self.control = ControlHandler(self, arm.name, session_id)
 
-    def abort_all(self, reason: str, moment: Moment) -> None:
+    def abort_all(self, reason: Reason, moment: Moment) -> None:
         """Nothing of what was under way is continued."""
         if self.goals.is_active:
             self.goals.abort(reason, moment)
         self.streaming.interrupt()
         self.controller.transmission.abandon()
 
-    def on_unreachable(self, reason: str, moment: Moment) -> None:
+    def on_unreachable(self, reason: Reason, moment: Moment) -> None:
         """The device cannot be reached: whatever it does now it does by itself."""
         is_moving = self.controller.is_followable
         self.abort_all(reason, moment)
@@ -65,7 +66,7 @@ class Components:
             self.goals.on_foreign_motion(moment)
             self.command_handler.send_due(moment)
 
-    def start_over(self, reason: str, moment: Moment) -> None:
+    def start_over(self, reason: Reason, moment: Moment) -> None:
         """Another boot, or another configuration: what the gateway knew of the arm's steps means nothing."""
         self.abort_all(reason, moment)
         self.gripper.abort(reason, moment)

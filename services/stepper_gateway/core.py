@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import ConfigureResponse, DeviceCommandKind
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import DEVICE_STATUS
 from gemelo.services.stepper_gateway.components import Components
@@ -18,7 +19,7 @@ from gemelo.services.stepper_gateway.device.command_arguments import STOPS, kind
 from gemelo.services.stepper_gateway.device.frame_handler import FrameHandler
 from gemelo.services.stepper_gateway.device.gateway_device import StatusWatch
 from gemelo.services.stepper_gateway.device.other_writers import Strangers
-from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
+from gemelo.services.stepper_gateway.goals.goal_executor import CancelVerdict, GoalVerdict
 from gemelo.services.stepper_gateway.goals.scene_versions import SceneVersion
 from gemelo.services.stepper_gateway.inputs import (
     BeganInput,
@@ -95,20 +96,20 @@ class GatewayCore:
             case FrameInput():
                 if not self._take_frame(given, moment):
                     return None, parts.out.take()
-            case LinkInput(connected, reason):
-                self._on_link(connected, reason, moment)
+            case LinkInput():
+                self._on_link(given, moment)
             case TargetsInput():
                 self._take_targets(given, moment)
             case GoalInput():
                 reply = self._accept_goal(given, moment)
             case CancelInput(goal_id):
-                reply = parts.goals.cancel(goal_id, moment)
+                reply = CancelVerdict(parts.goals.cancel(goal_id, moment))
                 parts.command_handler.send_due(moment)
             case GripInput(goal_id, goal, session):
                 refusal = parts.control.verdict(MotionCaller(session), moment)
                 reply = refusal or parts.gripper.accept(goal_id, goal, moment)
             case GripCancelInput(goal_id):
-                reply = parts.gripper.cancel(goal_id, moment)
+                reply = CancelVerdict(parts.gripper.cancel(goal_id, moment))
             case PlannerInput(instance, is_there):
                 parts.goals.scenes.on_planner(instance, is_there)
             case CommandInput():
@@ -136,10 +137,10 @@ class GatewayCore:
                 raise ValueError("a core begins once: make another one")
         return reply, self._finish(moment)
 
-    def not_ready(self, moment: Moment) -> str:
-        """Why the gateway's state is not valid, empty if it is."""
+    def not_ready(self, moment: Moment) -> Reason | None:
+        """Why the gateway's state is not valid, None if it is."""
         device = self.device
-        return device.unreachable_reason(moment) or ("" if device.state is not None else device.not_ready_reason())
+        return device.unreachable_reason(moment) or (None if device.state is not None else device.not_ready_reason())
 
     def prepare_goal(self, goal: FollowJointTrajectoryGoal, moment: Moment) -> Iterator[None]:
         """Checks a long goal ahead, in pieces; no input: what `handle` then decides is the same without it."""
@@ -170,7 +171,7 @@ class GatewayCore:
         for frame in device.session.due(moment):
             self._components.out.send(REGULAR[type(frame)], encode(frame))
         unreachable_reason = device.unreachable_reason(moment)
-        if unreachable_reason:
+        if unreachable_reason is not None:
             self._components.on_unreachable(unreachable_reason, moment)
         self._components.goals.step(moment, period)
         self._components.streaming.step(moment)
@@ -186,12 +187,13 @@ class GatewayCore:
         self.controller.pump(moment)
         self._components.stopping.step(moment)
 
-    def _on_link(self, connected: bool, reason: str, moment: Moment) -> None:
-        session = self.device.session
+    def _on_link(self, link: LinkInput, moment: Moment) -> None:
+        session, connected = self.device.session, link.connected
+        reason = link.why or plain(link.reason)
         if connected != session.link_up:
             session.on_link(connected, reason)
             level = LogLevel.INFO if connected else LogLevel.WARNING
-            self.device.event("connected" if connected else "disconnected", reason, moment, level)
+            self.device.event("connected" if connected else "disconnected", link.why or link.reason, moment, level)
         session.link_reason = reason
 
     def _take_frame(self, frame: FrameInput, moment: Moment) -> bool:
@@ -201,10 +203,11 @@ class GatewayCore:
         except BadFrame as error:
             self.bad_frames += 1
             if isinstance(error, NoFrame):
-                self._strangers.on_message(frame.kind, str(error), moment.monotonic)
+                self._strangers.on_message(frame.kind, error, moment.monotonic)
             if moment.monotonic - self._bad_reported >= BAD_FRAME_REPORT:
                 self._bad_reported = moment.monotonic
-                self.device.event("bad_frame", f"{frame.kind}: {error} ({self.bad_frames} so far)", moment)
+                about = {"kind": frame.kind.value, "count": self.bad_frames}
+                self.device.event("bad_frame", because("device.bad_frame", plain(str(error)), **about), moment)
             return False
         return True
 
@@ -244,12 +247,12 @@ class GatewayCore:
         parts, kind = self._components, STOPS[given.request.kind]
         if parts.command_handler.stop(kind, given.ticket, parts.goals.is_active, moment):
             self._make_way_for(kind, moment)
-            parts.gripper.abort(f"stopped by a device command ({kind.name})", moment)
+            parts.gripper.abort(because("ending.command", command=kind.name), moment)
         parts.command_handler.send_due(moment)
 
     def _configure(self, ticket: int, caller: MotionCaller, moment: Moment) -> None:
         if objection := self._components.control.objection(caller, moment):
-            self._components.out.put(Answer(ticket, ConfigureResponse(accepted=False, reason=objection)))
+            self._components.out.put(Answer(ticket, ConfigureResponse(reason=str(objection), why=objection)))
             return
         self.device.configuration.ask(ticket, self.device.unreachable_reason(moment), moment)
 
@@ -259,7 +262,7 @@ class GatewayCore:
             return
         self._components.streaming.interrupt()
         if self._components.goals.is_active:
-            self._components.goals.stop(f"stopped by a device command ({kind.name})", moment)
+            self._components.goals.stop(because("ending.command", command=kind.name), moment)
         elif kind == DeviceCommandKind.STOP:
             self.controller.stop(moment)
         else:
@@ -269,7 +272,7 @@ class GatewayCore:
         """Tell of the device's status where it has changed, and hand the outputs out."""
         self._components.command_handler.tell_listeners(moment)
         self._components.control.tell(moment)
-        warning = self._components.goals.scenes.rivals or self._strangers.text(moment.monotonic)
+        warning = self._components.goals.scenes.rivals or self._strangers.reason(moment.monotonic)
         if (status := self._status.changed(moment, warning)) is not None:
             self._components.out.publish(DEVICE_STATUS, status)
         return self._components.out.take()

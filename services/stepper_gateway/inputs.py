@@ -16,11 +16,12 @@ from gemelo.schemas.device import DeviceCommandRequest, DeviceStopRequest, Injec
 from gemelo.schemas.gripper import GripperCommandGoal
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
-from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
+from gemelo.schemas.reasons import Reason
+from gemelo.services.stepper_gateway.goals.goal_executor import CancelVerdict, GoalVerdict
 from gemelo.services.stepper_gateway.ledger.confidence import LedgerRecord
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.moment import Moment
-from gemelo.services.stepper_gateway.outputs import Output, Publish
+from gemelo.services.stepper_gateway.outputs import Answer, GoalFinished, GripperFinished, Output, Publish
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
 LARGEST = 64 * 1024 * 1024  # [B] of one message's inputs, unpacked; chosen: far beyond half a second of them
@@ -55,6 +56,7 @@ class LinkInput(_Input, frozen=True):
 
     connected: bool
     reason: str
+    why: Reason | None = None  # `reason` as data
 
 
 class FrameInput(_Input, frozen=True):
@@ -155,7 +157,7 @@ Input = (
     | GripCancelInput | SceneInput | PlannerInput | TargetsInput | CommandInput | StopInput | ConfigureInput
     | InjectInput | EchoInput | TakeControlInput | JoinControlInput | GiveControlInput
 )  # fmt: skip
-Reply = GoalVerdict | str | None  # what is said at once
+Reply = GoalVerdict | CancelVerdict | None  # what is answered at once
 
 
 class Given(msgspec.Struct, frozen=True, array_like=True):
@@ -176,12 +178,24 @@ def digest_of(reply: Reply, outputs: list[Output]) -> int:
 
     0 where there is none. No CRC-32: that of a frame which ends with its own CRC-32 is the same for every content.
     """
-    spoken = reply[:3] if isinstance(reply, GoalVerdict) else reply  # whose sentence is made of its reason
-    said = [] if reply is None else [msgspec.msgpack.encode(spoken)]
+    said = [] if reply is None else [msgspec.msgpack.encode(_without_reason(reply))]
     for output in outputs:
         if type(output) is not Publish:
-            said += (type(output).__name__.encode(), msgspec.msgpack.encode(output))
+            said += (type(output).__name__.encode(), _encoded(output))
     return int.from_bytes(blake2b(b"".join(said), digest_size=8).digest(), "big") if said else 0
+
+
+def _without_reason(reply: GoalVerdict | CancelVerdict) -> tuple[bool, int, str] | str:
+    """Its sentence alone, as recordings from before the reasons have it; the sentence is made of the reason."""
+    return reply[:3] if isinstance(reply, GoalVerdict) else str(reply.why or "")
+
+
+def _encoded(output: Output) -> bytes:
+    if not isinstance(output, GoalFinished | GripperFinished | Answer):
+        return msgspec.msgpack.encode(output)
+    fields = msgspec.to_builtins(output)
+    fields["response" if isinstance(output, Answer) else "result"].pop("why", None)
+    return msgspec.msgpack.encode(fields)
 
 
 _decoder = msgspec.msgpack.Decoder(list[Given])

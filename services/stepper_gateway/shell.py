@@ -32,6 +32,7 @@ from gemelo.schemas.motion import (
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
 )
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.topics import (
     CONTROL_GIVE,
     CONTROL_JOIN,
@@ -49,7 +50,7 @@ from gemelo.schemas.topics import (
 )
 from gemelo.services.stepper_gateway.control.control import seal
 from gemelo.services.stepper_gateway.core import GatewayCore
-from gemelo.services.stepper_gateway.goals.goal_executor import GoalVerdict
+from gemelo.services.stepper_gateway.goals.goal_executor import CancelVerdict, GoalVerdict
 from gemelo.services.stepper_gateway.goals.goal_reading import read_goal
 from gemelo.services.stepper_gateway.goals.pieces import Pieces
 from gemelo.services.stepper_gateway.input_log import InputLog
@@ -99,7 +100,7 @@ from gemelo.services.stepper_gateway.parameters import GatewayParameters
 PLANNER = "planner"  # the node whose scene counts, and which streams targets for others
 AT_ONCE = 16  # payloads handled before the loop looks at its deadline and for stops; chosen: about 1 ms
 
-WAS_STOPPED = "this gateway's process was stopped: it looks whether another has taken its place: wait two seconds"
+WAS_STOPPED = because("gateway.was_stopped")
 
 Server = ActionServer[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
 
@@ -156,7 +157,7 @@ class Shell:
     def step(self, _now: int) -> None:
         """One turn of the control loop; none while another gateway may have taken this one's place."""
         if self._is_silent():
-            return self._node.set_ready(False, WAS_STOPPED)
+            return self._node.set_ready(False, str(WAS_STOPPED))
         if self._parameters.value is not self._told:
             self._told = self._parameters.value
             self._handle(ParametersInput(self._told))
@@ -164,7 +165,7 @@ class Shell:
         self._handle(StepInput(self._absences.seconds(self._core.watched_clients, moment.monotonic)))
         moment = self._moment()
         reason = self._core.not_ready(moment)
-        self._node.set_ready(not reason, reason)
+        self._node.set_ready(reason is None, str(reason or ""))
         self._inputs.step(moment, self._told.record_inputs)
 
     def finish(self) -> None:
@@ -207,27 +208,27 @@ class Shell:
 
     def _on_goal(self, goal_id: str, goal: FollowJointTrajectoryGoal) -> GoalDecision:
         if self._is_silent():
-            return refuse(FollowErrorCode.DEVICE_FAILED, WAS_STOPPED)
+            return refuse(FollowErrorCode.DEVICE_FAILED, str(WAS_STOPPED), WAS_STOPPED)
         try:
             return _decision(self._handle(GoalInput(goal_id, goal, self._server.session_of(goal_id))))
         except Exception:
             self._handle(CancelInput(goal_id))  # it is refused, so the arm must not follow it
             raise
 
-    def _on_cancel(self, goal_id: str) -> str:
-        return str(self._handle(CancelInput(goal_id)))
+    def _on_cancel(self, goal_id: str) -> Reason | None:
+        return _objection(self._handle(CancelInput(goal_id)))
 
     def _on_grip(self, goal_id: str, goal: GripperCommandGoal) -> GoalDecision:
         if self._is_silent():
-            return refuse(FollowErrorCode.DEVICE_FAILED, WAS_STOPPED)
+            return refuse(FollowErrorCode.DEVICE_FAILED, str(WAS_STOPPED), WAS_STOPPED)
         try:
             return _decision(self._handle(GripInput(goal_id, goal, self._gripper.session_of(goal_id))))
         except Exception:
             self._handle(GripCancelInput(goal_id))
             raise
 
-    def _on_grip_cancel(self, goal_id: str) -> str:
-        return str(self._handle(GripCancelInput(goal_id)))
+    def _on_grip_cancel(self, goal_id: str) -> Reason | None:
+        return _objection(self._handle(GripCancelInput(goal_id)))
 
     def _on_targets(self, targets: JointTargets, writer: str) -> None:
         """The planner's are those of whom it jogs for; of anybody else it does not count what they say of that."""
@@ -322,3 +323,9 @@ def _decision(reply: Reply) -> GoalDecision:
     """A verdict as the action's server says it."""
     assert isinstance(reply, GoalVerdict)
     return accept() if reply.accepted else refuse(reply.code, reply.reason, reply.why)
+
+
+def _objection(reply: Reply) -> Reason | None:
+    """Why a goal is not cancelled; None where it is."""
+    assert isinstance(reply, CancelVerdict)
+    return reply.why

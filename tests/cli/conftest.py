@@ -88,9 +88,8 @@ class PretendGateway:
         self._goal = (goal_id, self._node.monotonic())
         return accept()
 
-    def _on_cancel(self, goal_id: str) -> str:
+    def _on_cancel(self, goal_id: str) -> None:
         self._finish(GoalStatusCode.CANCELED, "cancelled")
-        return ""
 
     def _finish(self, status: GoalStatusCode, reason: str) -> None:
         assert self._goal is not None

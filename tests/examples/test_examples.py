@@ -112,7 +112,7 @@ class Follower:
         self.states = node.publisher(JOINT_STATES)
         self.server: ActionServer[
             FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult
-        ] = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self.on_goal, lambda goal_id: "")
+        ] = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self.on_goal, lambda goal_id: None)
 
     def on_goal(self, goal_id: str, goal: FollowJointTrajectoryGoal) -> GoalDecision:
         self.goals.append(goal)
@@ -159,9 +159,8 @@ def test_ctrl_c_in_custom_planner_cancels_its_move(start: Start, robot: Node) ->
         running.append(goal_id)
         return accept()
 
-    def on_cancel(goal_id: str) -> str:
+    def on_cancel(goal_id: str) -> None:
         cancelled.append(goal_id)
-        return ""
 
     server = robot.serve_action(FOLLOW_JOINT_TRAJECTORY, on_goal, on_cancel)
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from gemelo.libraries.recordings.channels import Entry
 from gemelo.schemas.message import Message, decode, encode
+from gemelo.schemas.reasons import Reason
 from gemelo.schemas.topics import TOPICS
 from gemelo.services.logger.core import Logger
 from gemelo.services.logger.recording import Recording
@@ -24,6 +25,9 @@ SECOND = 1_000_000_000
 texts = st.text(max_size=8)
 
 
+HOLDING_THEIR_OWN = (Reason,)
+
+
 def values(kind):
     """A strategy for a field's type: everything that fits on the wire."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
@@ -32,6 +36,10 @@ def values(kind):
         return st.lists(values(arguments[0]), max_size=3).map(tuple) if many else st.tuples(*map(values, arguments))
     if origin in (typing.Union, types.UnionType):
         return st.one_of(*map(values, arguments))
+    if origin is dict:
+        return st.dictionaries(*map(values, arguments), max_size=2)
+    if kind in HOLDING_THEIR_OWN:  # at the depth of one: a reason behind a reason
+        return st.just(kind())
     if issubclass(kind, Message):
         return messages(kind)
     if issubclass(kind, enum.Enum):

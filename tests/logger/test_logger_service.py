@@ -191,7 +191,7 @@ def test_goals_requests_parameters_and_a_users_topic_are_recorded_as_what_they_a
     ):
         planner.serve(PLAN, lambda question: PlanResponse(code=PlanCode.SUCCESS))
         gateway.serve(DEVICE_STOP, lambda question: DeviceCommandResponse(accepted=True))
-        action = gateway.serve_action(GRIPPER_COMMAND, lambda goal_id, goal: accept(), lambda goal_id: "")
+        action = gateway.serve_action(GRIPPER_COMMAND, lambda goal_id, goal: accept(), lambda goal_id: None)
         sensor.serve(WEIGH, lambda question: Torque(value=question.value + 1.0))
         sensor.parameters(SensorParameters)
         torque = sensor.publisher(TORQUE)

@@ -27,22 +27,19 @@ from gemelo.programs import (
 )
 from gemelo.programs.steps import KINDS
 from gemelo.schemas.device import DeviceCommandKind, DeviceFault, DeviceMode, StopKind
-from gemelo.schemas.device_faults import fault_text
+from gemelo.schemas.device_faults import fault_reason, fault_text
 from gemelo.schemas.motion import FollowErrorCode
+from gemelo.schemas.reasons import Reason, because, plain, remedy
 from gemelo.services.panel.model.problems import problem_of
 from gemelo.services.panel.words.step_text import step_text
 from gemelo.services.panel.words.words import LANGUAGES, Words
 from gemelo.services.stepper_gateway.device.command_handler import NOT_NOW, REMEDIES, complaint
-from gemelo.services.stepper_gateway.device.session import DEAF, ONE_NAME
-from gemelo.services.stepper_gateway.links.foreign.ra_device import LOST, SILENT
-from gemelo.services.stepper_gateway.links.foreign.text_device import LOST_IN_A_MOTION, MUTE
 from gemelo.services.stepper_gateway.links.frames import Code
 from tests.table import table
 
 ROOT = Path(__file__).parents[2]
 SPANISH, ENGLISH = Words("es"), Words("en")
-SAID_WITHIN = "a newer goal took over"  # a sentence that is known, to stand at the places of values
-REFUSALS = ("invalid", "invalid_joints", "GoalRejected", "_changed", "GoalEnding", "abort", "stop")
+SAID_WITHIN = "all joints are home"  # a sentence that is known, to stand at the places of values
 ERRORS = (
     "BadArgument",
     "Refused",
@@ -59,7 +56,7 @@ def sentences_in(path: Path) -> Iterator[str]:
     """What is refused, raised or returned as a text in the file, with `SAID_WITHIN` for every value."""
     tree = ast.parse(path.read_text())
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in (*REFUSALS, *ERRORS):
+        if isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in ERRORS:
             for argument in node.args:
                 yield from _texts(argument)
         elif isinstance(node, ast.FunctionDef) and node.returns is not None and ast.unparse(node.returns) == "str":
@@ -90,43 +87,18 @@ def _part(node: ast.expr) -> str:
 
 
 PARTS = [
-    *(f"services/stepper_gateway/{room}" for room in ("goals", "device", "control", "gripper", "motion", "core.py")),
     "services/planner/scene",
     *("services/planner/collision/scene_shapes.py", "services/planner/collision/arm_geometry.py"),
     *("libraries/runtime/requests/client.py", "libraries/runtime/requests/limits.py", "libraries/arm/stl.py"),
     *("services/panel/model", "gemelo"),
 ]
 WITHIN_OTHERS = {  # parts of sentences, which are tested as a whole below
-    "joint limits": "make the trajectory {} times as long",
-    "bounds": "{} (between points, at {} s)",
-    "rate": 'joint "{}": {} steps/s at {} s is more than the {} steps/s that its driver and the device can do; {}',
-    "velocity": 'joint "{}": {} {}/s at {} s is beyond the velocity limit {} {}/s; {}',
-    "point": "{} at point {} ({} s)",
-    "followed": "goal {} cannot be followed, {}: plan from where the arm is",
-    "scene": "{}: plan again",
-    "another scene": "planned in version {} of a scene that the planner holds no more; another one is at version {} "
-    "now",
-    "older scene": "planned in scene version {}, the scene is version {} now",
-    "tolerance": "{}: {} {} is negative; give a bound, 0 for the default or -1 for no bound",
-    "acceleration": "{}: an acceleration of {} {}/s^2 cannot be watched, because the device measures steps and "
-    "velocities only; give 0 or -1, and bound the velocity",
-    "answer": "the device has not answered {} in time, which was sent {} times{}",
-    "e-stop": 'the emergency stop "{}" of device "{}" is pressed: release it, {}',
-    "e-stop before": 'the emergency stop of device "{}" was pressed: {}',
-    "clock": 'the clock of device "{}" is not known yet: {}',
-    "devices": '{} devices call themselves "{}": {}: {}',
     "not usable": "the device is {}",
-    "heard": 'device "{}" has not been heard: {}',
-    "gone": "{} for {} s: take control anew with `gemelo control take --force`",
     "picked": "{} is at {}: seen +-{} mm{}{}, {} s{}",
     "unseen": "{}; not seen afterwards: {}",
     "configuration": "the device refused the configuration: {}{}",
 }
 NOT_ON_THE_PAGE = {  # of files, logs and clients that a page does not have, and arguments that only a script gives
-    "services/stepper_gateway/goals/active_goal.py": ("{}; {}; {} steps from the goal", "{}; nothing moved for it"),
-    "services/stepper_gateway/goals/scene_versions.py": ("version {} is ", "it comes from {}", "a process that "),
-    "services/stepper_gateway/device/state_checks.py": ("a state that ",),
-    "services/stepper_gateway/device/echoes.py": ("too many measurements", "no link to the device", "its longest pass"),
     "gemelo/api/connection.py": ("no {} of {} at the router",),
     "gemelo/api/control_file.py": ("{} belongs to user", "{}: {}: name another file in"),
     "gemelo/api/motion.py": ("{} in {} s{}, final error",),
@@ -160,6 +132,11 @@ def told_in_spanish(english: str) -> str:
     """What a person reads, who must not find English words in it."""
     said = SPANISH.said(english)
     assert said != english, english
+    return spanish(said)
+
+
+def spanish(said: str) -> str:
+    """The sentence, which has no common English word and no command in it."""
     assert not english_in(said), said
     assert "gemelo " not in said
     return said
@@ -169,8 +146,8 @@ def told_in_spanish(english: str) -> str:
 @table("mode", DeviceMode)
 def test_every_command_that_the_device_refuses_in_any_mode_with_any_code(kind: DeviceCommandKind, mode: DeviceMode):
     for code in Code:
-        told = complaint(kind, SimpleNamespace(code=code, mode=mode))
-        said = told_in_spanish(f"{kind.name.lower()} refused: {told}")
+        said = SPANISH.why(complaint(kind, SimpleNamespace(code=code, mode=mode)))
+        assert not english_in(said), said
         for english in (kind.name, mode.name, code.name):
             assert not re.search(rf"\b{english}\b", said), said
 
@@ -178,10 +155,11 @@ def test_every_command_that_the_device_refuses_in_any_mode_with_any_code(kind: D
 @table("fault", [*(fault for fault in DeviceFault if fault), 99])
 @table("joint", ["", "brazo_joint"])
 def test_every_fault_has_its_meaning_and_remedy_in_spanish(fault: int, joint: str):
-    said = told_in_spanish(fault_text(fault, joint))
-    assert joint in said
-    assert fault == 99 or DeviceFault(fault).name not in said
-    assert told_in_spanish(f'device "x" has a fault: {fault_text(1, joint)}')
+    reason = fault_reason(fault, joint)
+    assert reason is not None
+    for said in (told_in_spanish(fault_text(fault, joint)), spanish(SPANISH.why(reason))):
+        assert joint in said
+        assert fault == 99 or DeviceFault(fault).name not in said
 
 
 @table("code", [code for code in FollowErrorCode if code])
@@ -196,54 +174,14 @@ def test_every_code_of_a_goal_is_said_in_spanish_where_its_sentence_is_not_known
 
 @table("kind", StopKind)
 def test_a_stop_that_is_refused_says_why(kind: StopKind):
-    reason = f"a goal is being carried out: cancel it or run `gemelo stop` before {kind.name}"
-    refused = gemelo.Refused(f"{kind} refused: {reason} (device mode RUN)", check="device", reason=reason)
-    assert SPANISH.problem(problem_of(refused))[1].startswith("El brazo va hacia una meta: pulse Parar antes de ")
-
-
-BEYOND = 'joint "a": 3.2000 rad is beyond the upper limit 2.9497 rad; stay within -2.9497 to 2.9497 rad'
+    why = because("command.goal_active", command=kind.name)
+    refused = gemelo.Refused(f"{kind} refused: {why} (device mode RUN)", check="device", reason=why)
+    assert SPANISH.problem(problem_of(refused))[1].startswith("El brazo va hacia una meta: pulse PARAR antes de ")
 
 
 @table(
     ("english", "spanish"),
     [
-        (f"{BEYOND} at point 3 (1.000 s)", "a: 3.2000 rad está más allá del límite superior de 2.9497 rad; quédese "
-         "entre -2.9497 y 2.9497 rad (punto 3, a los 1.000 s)."),
-        (f"{BEYOND} (between points, at 1.000 s)", "entre dos puntos, a los 1.000 s"),
-        ('joint "a": 900 steps/s at 1.000 s is more than the 500 steps/s that its driver and the device can do; make '
-         "the trajectory 1.80 times as long", "900 pasos/s a los 1.000 s son más que los 500"),
-        ('joint "a": 2.0000 rad/s at 1.000 s is beyond the velocity limit 1.0000 rad/s; make the trajectory 2.00 times '
-         "as long", "su límite de velocidad, 1.0000 rad/s: vaya 2.00 veces más despacio"),
-        ("goal g1 cannot be followed, it ended ABORTED: plan from where the arm is", "(antes de la meta)"),
-        ("goal g1 cannot be followed, it is not under way: plan from where the arm is", "ya no está en marcha"),
-        ("planned in scene version 3, the scene is version 4 now: plan again", "en la versión 3 de la escena"),
-        ("planned in version 3 of a scene that the planner holds no more; another one is at version 1 now: plan again",
-         "versión 3 de una escena que ya no hay"),
-        ('goal_tolerance of joint "a": position -2 is negative; give a bound, 0 for the default or -1 for no bound',
-         "position -2 es negativo"),
-        ('path_tolerance of joint "a": an acceleration of 3 rad/s^2 cannot be watched, because the device measures '
-         "steps and velocities only; give 0 or -1, and bound the velocity", "una aceleración de 3 rad/s^2"),
-        ("the device has not answered ARM in time, which was sent 3 times", "a encender los motores, que se le envió "
-        "3"),
-        ('the device has not answered HOME in time, which was sent 3 times: device "x" is offline: switch it on, or '
-         "check its network", "no está conectado"),
-        ('the emergency stop "estop" of device "x" is pressed: release it, run `gemelo reset`, `gemelo device arm`, '
-        'then '
-         "`gemelo home` or `gemelo reference`", "«estop» del equipo «x» está pulsada"),
-        ("ana (node cli-1 on desk), who holds control, is gone for 1.2 s: take control anew with `gemelo control take "
-         "--force`", "ana (node cli-1 on desk), que tiene el mando"),
-        ("refused by stepper_gateway: ana holds control of rm1, since 09:10:11 UTC (12 s ago), from node cli-1 on "
-        "desk: "
-         "ask for it, or run `gemelo control take --force`", "ana tiene el mando de rm1 desde las 09:10:11 UTC (hace "
-         "12"),
-        ('the device is not usable: two devices call themselves "rm1": boot 00000001 (virtual); boot 00000002 (board): '
-         f"{ONE_NAME}", "se llama «rm1» (boot 00000001 (virtual); boot 00000002 (board))"),
-        (SILENT.format(silence=0.31), "El sketch calló 0.31 s con un mensaje por hacer"),
-        (LOST, "El broker no entregó el último mensaje de pasos"),
-        (f'no link to device "rm1": {MUTE.format(silence=1.2, baud=115200)} (port /dev/ttyUSB0)',
-         "trabaja la placa a 115200 baudios?"),
-        (LOST_IN_A_MOTION.format(mute=MUTE.format(silence=1.2, baud=115200)), "Estaba en movimiento y no se sabe"),
-        (f'device "rm1" {DEAF} (for 12 s)', "Sin latidos se detiene solo. (desde hace 12 s)"),
         ("cup is not seen by overhead, and nothing else: is it in the image, lit, and not behind the arm? `gemelo "
          "camera view`", "overhead no ve cup, ni nada más"),
         ("cup is not seen by overhead, which see red_block: is it in the image, lit, and not behind the arm? `gemelo "
@@ -255,18 +193,55 @@ BEYOND = 'joint "a": 3.2000 rad is beyond the upper limit 2.9497 rad; stay withi
         ("gripper: 20.0 mm, stopped by what is between the jaws (commanded, not measured), holds cup", "lleva cup"),
         ('refused: object "x": its data is no usable STL file: it is no STL file: 17 bytes that are neither the binary '
          "form nor begin with solid", "«x»: el archivo no sirve. No es un archivo STL (17 bytes)."),
-        ('the emergency stop of device "x" was pressed: run `gemelo reset`, `gemelo device arm`, then `gemelo home` or '
-         "`gemelo reference`", "Se pulsó la parada de emergencia del equipo «x»"),
-        ('device "x" has not been heard: is it switched on, does it use the same broker, and does the broker\'s ACL '
-         "let it write?", "Aún no se oye al equipo «x»"),
-        ('the clock of device "x" is not known yet: try again in a second', "Aún no se conoce el reloj del equipo «x»"),
         ("cup: it is seen 2 times: take the others away, or give each a tag of its own", "cup: se ve 2 veces"),
-        ("aborted after 2.10 s: the device holds because it lost the gateway's heartbeat; then stopped by a device "
-         "command (DISARM)", "Luego: Lo detuvo una orden al equipo (apagar los motores)."),
     ],
 )  # fmt: skip
 def test_sentences_that_are_put_together_keep_their_values(english: str, spanish: str):
     assert spanish in told_in_spanish(english)
+
+
+OFFLINE = because("device.offline", device="x")
+HOLDER = {"name": "ana", "node": "cli-1", "host": "desk"}
+VIRTUAL = because("device.boot.reported", boot="00000001", kind="virtual", firmware="1.0.0")
+
+
+@table(
+    ("reason", "expected"),
+    [
+        (because("command.unanswered", command="ARM", count=3), "a encender los motores, que se le envió 3 veces"),
+        (because("command.unanswered.unreachable", OFFLINE, command="HOME", count=3), "3 veces: el equipo «x» no está"),
+        (because("command.last_state.stands", OFFLINE, age=1.25, mode="IDLE"), "hace 1.2 s, está quieto y en reposo."),
+        (because("device.estop.pressed", remedy("release_and_reset"), device="x", input="estop"),
+         "«estop» del equipo «x» está pulsada: suéltela, pulse «Borrar el fallo» y «Encender los motores»"),
+        (because("device.estop.was_pressed", remedy("reset_and_reference"), device="x"), "Se pulsó la parada"),
+        (because("device.disarmed", remedy("home_or_reference"), device="x"),
+         "pulse «Encender los motores»; luego pulse «Buscar el origen», o ponga el brazo en su posición de referencia"),
+        (because("device.unreferenced", remedy("reference_by_hand"), device="x", joints=("a", "b")), "está a, b: "),
+        (because("device.several", VIRTUAL, because("device.boot", boot="00000002"), device="rm1", number="two"),
+         "Hay dos equipos que se llaman «rm1» (arranque 00000001 (virtual, firmware 1.0.0); arranque 00000002)"),
+        (because("device.for_time", because("device.deaf", device="rm1"), time=12.0), "solo (desde hace 12 s)."),
+        (because("device.never_received", device="x"), "Aún no llega nada del equipo «x»"),
+        (because("device.clock_unknown", device="x"), "Aún no se conoce el reloj del equipo «x»"),
+        (because("device.held", device="x"), "pulse antes «Continuar» o PARAR."),
+        (because("control.holder_gone.anew", time=1.2, **HOLDER), "ana (nodo cli-1 de desk), que tiene el mando, "),
+        (because("control.held", robot="rm1", clock="09:10:11", age=12.0, **HOLDER),
+         "ana tiene el mando de rm1 desde las 09:10:11 UTC (hace 12 s), en el nodo cli-1 de desk: pídaselo, o pulse "
+         "«Quitar el mando a quien lo tiene»."),
+        (because("ended.aborted", because("ending.then", because("ending.held.heartbeat"),
+                                          because("ending.command", command="DISARM")), time=2.1),
+         "Terminó antes de la meta, tras 2.10 s: el equipo se detuvo porque dejaron de llegarle los latidos de "
+         "stepper_gateway; luego lo detuvo una orden al equipo (apagar los motores)."),
+        (because("ending.off_velocity", joint="a", time=0.5, error=0.1, bound=0.05, unit="rad"),
+         "a se apartó 5.7°/s de su velocidad a los 0.500 s; se permiten 2.9°/s."),
+        (because("ending.before_it", because("ending.canceled"), goal="g1", status="CANCELED"),
+         "terminó antes (cancelado): el brazo frenó sobre su camino."),
+        (because("gripper.opening.beyond", value=0.06, closed=0.0, open=0.05), "60 mm no está entre 0 mm (cerrada)"),
+        (because("ledger.doubt.load", remedy("reference_joint", joint="a"), joint="a", by="switch", load=0.21),
+         "a, verificada por su interruptor: se le pidió el 21 % de su par máximo: no tiene interruptor: pulse"),
+    ],
+)  # fmt: skip
+def test_a_reason_of_the_gateway_is_spanish_on_the_page_with_its_values_and_buttons(reason: Reason, expected: str):
+    assert expected in spanish(SPANISH.why(reason))
 
 
 def test_a_sentence_around_one_that_is_not_known_is_left_as_it_came():
@@ -276,9 +251,11 @@ def test_a_sentence_around_one_that_is_not_known_is_left_as_it_came():
 
 
 def test_what_the_gateway_and_the_device_say_to_do_is_to_press_buttons_in_both_languages():
-    for text in (*REMEDIES.values(), *NOT_NOW.values(), fault_text(DeviceFault.EMERGENCY_STOP)):
-        told_in_spanish(text)
-        assert re.findall("`gemelo ([^`]*)`", ENGLISH.said(text)) in ([], ["device config"])
+    remedies = [remedy(code) for code in (*REMEDIES.values(), *NOT_NOW.values())]
+    reasons = [because("command.refused", each, command="HOME", mode="RUN", answer="NOT_READY") for each in remedies]
+    for reason in (*reasons, fault_reason(DeviceFault.EMERGENCY_STOP) or plain("")):
+        for words in (SPANISH, ENGLISH):
+            assert re.findall("`gemelo ([^`]*)`", words.why(reason)) in ([], ["device config"])
     assert ENGLISH.said("run `gemelo device arm`, and wait") == "press “Switch the drivers on”, and wait"
     assert ENGLISH.said("release it, `gemelo reset`") == "release it, “Reset the fault”"
 

@@ -22,6 +22,7 @@ from gemelo.schemas.motion import (
     FollowJointTrajectoryResult,
     JointTrajectory,
 )
+from gemelo.schemas.reasons import Reason, plain
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
 from tests.runtime.support import Buses, hear, spinning, until
 
@@ -49,11 +50,11 @@ class Arm:
         self.left[goal_id] = len(goal.trajectory.joint_names)
         return accept()
 
-    def on_cancel(self, goal_id: str) -> str:
+    def on_cancel(self, goal_id: str) -> Reason | None:
         if self.left[goal_id] > 10_000:
-            return "it cannot be stopped any more"
+            return plain("it cannot be stopped any more")
         self.left[goal_id] = -1
-        return ""
+        return None
 
     def end(self, goal_id: str, status: GoalStatusCode) -> None:
         del self.left[goal_id]

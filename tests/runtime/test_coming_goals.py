@@ -38,7 +38,7 @@ class Reader:
     begun: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.action = self.node.serve_action(FOLLOW, self.on_goal, lambda goal_id: "", self.read)
+        self.action = self.node.serve_action(FOLLOW, self.on_goal, lambda goal_id: None, self.read)
         self.node.serve_later(DEVICE_STOP, self.on_stop)
 
     def read(self, payload: bytes) -> Generator[None, None, FollowJointTrajectoryGoal]:

@@ -122,7 +122,7 @@ def test_the_end_of_a_goal_is_told_though_no_client_asks_for_it(nodes, network):
     server, client = nodes
     ends = heard(network, keys.ended_topic(FOLLOW_JOINT_TRAJECTORY))
     goals = heard(network, exchange_topic(keys.goal_request(FOLLOW_JOINT_TRAJECTORY)))
-    action = server.serve_action(FOLLOW_JOINT_TRAJECTORY, lambda goal_id, goal: accept(), lambda goal_id: "")
+    action = server.serve_action(FOLLOW_JOINT_TRAJECTORY, lambda goal_id, goal: accept(), lambda goal_id: None)
     result = FollowJointTrajectoryResult(error_string="nothing to do")
     with spinning(server):
         handle = client.action(FOLLOW_JOINT_TRAJECTORY).send(FollowJointTrajectoryGoal())

@@ -56,7 +56,7 @@ def victim(network: MemoryNetwork, tmp_path_factory: pytest.TempPathFactory) -> 
         for topic in TOPICS:
             node.subscribe(topic, lambda message: None)
         node.serve(PLAN, lambda request: PLAN.response())
-        server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, lambda goal_id, goal: accept(), lambda goal_id: "")
+        server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, lambda goal_id, goal: accept(), lambda goal_id: None)
         assert server.active == ()
         yield node
 

@@ -121,7 +121,7 @@ def test_a_goal_of_a_hundred_thousand_points_arrives_and_what_a_server_says_of_i
         found.append(len(goal.trajectory.points))
         return refuse(1, "no" * 1_000_000)
 
-    server.serve_action(FOLLOW_JOINT_TRAJECTORY, on_goal, lambda goal_id: "")  # type: ignore[arg-type]
+    server.serve_action(FOLLOW_JOINT_TRAJECTORY, on_goal, lambda goal_id: None)  # type: ignore[arg-type]
     with spinning(server):
         with pytest.raises(GoalRefused) as refused:
             client.action(FOLLOW_JOINT_TRAJECTORY).send(goal)
@@ -131,7 +131,7 @@ def test_a_goal_of_a_hundred_thousand_points_arrives_and_what_a_server_says_of_i
 
 def test_a_name_without_an_end_is_refused_before_every_status_would_carry_it(buses: Buses) -> None:
     server, client = buses.node("stepper_gateway"), buses.node("client")
-    server.serve_action(GRIPPER_COMMAND, lambda goal_id, goal: accept(), lambda goal_id: "")
+    server.serve_action(GRIPPER_COMMAND, lambda goal_id, goal: accept(), lambda goal_id: None)
     statuses = client.latest(status_topic(GRIPPER_COMMAND))
     with spinning(server):
         for request in (GoalRequest(goal_id="x" * 600_000), GoalRequest(goal_id="g", client="c" * 600_000)):

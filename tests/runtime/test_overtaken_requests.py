@@ -105,7 +105,7 @@ class SoMany(RequestRates):
 def gateway(buses: Buses, started: list[str], rates: RequestRates | None = None) -> tuple[Node, int]:
     """A node that refuses what a stop has overtaken, as stepper_gateway does, and the epoch of its goals."""
     node = buses.node("gateway", rates=rates)
-    action = node.serve_action(FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: "")
+    action = node.serve_action(FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: None)
 
     def on_stop(_request: DeviceStopRequest, pending: Pending[DeviceCommandResponse]) -> None:
         action.refuse_waiting("stop was asked for after it: ask again", pending.asked)

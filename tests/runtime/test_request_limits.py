@@ -160,7 +160,7 @@ def test_a_caller_above_the_rate_hears_at_once_of_how_much_is_taken(buses: Buses
 
 def test_a_goal_that_is_dropped_is_sent_again_a_few_times_only(buses: Buses) -> None:
     server, client = limited(buses, "gateway", Rate(0.0, 0)), buses.node("script")
-    server.serve_action(FOLLOW_JOINT_TRAJECTORY, lambda goal_id, goal: accept(), lambda goal_id: "")
+    server.serve_action(FOLLOW_JOINT_TRAJECTORY, lambda goal_id, goal: accept(), lambda goal_id: None)
     with pytest.raises(NoAnswer, match=r"follow_joint_trajectory/result: it has just ended .* dropped it unread"):
         client.action(FOLLOW_JOINT_TRAJECTORY).send(FollowJointTrajectoryGoal(), timeout=2.0)
     assert 1 < dropped(server, f"{FOLLOW_JOINT_TRAJECTORY.key}/result") <= 2.0 / PAUSE + 1

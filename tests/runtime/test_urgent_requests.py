@@ -194,7 +194,9 @@ def test_the_flood_of_one_client_leaves_room_for_another(buses: Buses) -> None:
 def test_what_a_stop_has_overtaken_is_refused(buses: Buses) -> None:
     server, client = buses.node("gateway"), buses.open()
     started: list[str] = []
-    action = server.serve_action(FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: "")
+    action = server.serve_action(
+        FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: None
+    )
 
     def stop(request: DeviceStopRequest) -> DeviceCommandResponse:
         action.refuse_waiting("stop was asked for after it: ask again", {})
@@ -222,7 +224,9 @@ def test_what_a_stop_has_overtaken_is_refused(buses: Buses) -> None:
 def test_a_goal_that_its_own_cancel_has_overtaken_does_not_start(buses: Buses) -> None:
     server, client = buses.node("gateway"), buses.open()
     started: list[str] = []
-    action = server.serve_action(FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: "")
+    action = server.serve_action(
+        FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: None
+    )
     goal_key, cancel_key = keys.goal_request(FOLLOW).key, keys.cancel_request(FOLLOW).key
     assert client.wait_served(goal_key, 1.0)
     assert client.wait_served(cancel_key, 1.0)

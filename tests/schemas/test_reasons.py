@@ -15,6 +15,7 @@ from gemelo.schemas.message import decode, encode
 from gemelo.schemas.reasons import FrontEnd, Reason, because, plain, remedy, say
 from gemelo.schemas.reasons.catalogue import ENGLISH, EXPLAIN, LANGUAGES, codes, entries, languages
 from gemelo.schemas.reasons.examples import example_of, examples
+from gemelo.schemas.reasons.sentences import WITHIN
 
 ROOT = project_root()
 BEYOND = because(
@@ -86,7 +87,7 @@ def test_the_values_at_a_call_are_those_of_its_template():
         code = call.args[0] if call.args else None
         if isinstance(code, ast.Constant) and all(word.arg for word in call.keywords):
             given = {str(word.arg) for word in call.keywords}
-            placed = places(catalogue(ENGLISH)[code.value]) - {"causes", "lines", "remedies"}
+            placed = places(catalogue(ENGLISH)[code.value]) - WITHIN
             assert placed == given, f"{file}: {code.value}"
 
 
@@ -143,7 +144,7 @@ def test_what_is_explained_is_a_code_or_the_beginning_of_some_in_every_language(
 def test_an_example_is_that_of_a_real_cause_and_has_the_values_of_its_template():
     assert sum(example_of(code) is each for code, each in examples().items()) > 30
     for code in codes():
-        assert set(example_of(code).values) == places(catalogue(ENGLISH)[code]) - {"causes", "lines", "remedies"}, code
+        assert set(example_of(code).values) == places(catalogue(ENGLISH)[code]) - WITHIN, code
 
 
 def test_the_index_has_every_template_that_the_files_have():

@@ -13,6 +13,7 @@ from gemelo.schemas.motion import (
     JointTrajectory,
     TrajectoryPoint,
 )
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import COMMAND_ACKS, COMMANDS, JOINT_STATES, STEP_ERRORS
 from gemelo.services.stepper_gateway.goals.active_goal import ActiveGoal
 from gemelo.services.stepper_gateway.goals.goal_validator import GoalValidator
@@ -192,7 +193,7 @@ def test_cancel_decelerates_on_the_path_within_the_limits() -> None:
     rig = VirtualArm().ready()
     rig.goal(move(HOME, READY))
     rig.run(1.5)
-    assert rig.handle(CancelInput("g")) == ""
+    assert rig.handle(CancelInput("g")).why is None
     status, result = rig.finish()
     assert status == GoalStatusCode.CANCELED
     assert result.error_code == FollowErrorCode.CANCELED
@@ -208,16 +209,16 @@ def test_cancel_decelerates_on_the_path_within_the_limits() -> None:
 def test_a_cancel_at_once_and_one_at_the_end_both_end_the_goal() -> None:
     rig = VirtualArm().ready()
     rig.goal(move(HOME, READY), "early")
-    assert rig.handle(CancelInput("early")) == ""
+    assert rig.handle(CancelInput("early")).why is None
     assert rig.finish("early", 5.0)[0] == GoalStatusCode.CANCELED
     rig.goal(move(rig.position, READY), "late")
     stream = rig.core.controller.stream
     assert stream is not None
     rig.run(20.0, lambda: stream.is_complete)
     rig.run(0.2)
-    assert rig.handle(CancelInput("late")) == ""
+    assert rig.handle(CancelInput("late")).why is None
     assert rig.finish("late", 5.0)[0] == GoalStatusCode.CANCELED
-    assert "not being carried out" in rig.handle(CancelInput("late"))
+    assert rig.handle(CancelInput("late")).why == because("goal.not_under_way", goal="late")
     assert_within_limits(rig)
 
 

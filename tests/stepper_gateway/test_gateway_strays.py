@@ -11,6 +11,7 @@ from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.libraries.runtime.serial_frames import packet
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import DEVICE_STATUS, JOINT_STATES
 from gemelo.services.stepper_gateway.links.frames import (
     Ack,
@@ -104,7 +105,7 @@ def test_a_lost_status_is_asked_for() -> None:
     rig.lost.add("status")
     rig.new_gateway()
     rig.run(1.0)
-    assert "has not said yet who it is" in rig.core.not_ready(rig.moment)
+    assert rig.core.not_ready(rig.moment) == because("device.unidentified", device="rm1")
     rig.lost.clear()
     rig.run(1.5)
     assert not rig.core.not_ready(rig.moment)

@@ -18,6 +18,7 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandKind, InjectKind, InjectRequest, OutputCommand, StopKind
 from gemelo.schemas.gripper import GripperCommandGoal, GripperState
 from gemelo.schemas.grippers.servo import ServoGripper
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import GRIPPER_STATE
 from gemelo.tools.virtual_arm.gateway_driver import GripCancelInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
@@ -152,7 +153,7 @@ def test_a_cancel_lets_the_jaws_stay_where_they_are():
     arm = opened()
     arm.grip(0.0)
     arm.run(0.25)
-    assert arm.handle(GripCancelInput("grip")) == ""
+    assert arm.handle(GripCancelInput("grip")).why is None
     status, _ = arm.finish_grip()
     arm.run(0.2)
     there = arm.device.opening
@@ -160,7 +161,7 @@ def test_a_cancel_lets_the_jaws_stay_where_they_are():
     arm.run(1.0)
     assert 0.015 < there < 0.04
     assert arm.device.opening == there
-    assert "is not being carried out" in arm.handle(GripCancelInput("grip"))
+    assert arm.handle(GripCancelInput("grip")).why == because("goal.not_under_way", goal="grip")
 
 
 def test_a_newer_goal_takes_over():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from gemelo.schemas.reasons import because
 from gemelo.services.stepper_gateway.device import readiness
 from gemelo.services.stepper_gateway.device.readiness import LEAST_FIRMWARE, outdated_reason
 from gemelo.tools.virtual_arm.sketch_arm import SketchArm
@@ -31,12 +32,13 @@ def test_a_goal_for_an_older_firmware_is_refused_with_both_versions_and_the_reme
 @pytest.mark.parametrize("firmware", ["0.9.9", "0.10.0", "0.0.1-rc2"])
 def test_a_lower_version_is_outdated(firmware: str) -> None:
     assert LEAST_FIRMWARE == (1, 0, 0)
-    assert firmware in outdated_reason("rm1", firmware)
+    reason = because("device.firmware.old", device="rm1", firmware=firmware, least="1.0.0")
+    assert outdated_reason("rm1", firmware) == reason
 
 
 @pytest.mark.parametrize("firmware", ["1.0.0", "1.0.0-dirty", "1.0.1", "10.0.0", "", "a sketch"])
 def test_a_version_that_is_high_enough_or_none_is_not(firmware: str) -> None:
-    assert outdated_reason("rm1", firmware) == ""
+    assert outdated_reason("rm1", firmware) is None
 
 
 def test_a_board_of_another_dialect_has_no_version_that_counts(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -41,11 +41,14 @@ class Comparison:
     difference: Difference | None = None
 
     def hold(self, topic: str, heard: Heard[Any], recorded: Message, replayed: Message | None) -> bool:
-        """True if `replayed` is `recorded`, of the message `heard`; else it is the difference."""
+        """True if `replayed` is `recorded`, of the message `heard`; else it is the difference.
+
+        Fields that the recording is older than do not count.
+        """
         if replayed is not None and encode(recorded) == encode(replayed):
             self.alike[topic] += 1
             return True
-        found = differing(recorded, replayed, self.tolerance)
+        found = differing(recorded, replayed, self.tolerance, heard.added)
         if found is None:
             self.alike[topic] += 1
             return True
@@ -60,17 +63,30 @@ class Comparison:
             )
 
 
-def differing(recorded: Message, replayed: Message | None, tolerance: float = 0.0) -> Differing | None:
-    """The path of the first field that differs by more than the share `tolerance`, and both values; None if none."""
+def differing(
+    recorded: Message, replayed: Message | None, tolerance: float = 0.0, added: frozenset[str] = frozenset()
+) -> Differing | None:
+    """The path of the first field that differs by more than the share `tolerance`, and both values; None if none.
+
+    `added`: names of fields that are not compared.
+    """
     if replayed is None:
         return "", recorded, ABSENT
-    return _differing("", msgspec.to_builtins(recorded), msgspec.to_builtins(replayed), tolerance)
+    ours, theirs = (_without(added, msgspec.to_builtins(message)) for message in (recorded, replayed))
+    return _differing("", ours, theirs, tolerance)
+
+
+def _without(names: frozenset[str], value: Any) -> Any:
+    """The value without fields of these names, at any depth."""
+    if not names:
+        return value
+    if isinstance(value, dict):
+        return {key: _without(names, each) for key, each in value.items() if key not in names}
+    return [_without(names, each) for each in value] if isinstance(value, list | tuple) else value
 
 
 def _differing(path: str, one: object, other: object, tolerance: float) -> Differing | None:
     match one, other:
-        case None, dict() if path == "why" or path.endswith(".why"):
-            return None  # an older recording has its reasons as sentences alone
         case float(), float() if tolerance and math.isclose(one, other, rel_tol=tolerance, abs_tol=tolerance):
             return None
         case dict(), dict():

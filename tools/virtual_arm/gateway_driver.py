@@ -131,7 +131,7 @@ class GatewayDriver(ABC):
     @property
     def reason_not_ready(self) -> str:
         """Reason for which the gateway accepts no goal now; empty if it does."""
-        return self.core.not_ready(self.moment)
+        return str(self.core.not_ready(self.moment) or "")
 
     @property
     def state(self) -> DeviceState:

@@ -29,7 +29,7 @@ from gemelo.schemas.actions import (
     GoalStatuses,
 )
 from gemelo.schemas.message import BadMessage, Message, decode, encode
-from gemelo.schemas.reasons import Reason
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.topics import Action
 
 G = TypeVar("G", bound=Message)
@@ -60,7 +60,7 @@ def refuse(code: int, reason: str, why: Reason | None = None) -> GoalDecision:
 
 
 OnGoal = Callable[[str, G], GoalDecision]
-OnCancel = Callable[[str], str]
+OnCancel = Callable[[str], Reason | None]  # None: it is being cancelled; else why not
 ReadGoal = Callable[[bytes], Generator[None, None, G]]  # yields between the pieces of a long one; raises `BadMessage`
 
 
@@ -179,8 +179,8 @@ class ActionServer(Generic[G, F, R]):
         """The refusal of a goal meant for another process in this one's place; one that names none is taken."""
         if request.epoch in (0, self.epoch):
             return None
-        why = f"it was sent to a {self.action.server} that was started anew since: ask again for what is wanted"
-        return GoalResponse(reason=why, stamp=self._clock.unix())
+        why = because("goal.void", server=self.action.server)
+        return GoalResponse(reason=str(why), why=why, stamp=self._clock.unix())
 
     def _require_form(self, request: GoalRequest) -> None:
         """Raises `RequestRefused`."""
@@ -200,7 +200,8 @@ class ActionServer(Generic[G, F, R]):
         response = GoalResponse(accepted=True, stamp=self._clock.unix())
         goal = GoalRecord(request.goal_id, request.client, response, session=session)
         self._goals.add(goal)
-        decision = refuse(0, "the server failed")
+        failed = because("goal.server_failed")
+        decision = refuse(0, str(failed), failed)
         try:
             decision = self._on_goal(request.goal_id, wanted)
         finally:
@@ -213,50 +214,51 @@ class ActionServer(Generic[G, F, R]):
         return response
 
     def _canceled_early(self, goal_id: str) -> GoalResponse:
-        reason = "it was cancelled before it was looked at"
-        return self._goals.refuse(goal_id, GoalResponse(reason=reason, stamp=self._clock.unix()))
+        why = because("cancel.before_it_began")
+        return self._goals.refuse(goal_id, GoalResponse(reason=str(why), why=why, stamp=self._clock.unix()))
 
     def _answer_cancel(self, request: CancelRequest, pending: Pending[CancelResponse]) -> None:
         if request.goal_id and request.goal_id not in self.active:
-            pending.reply(CancelResponse(reason=self._cancel_absent(request.goal_id)))
+            pending.reply(_cancel_response((), [self._cancel_absent(request.goal_id)]))
             return
         if not request.goal_id:
             self.refuse_waiting("all goals were cancelled after it was sent: send it again", pending.asked)
         wanted = (request.goal_id,) if request.goal_id else self.active
-        canceling, reasons = [], [] if wanted else ["no goal is active"]
+        canceling, reasons = [], [] if wanted else [because("cancel.none_active")]
         for goal_id in wanted:
             reason = self._cancel(goal_id)
-            if reason:
+            if reason is not None:
                 reasons.append(reason)
             else:
                 canceling.append(goal_id)
-        pending.reply(CancelResponse(canceling=tuple(canceling), reason="; ".join(reasons)))
+        pending.reply(_cancel_response(tuple(canceling), reasons))
 
-    def _cancel_absent(self, goal_id: str) -> str:
-        """Says why `goal_id` is not active; one that is not known may have been overtaken by its own cancel."""
+    def _cancel_absent(self, goal_id: str) -> Reason:
+        """Why `goal_id` is not active; one that is not known may have been overtaken by its own cancel."""
         known = self._goals.get(goal_id)
         if known is not None:
-            return f"it has ended as {known.status.name}"
+            return because("cancel.ended", status=known.status.name)
         if (coming := self._coming.take_out(goal_id)) is not None:
             coming.reply(self._canceled_early(goal_id))
-            return "it was not decided upon yet, and is refused"
+            return because("cancel.undecided")
         now = self._clock.monotonic()
         self._cancelled_early = {key: at for key, at in self._cancelled_early.items() if now - at < EARLY_CANCEL_KEPT}
         if len(self._cancelled_early) < MAX_EARLY_CANCELS and len(goal_id) <= LONGEST_NAME:
             self._cancelled_early[goal_id] = now
-        return "no such goal is known here; one of that name that comes within 2 s is refused"
+        return because("cancel.unknown", time=EARLY_CANCEL_KEPT)
 
-    def _cancel(self, goal_id: str) -> str:
-        """Empty if the goal is being cancelled, else why not."""
+    def _cancel(self, goal_id: str) -> Reason | None:
+        """None if the goal is being cancelled, else why not."""
         reason = self._on_cancel(goal_id)
-        if not reason and not self._goals[goal_id].status.is_terminal:
+        if reason is None and not self._goals[goal_id].status.is_terminal:
             self._set(self._goals[goal_id], GoalStatusCode.CANCELING)
         return reason
 
     def _cancel_lost(self, goal_id: str, client: str) -> None:
         """Nobody watches an attached goal any more."""
         reason = self._cancel(goal_id)
-        self._warn(f"goal {goal_id}: its client {client} is gone, so it is {reason or 'cancelled'}")
+        became = "it is cancelled" if reason is None else f"it cannot be cancelled: {reason}"
+        self._warn(f"goal {goal_id}: its client {client} is gone: {became}")
 
     def _set(self, goal: GoalRecord, status: GoalStatusCode) -> None:
         if not goal.status.is_terminal and goal.status is not status:
@@ -265,3 +267,9 @@ class ActionServer(Generic[G, F, R]):
 
     def _publish_status(self) -> None:
         self._status.put(self._goals.statuses)
+
+
+def _cancel_response(canceling: tuple[str, ...], reasons: list[Reason]) -> CancelResponse:
+    """`reasons` of the goals that are not cancelled."""
+    why = reasons[0] if len(reasons) == 1 else because("cancel.several", *reasons) if reasons else None
+    return CancelResponse(canceling=canceling, reason=str(why or ""), why=why)

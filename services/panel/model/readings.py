@@ -9,17 +9,18 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 import gemelo
-from gemelo.api.device import fault_of
 from gemelo.libraries.arm.model.jaws import jaw_objects, jaws_apart
 from gemelo.libraries.runtime.scene_meshes import SceneMeshes
 from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.control import ControlState
 from gemelo.schemas.device import DeviceState, DeviceStatus
+from gemelo.schemas.device_faults import fault_reason
 from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.ledger import StepLedger, StoppingDistance
 from gemelo.schemas.message import Message
 from gemelo.schemas.planning import JogStatus, PlannedPath
+from gemelo.schemas.reasons import Reason
 from gemelo.schemas.scene import Contacts, PlanningScene, SceneObject
 from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import Topic
@@ -42,7 +43,7 @@ class Readings:
     state: DeviceState | None
     status: DeviceStatus | None
     sensors: Mapping[str, float]
-    fault: str
+    fault: Reason | None
     gripper: GripperState | None
     ledger: StepLedger | None
     stopping: StoppingDistance | None
@@ -94,7 +95,7 @@ class BusReadings:
             sensors=dict(zip(sensors.name, sensors.value, strict=False))
             if sensors is not None and not self._sensors.is_stale
             else {},
-            fault=fault_of(self._arm.description, state) if state is not None else "",
+            fault=fault_reason(state.fault, state.fault_joint) if state is not None else None,
             gripper=self._gripper.message if not self._gripper.is_stale else None,
             ledger=self._ledger.message if not self._ledger.is_stale else None,
             stopping=self._stopping.message if not self._stopping.is_stale else None,

@@ -11,7 +11,8 @@ from typing import Literal
 import viser
 
 from gemelo.schemas.device import DeviceMode
-from gemelo.schemas.device_link import reason_text
+from gemelo.schemas.device_link import warning_of, why_not_usable
+from gemelo.schemas.reasons import Reason
 from gemelo.services.panel.model.availability import reasons
 from gemelo.services.panel.model.operator import Operator
 from gemelo.services.panel.model.readings import Readings
@@ -233,23 +234,24 @@ class Page:
         words, state = self._words, readings.state
         if state is None or not readings.is_live:
             age = f"{readings.age:.1f} s" if isfinite(readings.age) else "-"
-            return f"<b>{esc(words('not_live', age=age))}</b> {esc(words.said(self._trouble(readings)))}", BAD
+            trouble = self._trouble(readings)
+            return f"<b>{esc(words('not_live', age=age))}</b> {esc(words.why(trouble) if trouble else '')}", BAD
         worst = max((abs(error) for error in readings.step_errors.values()), default=0.0)
         error = words("step_error", steps=f"{worst:.2f}")
         if readings.status is not None and readings.status.open_loop:
             error = words("sent_not_verified")
         text = f"<b>{esc(words(f'mode_{state.mode.name.lower()}'))}</b> · {esc(error)} · {esc(words('live_data'))}{lag}"
         if said := readings.fault or self._trouble(readings):
-            return f"{text}<br>{esc(words.said(said))}", BAD
+            return f"{text}<br>{esc(words.why(said))}", BAD
         return text, GOOD if state.armed and all(state.referenced) else NEUTRAL
 
     @staticmethod
-    def _trouble(readings: Readings) -> str:
-        """Why the device is not usable, or what else a person has to mend; empty where all is well."""
+    def _trouble(readings: Readings) -> Reason | None:
+        """Why the device is not usable, or what else a person has to mend; None where all is well."""
         status = readings.status
         if status is None:
-            return ""
-        return status.warning if status.online else reason_text(status, time.time_ns())
+            return None
+        return warning_of(status) if status.online else why_not_usable(status, time.time_ns())
 
     def _show_problem(self) -> None:
         told = self._operator.newest_problem

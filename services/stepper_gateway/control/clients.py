@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from gemelo.schemas.reasons import because
 from gemelo.schemas.roles import ROLE_OF_NODE
 from gemelo.services.stepper_gateway.goals.rejections import invalid
 
@@ -47,9 +48,9 @@ def client_of(key: str, session: str) -> ControlClient:
     """The node whose token is `key`; raises `GoalRejected` for a key that no node of this bus has."""
     found = TOKEN.fullmatch(key)
     if found is None:
-        raise invalid(f'client "{key[:80]}" is not the key of a liveliness token: `gemelo control take` sends its own')
+        raise invalid(because("control.client.no_token", client=key[:80]))
     if not session:
-        raise invalid("the request does not say which session it comes from: use `gemelo control`, or its Python API")
+        raise invalid(because("control.client.no_session"))
     principal, node, host = found[1] or LOCAL, found[2], found[3]
     is_plain = principal == LOCAL or ROLE_OF_NODE.get(node) == principal
     return ControlClient(key, node, host, session, node if is_plain else f"{principal}/{node}")

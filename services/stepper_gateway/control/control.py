@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gemelo.schemas.control import ControlGive, ControlJoin, ControlState, ControlTake
+from gemelo.schemas.reasons import Reason, Value, because
 from gemelo.schemas.system import LogLevel
 from gemelo.services.stepper_gateway.control.clients import ControlClient, MotionCaller, client_of
 from gemelo.services.stepper_gateway.goals.rejections import invalid
@@ -36,8 +37,13 @@ class Claim:
 
     @property
     def words(self) -> str:
-        """`ana (node cli-4711 on desk)`."""
+        """`ana (node cli-4711 on desk)`, for the log."""
         return f"{self.name} (node {self.client.node} on {self.client.host})"
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """Who that is, in a reason."""
+        return {"name": self.name, "node": self.client.node, "host": self.client.host}
 
 
 class ControlHolder:
@@ -53,7 +59,7 @@ class ControlHolder:
         self._claim: Claim | None = None
         self._notes: list[Note] = []
         self._seen: tuple[object, ...] | None = None  # of what `state` says, when `has_changed` was asked last
-        self.refused: list[tuple[int, str]] = []  # tickets of claims that came to nothing, and why
+        self.refused: list[tuple[int, Reason]] = []  # tickets of claims that came to nothing, and why
         self.granted: list[int] = []  # tickets of claims that were granted
 
     @property
@@ -77,11 +83,11 @@ class ControlHolder:
         return self._holder is not None and self._absence > GONE
 
     @property
-    def must_rest(self) -> str:
-        """Why the arm has to come to rest before anything else, empty if it need not."""
+    def must_rest(self) -> Reason | None:
+        """Why the arm has to come to rest before anything else, None if it need not."""
         if self._claim is not None:
-            return f"{self._claim.words} takes control"
-        return f"{self._holder.words}, who holds control, is gone" if self._holder and self.is_gone else ""
+            return because("control.taken", **self._claim.values)
+        return because("control.holder_gone", **self._holder.values) if self._holder and self.is_gone else None
 
     def has_changed(self) -> bool:
         """True where `take_notes` or `state` may say something else than when this was asked last."""
@@ -91,26 +97,29 @@ class ControlHolder:
 
     def state(self) -> ControlState:
         """What everybody may know, without a stamp."""
-        about = ControlState(epoch=self._epoch, number=self._number, given=self._was_given, pending=self.must_rest)
+        why = self.must_rest
+        about = ControlState(
+            epoch=self._epoch, number=self._number, given=self._was_given, pending=str(why or ""), why=why
+        )
         if (holder := self._holder) is None:
             return about
         return ControlState(
             epoch=self._epoch, number=self._number, held=True, name=holder.name,
             node=holder.client.node, host=holder.client.host, since=self._since.unix,
-            members=tuple(member.address for member in self._members.values()), pending=about.pending,
+            members=tuple(member.address for member in self._members.values()), pending=about.pending, why=why,
         )  # fmt: skip
 
-    def objection(self, caller: MotionCaller, moment: Moment) -> str:
-        """Why `caller` may not move the arm, empty if it may."""
+    def objection(self, caller: MotionCaller, moment: Moment) -> Reason | None:
+        """Why `caller` may not move the arm, None if it may."""
         if self._claim is not None:
-            return f"{self._claim.words} is taking control of {self._robot}: nothing moves until the arm rests"
+            return because("control.being_taken", robot=self._robot, **self._claim.values)
         if self._holder is None:
-            return ""
+            return None
         if not any(member.is_caller(caller) for member in self._members.values()):
             return self._held_by(self._holder, moment)
         if self.is_gone:
-            return f"{self.must_rest} for {self._absence:.1f} s: take control anew with `gemelo control take --force`"
-        return ""
+            return because("control.holder_gone.anew", time=self._absence, **self._holder.values)
+        return None
 
     def take(self, request: ControlTake, session: str, ticket: int, moment: Moment) -> Claim | None:
         """A claim that `grant` fulfils; None for the holder's own, repeated. Raises `GoalRejected`."""
@@ -119,26 +128,26 @@ class ControlHolder:
             return None
         if not request.force:
             if self._claim is not None:
-                raise invalid(f"{self._claim.words} is taking control of {self._robot} at this moment")
+                raise invalid(because("control.take.being_taken", robot=self._robot, **self._claim.values))
             if self._holder is not None:
                 raise invalid(self._held_by(self._holder, moment))
-        self._drop_claim(f"{claim.words} has asked for control after you, with --force")
+        self._drop_claim(because("control.take.forced", **claim.values))
         self._claim = claim
         return claim
 
     def join(self, request: ControlJoin, session: str) -> None:
         """One more node of the holder's; raises `GoalRejected`."""
         if not self._is_holders(_digest(request.secret)):
-            raise invalid(self._not_held("nothing to share"))
+            raise invalid(self._not_held("control.join.others", "control.join.none"))
         client = client_of(request.client, session)
         if client.key not in self._members and len(self._members) >= MOST_MEMBERS:
-            raise invalid(f"{MOST_MEMBERS} nodes share this hold already: end one of them")
+            raise invalid(because("control.join.full", limit=MOST_MEMBERS))
         self._members[client.key] = client
 
     def give(self, request: ControlGive) -> None:
         """Everybody may move the arm; raises `GoalRejected`."""
         if not self._is_holders(_digest(request.secret)) or self._holder is None:
-            raise invalid(self._not_held("nothing to give back"))
+            raise invalid(self._not_held("control.give.others", "control.give.none"))
         self._notes.append((LogLevel.INFO, f"control: {self._holder.words} has given it back"))
         self._free()
         self._was_given = True
@@ -149,7 +158,7 @@ class ControlHolder:
         `absences` [s] by key of a token: for how long it has been missing; `grace` [s] that a holder may be.
         """
         if self._claim is not None and absences.get(self._claim.client.key, 0.0) > GONE:
-            self._drop_claim("the node that asked for control is gone")
+            self._drop_claim(because("control.take.client_gone"))
         if self._claim is not None and is_at_rest:
             self._grant(self._claim, moment)
             return
@@ -182,7 +191,7 @@ class ControlHolder:
         self._notes.append((level, f"control: {claim.words} has taken it{by_force}"))
         self.granted.append(claim.ticket)
 
-    def _drop_claim(self, reason: str) -> None:
+    def _drop_claim(self, reason: Reason) -> None:
         if self._claim is not None:
             self.refused.append((self._claim.ticket, reason))
             self._claim = None
@@ -201,23 +210,23 @@ class ControlHolder:
     def _is_holders(self, digest: bytes) -> bool:
         return self._holder is not None and hmac.compare_digest(digest, self._holder.digest)
 
-    def _held_by(self, holder: Claim, moment: Moment) -> str:
+    def _held_by(self, holder: Claim, moment: Moment) -> Reason:
         clock = time.strftime("%H:%M:%S", time.gmtime(self._since.unix // 1_000_000_000))
         age = moment.monotonic - self._since.monotonic
-        gone = f", and is gone for {self._absence:.1f} s" if self.is_gone else ""
-        return (
-            f"{holder.name} holds control of {self._robot}, since {clock} UTC ({age:.0f} s ago), from node "
-            f"{holder.client.node} on {holder.client.host}{gone}: ask for it, or run `gemelo control take --force`"
-        )
+        about: dict[str, Value] = {"robot": self._robot, "clock": clock, "age": age, **holder.values}
+        if self.is_gone:
+            return because("control.held.gone", gone=self._absence, **about)
+        return because("control.held", **about)
 
-    def _not_held(self, what: str) -> str:
-        held = "nobody holds control" if self._holder is None else f"{self._holder.words} holds control, not you"
-        return f"{held}: {what}"
+    def _not_held(self, by_others: str, by_none: str) -> Reason:
+        """The code of the two that is so."""
+        return because(by_none) if self._holder is None else because(by_others, **self._holder.values)
 
 
 def _name(name: str) -> str:
     if not 0 < len(name) <= MOST_NAME or not name.isprintable() or not name.strip():
-        raise invalid(f"{name[:MOST_NAME]!a} ({len(name)} characters) is no name: 1 to {MOST_NAME} that can be printed")
+        shown = ascii(name[:MOST_NAME])
+        raise invalid(because("control.name.unprintable", name=shown, count=len(name), limit=MOST_NAME))
     return name.strip()
 
 
@@ -229,5 +238,5 @@ def seal(secret: str) -> str:
 def _digest(secret: str) -> bytes:
     least, most = SECRET
     if not least <= len(secret) <= most:
-        raise invalid(f"a secret of {len(secret)} characters: {least} to {most} are needed")
+        raise invalid(because("control.secret.length", count=len(secret), least=least, most=most))
     return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).digest()

@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from gemelo.schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlState, ControlTake
 from gemelo.schemas.device import DeviceCommandKind, DeviceCommandResponse, DeviceMode
 from gemelo.schemas.motion import FollowErrorCode
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.topics import CONTROL
 from gemelo.services.stepper_gateway.control.clients import MotionCaller
 from gemelo.services.stepper_gateway.control.control import ControlHolder
@@ -58,32 +59,33 @@ class ControlHandler:
         """Keys of the liveliness tokens whose absence counts."""
         return self._control.watched
 
-    def objection(self, caller: MotionCaller, moment: Moment) -> str:
-        """Why `caller` may not move the arm, nor change how it moves; empty if it may."""
+    def objection(self, caller: MotionCaller, moment: Moment) -> Reason | None:
+        """Why `caller` may not move the arm, nor change how it moves; None if it may."""
         return self._control.objection(caller, moment)
 
     def verdict(self, caller: MotionCaller, moment: Moment) -> GoalVerdict | None:
         """The refusal of a goal of `caller`; None if it may move the arm."""
         objection = self._control.objection(caller, moment)
-        return GoalVerdict(False, FollowErrorCode.NOT_IN_CONTROL, objection) if objection else None
+        return None if objection is None else GoalVerdict.refused(FollowErrorCode.NOT_IN_CONTROL, objection)
 
     def permits_targets(self, caller: MotionCaller, moment: Moment) -> bool:
         """True if `caller` may stream targets; else it is told why, once a second at most."""
         objection = self._control.objection(caller, moment)
-        if not objection:
+        if objection is None:
             self._mover = caller
         elif moment.monotonic - self._complained >= COMPLAINT:
             self._complained = moment.monotonic
             self._device.event("target_refused", objection, moment, client=caller.node)
-        return not objection
+        return objection is None
 
     def permits_command(self, caller: MotionCaller, ticket: int, moment: Moment) -> bool:
         """True if `caller` may command the device; else the answer is given."""
         objection = self._control.objection(caller, moment)
-        if objection:
-            response = DeviceCommandResponse(reason=objection, mode=self._device.session.mode, check="control")
+        if objection is not None:
+            mode = self._device.session.mode
+            response = DeviceCommandResponse(reason=str(objection), mode=mode, check="control", why=objection)
             self._device.out.put(Answer(ticket, response))
-        return not objection
+        return objection is None
 
     def note_mover(self, caller: MotionCaller) -> None:
         """`caller` moves the arm from now on."""
@@ -94,7 +96,7 @@ class ControlHandler:
         try:
             claim = self._control.take(request, session, ticket, moment)
         except GoalRejected as rejected:
-            return self._answer(ticket, str(rejected))
+            return self._answer(ticket, rejected.reason)
         self._answer_claims()
         if claim is None:
             return self._answer(ticket)
@@ -107,7 +109,7 @@ class ControlHandler:
         try:
             self._control.join(request, session)
         except GoalRejected as rejected:
-            return self._answer(ticket, str(rejected))
+            return self._answer(ticket, rejected.reason)
         self._answer(ticket)
 
     def give(self, request: ControlGive, ticket: int) -> None:
@@ -115,7 +117,7 @@ class ControlHandler:
         try:
             self._control.give(request)
         except GoalRejected as rejected:
-            return self._answer(ticket, str(rejected))
+            return self._answer(ticket, rejected.reason)
         self._answer(ticket)
 
     def step(self, absences: Mapping[str, float], moment: Moment) -> None:
@@ -139,13 +141,13 @@ class ControlHandler:
     def _change(self, moment: Moment) -> None:
         """Brings the arm to rest where control is to change hands."""
         reason = self._control.must_rest
-        if not reason:
+        if reason is None:
             self._stopped = -1.0e9
         elif not self._is_at_rest(moment) and moment.monotonic - self._stopped >= STOP_AGAIN:
             self._stopped = moment.monotonic
-            self._bring_to_rest(f"slowed to rest: {reason}", moment)
+            self._bring_to_rest(because("ending.control", reason), moment)
 
-    def _bring_to_rest(self, reason: str, moment: Moment) -> None:
+    def _bring_to_rest(self, reason: Reason, moment: Moment) -> None:
         movers = self._movers
         movers.streaming.interrupt()
         movers.gripper.stop(reason, moment)
@@ -177,6 +179,7 @@ class ControlHandler:
         control.granted.clear()
         control.refused.clear()
 
-    def _answer(self, ticket: int, reason: str = "") -> None:
-        answer = ControlAnswer(accepted=not reason, reason=reason, epoch=self._epoch, number=self._control.number)
+    def _answer(self, ticket: int, reason: Reason | None = None) -> None:
+        text, number = str(reason or ""), self._control.number
+        answer = ControlAnswer(accepted=reason is None, reason=text, epoch=self._epoch, number=number, why=reason)
         self._device.out.put(Answer(ticket, answer))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device import (
     ArmCommand,
@@ -17,6 +17,7 @@ from gemelo.schemas.device import (
     SpeedCommand,
     StopKind,
 )
+from gemelo.schemas.reasons import because
 from gemelo.services.stepper_gateway.device.pending_commands import NO_ARGUMENTS, Arguments
 from gemelo.services.stepper_gateway.goals.limit_checks import SLACK, beyond
 from gemelo.services.stepper_gateway.goals.rejections import invalid
@@ -61,7 +62,8 @@ def arguments_of(request: DeviceCommandRequest, arm: ArmDescription) -> Argument
 def _reference(command: ReferenceCommand, arm: ArmDescription) -> Arguments:
     """Where the joints named stand, by the command or else by robot.toml; all of them if none is named."""
     if command.position and len(command.position) != len(command.name):
-        raise invalid(f"{len(command.name)} joints are named and {len(command.position)} positions given")
+        named, given = len(command.name), len(command.position)
+        raise invalid(because("command.positions.count", named=named, given=given))
     require_known(command.name, arm.joints)
     positions = {joint.name: joint.drive.reference_position for joint in arm.joints}
     positions |= dict(zip(command.name, command.position, strict=False))
@@ -82,23 +84,21 @@ def _homing_mask(names: tuple[str, ...], arm: ArmDescription) -> int:
     able = [joint.name for joint in asked if joint.drive.homing is not None]
     for joint in asked:
         if joint.name not in able and (names or not able):
-            raise invalid(
-                f'joint "{joint.name}" has no home switch: put it into place by hand and run `gemelo reference`, or '
-                "give it a [joint.homing] in robot.toml"
-            )
+            raise invalid(because("command.home.no_switch", joint=joint.name))
     return _mask(names, arm)
 
 
 def _output(command: OutputCommand, arm: ArmDescription) -> Arguments:
     names = [output.name for output in arm.outputs]
     if command.output not in names:
-        raise invalid(f'{arm.name} has no output "{command.output}"{suggestion(command.output, names)}')
+        guess = nearest(command.output, names)
+        raise invalid(because("command.output.unknown", guess, robot=arm.name, output=command.output))
     return Arguments(index=names.index(command.output), argument=int(command.on))
 
 
 def _permil(speed: float) -> int:
     if not 0.0 <= speed <= 1.0:
-        raise invalid(f"a speed is 0 (stands) to 1 (as planned), not {speed:g}")
+        raise invalid(because("command.speed.range", value=speed))
     return round(speed * 1000.0)
 
 

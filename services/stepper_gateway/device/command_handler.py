@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 
 from gemelo.schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse, DeviceMode
+from gemelo.schemas.reasons import Reason, Value, because, remedy
 from gemelo.services.stepper_gateway.device.command_arguments import arguments_of, kind_of
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.device.pending_commands import STOPPING, Arguments, PendingCommand
@@ -18,20 +19,20 @@ from gemelo.services.stepper_gateway.motion.motion_controller import MotionContr
 from gemelo.services.stepper_gateway.outputs import Answer
 
 REMEDIES: dict[int, str] = {
-    Code.NOT_READY: "it does not do that in this mode",
-    Code.POSITION_LIMIT: "the position is beyond its soft limits",
-    Code.NOT_ARMED: "its drivers are off, or only just on: run `gemelo device arm`, and wait a second",
-    Code.ESTOP_PRESSED: "its emergency stop is pressed: release it first",
-    Code.NO_HOMING: "a joint has no home switch: give it a [joint.homing] in robot.toml, or run `gemelo reference`",
-    Code.UNKNOWN_CMD: "its firmware, or the dialect that it speaks, has no such command",
-    Code.BAD_ARGUMENT: "it has no such output, joint or value: see `gemelo device config`",
+    Code.NOT_READY: "other_mode",
+    Code.POSITION_LIMIT: "within_soft_limits",
+    Code.NOT_ARMED: "drivers_on",
+    Code.ESTOP_PRESSED: "release_first",
+    Code.NO_HOMING: "home_switch_or_reference",
+    Code.UNKNOWN_CMD: "newer_firmware",
+    Code.BAD_ARGUMENT: "known_argument",
 }
-NOT_NOW = {
-    DeviceCommandKind.RESUME: "only a hold can be resumed; start a new goal",
-    DeviceCommandKind.REFERENCE: "the arm must stand: run `gemelo stop`, or clear its fault with `gemelo reset`",
-    DeviceCommandKind.HOME: "the arm must stand: run `gemelo stop`, or clear its fault with `gemelo reset`",
-    DeviceCommandKind.DISARM: "the arm must stand: run `gemelo stop` first",
-    DeviceCommandKind.ARM: "clear its fault or emergency stop with `gemelo reset` first",
+NOT_NOW: dict[DeviceCommandKind, str] = {
+    DeviceCommandKind.RESUME: "resume_holds_only",
+    DeviceCommandKind.REFERENCE: "stand_or_reset",
+    DeviceCommandKind.HOME: "stand_or_reset",
+    DeviceCommandKind.DISARM: "stand_first",
+    DeviceCommandKind.ARM: "reset_first",
 }
 TRUSTING = (  # commands that would move or mean something else with another configuration
     DeviceCommandKind.RESUME,
@@ -62,10 +63,10 @@ class CommandHandler:
             if reason := self._device.unreachable_reason(moment) or self._objection(kind, goal_is_active):
                 raise invalid(reason)
             if self._device.commands.is_full:
-                raise invalid("the device has not answered the commands before this one yet: wait a moment")
+                raise invalid(because("command.too_many"))
             arguments = arguments_of(request, self._device.arm)
         except GoalRejected as rejected:
-            self._answer(ticket, False, str(rejected))
+            self._answer(ticket, rejected.reason)
             return False
         self._device.commands.ask(kind, moment, self._device.parameters.command_timeout, ticket, arguments)
         return True
@@ -84,7 +85,7 @@ class CommandHandler:
         """Have a stop sent, whatever is known of the device; true unless it is refused because the arm moves."""
         controller = self._controller
         if reason := self._objection(kind, goal_is_active):
-            self._answer(ticket, False, reason)
+            self._answer(ticket, reason)
             return False
         stream = controller.stream.id if controller.stream is not None else 0
         self._device.commands.ask(kind, moment, self._device.parameters.command_timeout, ticket, stream=stream)
@@ -107,8 +108,8 @@ class CommandHandler:
         self._device.commands.remove(command)
         reason = self._device.unreachable_reason(moment) if accepted else complaint(command.kind, reply)
         for ticket in command.tickets:
-            self._answer(ticket, accepted, reason, reply.mode, sent=True)
-        if not command.tickets and not accepted:
+            self._answer(ticket, reason, reply.mode, accepted=accepted, sent=True)
+        if not command.tickets and reason is not None and not accepted:
             self._device.event("command_refused", reason, moment)
 
     def tell_shown(self, moment: Moment) -> None:
@@ -118,7 +119,8 @@ class CommandHandler:
         """
         for command, reply in self._device.commands.shown(self._device.session.latest, moment):
             for ticket in command.tickets:
-                self._answer(ticket, True, self._device.unreachable_reason(moment), reply.mode, sent=True)
+                reason = self._device.unreachable_reason(moment)
+                self._answer(ticket, reason, reply.mode, accepted=True, sent=True)
 
     def tell_listeners(self, moment: Moment) -> None:
         """Hand the answers to the gateway's own commands to those who wait for them."""
@@ -146,17 +148,17 @@ class CommandHandler:
             if command.kind == DeviceCommandKind.HOLD and state is not None:
                 self._controller.hold_answered(state.mode == DeviceMode.HOLD, state.t_us)
             for ticket in command.tickets:
-                self._answer(ticket, False, self._silence(command, moment), sent=command.times_sent > 0)
+                self._answer(ticket, self._silence(command, moment), sent=command.times_sent > 0)
             if command.is_own and command.kind == DeviceCommandKind.STOP:
                 self._controller.stop(moment)
         self.tell_shown(moment)
         self.send_due(moment)
 
-    def drop_all(self, reason: str) -> None:
+    def drop_all(self, reason: Reason) -> None:
         """The device these commands were for is gone; a person's stop is sent on, to whatever is there."""
         for command in self._device.commands.drop_all_but_stops():
             for ticket in command.tickets:
-                self._answer(ticket, False, reason, sent=command.times_sent > 0)
+                self._answer(ticket, reason, sent=command.times_sent > 0)
 
     def _insist(self, command: PendingCommand, code: Code, moment: Moment) -> None:
         if not command.is_stop:
@@ -168,29 +170,32 @@ class CommandHandler:
         command.sent = -math.inf
         self.send_due(moment)
 
-    def _silence(self, command: PendingCommand, moment: Moment) -> str:
+    def _silence(self, command: PendingCommand, moment: Moment) -> Reason:
         """What is known of a command that was not answered in time."""
-        name, unreachable_reason = command.kind.name, self._device.unreachable_reason(moment)
-        if not command.times_sent:
-            return f"{name} could not be sent: {unreachable_reason}; the device holds by itself without heartbeats"
-        because = f": {unreachable_reason}" if unreachable_reason else ""
-        told = f"the device has not answered {name} in time, which was sent {command.times_sent} times{because}"
-        return self._with_last_state(told, moment) if command.is_stop else told
+        name, unreachable = command.kind.name, self._device.unreachable_reason(moment)
+        if not command.times_sent and unreachable is not None:
+            return because("command.not_sent", unreachable, command=name)
+        known: dict[str, Value] = {"command": name, "count": command.times_sent}
+        if unreachable is not None:
+            unanswered = because("command.unanswered.unreachable", unreachable, **known)
+        else:
+            unanswered = because("command.unanswered", **known)
+        return self._with_last_state(unanswered, moment) if command.is_stop else unanswered
 
-    def _with_last_state(self, told: str, moment: Moment) -> str:
-        """`told`, and how the arm was by the newest state, where one has come."""
+    def _with_last_state(self, unanswered: Reason, moment: Moment) -> Reason:
+        """`unanswered`, and how the arm was by the newest state, where one has come."""
         session = self._device.session
         age = moment.monotonic - session.state_arrival
         if session.latest is None or age > KNOWN:
-            return told
-        if any(session.latest.velocity):
-            return f"{told}; its last state, {age:.1f} s old: it moves, in mode {session.mode.name}"
-        return f"{told}; its last state, {age:.1f} s old: it stands, in mode {session.mode.name}"
+            return unanswered
+        moves = any(session.latest.velocity)
+        code = "command.last_state.moves" if moves else "command.last_state.stands"
+        return because(code, unanswered, age=age, mode=session.mode.name)
 
-    def _objection(self, kind: DeviceCommandKind, goal_is_active: bool) -> str:
+    def _objection(self, kind: DeviceCommandKind, goal_is_active: bool) -> Reason | None:
         if goal_is_active and kind in AT_REST:
-            return f"a goal is being carried out: cancel it or run `gemelo stop` before {kind.name}"
-        return self._device.configuration.mismatch_reason() if kind in TRUSTING else ""
+            return because("command.goal_active", command=kind.name)
+        return self._device.configuration.mismatch_reason() if kind in TRUSTING else None
 
     def _note(self, command: PendingCommand, reply: CommandReply, moment: Moment) -> None:
         match command.kind:
@@ -204,10 +209,13 @@ class CommandHandler:
                     given = command.arguments
                     self._on_reference(given.argument, given.positions, reply.t_us, moment)
 
-    def _answer(self, ticket: int, accepted: bool, reason: str, mode: int | None = None, sent: bool = False) -> None:
+    def _answer(
+        self, ticket: int, reason: Reason | None, mode: int | None = None, *, accepted: bool = False, sent: bool = False
+    ) -> None:
         said = mode is not None and mode in DeviceMode._value2member_map_
         known = DeviceMode(mode or 0) if said else self._device.session.mode
-        response = DeviceCommandResponse(accepted=accepted, sent=sent, reason=reason, mode=known)
+        text = str(reason or "")
+        response = DeviceCommandResponse(accepted=accepted, sent=sent, reason=text, mode=known, why=reason)
         if ticket < 0:
             if (listener := self._listeners.pop(ticket, None)) is not None:
                 self._heard.append((listener, response))
@@ -215,11 +223,13 @@ class CommandHandler:
         self._device.out.put(Answer(ticket, response))
 
 
-def complaint(kind: DeviceCommandKind, reply: CommandReply) -> str:
+def complaint(kind: DeviceCommandKind, reply: CommandReply) -> Reason:
     """Why the device has refused a command, with the remedy where there is one."""
-    remedy = REMEDIES.get(reply.code)
+    mend = REMEDIES.get(reply.code)
     if reply.code == Code.NOT_READY:
-        remedy = NOT_NOW.get(kind, remedy)
+        mend = NOT_NOW.get(kind, mend)
     mode = DeviceMode(reply.mode).name if reply.mode in DeviceMode._value2member_map_ else str(reply.mode)
-    text = f"the device refuses {kind.name} in mode {mode}: {code_name(reply.code)}"
-    return f"{text}, {remedy}" if remedy else text
+    refused = {"command": kind.name, "mode": mode, "answer": code_name(reply.code)}
+    if mend is None:
+        return because("command.refused.unexplained", **refused)
+    return because("command.refused", remedy(mend), **refused)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from gemelo.libraries.arm.motors.relative_moves import LOOP_READING
 from gemelo.schemas.device import EchoResponse
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.robot import Dialect
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.links.frames import SyncReply, encode
@@ -17,10 +18,7 @@ from gemelo.services.stepper_gateway.outputs import Answer
 
 TIMEOUT = 1.0  # [s] after which an answer counts as lost; chosen: twice the silence that stops the arm
 MOST = 32  # that may wait; chosen: it is one more than any bench has under way
-NO_ANSWERS = "a sketch on ra/juntas answers nothing, so no round trip can be measured"
-NO_WORD = 'its readings do not say how long its loop() takes: publish "loop_us" in ra/sensores (docs/my_old_sketch.md)'
 LOOKED_BACK = 10.0  # [s] of readings that count; chosen: a hundred of a sketch
-NOT_YET = "the first line to this board would move it: say where its joints stand first, with `gemelo reference`"
 
 
 class Waiting(NamedTuple):
@@ -48,7 +46,7 @@ class Echoes:
     def ask(self, ticket: int, moment: Moment) -> None:
         """Send a question now, or answer why not."""
         if reason := self._objection(moment):
-            return self._answer(ticket, EchoResponse(reason=reason))
+            return self._refuse(ticket, reason)
         question = self._device.session.question(moment)
         self._waiting[question.t0] = Waiting(ticket, moment.monotonic)
         self._device.out.send(Kind.SYNC, encode(question))
@@ -74,26 +72,30 @@ class Echoes:
         for t0, waiting in list(self._waiting.items()):
             if moment.monotonic - waiting.asked > TIMEOUT:
                 del self._waiting[t0]
-                self._answer(waiting.ticket, EchoResponse(reason=f"no answer in {TIMEOUT:g} s"))
+                self._refuse(waiting.ticket, because("echo.unanswered", time=TIMEOUT))
 
-    def _objection(self, moment: Moment) -> str:
+    def _objection(self, moment: Moment) -> Reason | None:
         dialect, state = self._device.arm.device.dialect, self._device.state
         if not self._device.session.link_up:
-            return f"no link to the device: {self._device.session.link_reason}"
+            return because("echo.no_link", self._device.session.link_reason)
         if dialect is Dialect.RA:
-            return f"{NO_ANSWERS}; {self._of_the_loop(moment)}"
+            return because("echo.sketch", self._of_the_loop(moment))
         if dialect is Dialect.TEXT and (state is None or not state.referenced):
-            return NOT_YET
-        return "too many measurements at a time: one bench is enough" if len(self._waiting) >= MOST else ""
+            return because("echo.unreferenced")
+        return because("echo.too_many") if len(self._waiting) >= MOST else None
 
-    def _of_the_loop(self, moment: Moment) -> str:
-        """Whether robot.toml's loop_time is as long as the sketch's passes, by its own word."""
+    def _of_the_loop(self, moment: Moment) -> Reason:
+        """Whether robot.toml's loop_time is as long as the sketch's passes, by its own readings."""
         passes = [one.micros for one in self._passes if moment.monotonic - one.arrival <= LOOKED_BACK]
         if not passes:
-            return NO_WORD
-        longest, believed = max(passes), 1e6 * self._device.arm.device.loop_time
-        verdict = "which is enough" if longest <= believed else f"so write loop_time = {1e-6 * longest:.6f}"
-        return f"its longest pass of loop() took {longest:.0f} us, robot.toml says {believed:.0f} us, {verdict}"
+            return because("echo.loop_unknown")
+        longest, configured = max(passes), 1e6 * self._device.arm.device.loop_time  # [us]
+        if longest <= configured:
+            return because("echo.loop_fits", longest=longest, configured=configured)
+        return because("echo.loop_too_long", longest=longest, configured=configured, loop_time=1e-6 * longest)
+
+    def _refuse(self, ticket: int, why: Reason) -> None:
+        self._answer(ticket, EchoResponse(reason=str(why), why=why))
 
     def _answer(self, ticket: int, response: EchoResponse) -> None:
         self._device.out.put(Answer(ticket, response))

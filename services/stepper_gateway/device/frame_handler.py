@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gemelo.schemas.device import DeviceMode
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import DEVICE_SHAFT, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS
 from gemelo.services.stepper_gateway.components import Components
@@ -23,17 +24,12 @@ from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
 
 STOPPED = ("hold", "homing_stopped")
 BY_LOST_HEARTBEAT = "heartbeat"  # the detail of these
-RENEWED = (
-    "the device has stopped for lost heartbeats though this gateway sends them: they were lost on the way, or others "
-    "were sent under its session; it has begun a fresh session"
-)
 LOST = (DeviceMode.FAULT, DeviceMode.ESTOP, DeviceMode.UNREFERENCED, DeviceMode.HOMING, DeviceMode.BOOT)
 TROUBLE = (
     "fault", "hold", "late", "underrun", "estop", "homing_stopped", "text_lost", "inject_refused", "position_lost",
 )  # fmt: skip
 MOTION = {"started": "from", "finished": "at"}  # how the place of a motion's event is introduced
 POSITION_LOST = "position_lost"  # the event of a board of another dialect, which begins anew by it
-RESTARTED = "the device has restarted"
 BY_A_PERSON = "command"  # the detail of what somebody has asked for
 
 
@@ -43,7 +39,7 @@ class FrameHandler:
     def __init__(self, parts: Components) -> None:
         self._components = parts
         self._device, self._controller = parts.device, parts.controller
-        self._position_lost = ""  # why a board of another dialect begins anew, until its next boot is met
+        self._position_lost: Reason | None = None  # of a board of another dialect, until its next boot is met
 
     def take(self, received: FrameInput, moment: Moment) -> None:
         """One payload; raises `BadFrame` for one that no device says."""
@@ -98,7 +94,7 @@ class FrameHandler:
             self._components.injections.on_last_will()
         device.configuration.on_status()
         if before and device.configuration.device_crc32 != before:
-            self._components.start_over("the device has another configuration", moment)
+            self._components.start_over(because("device.configuration.changed"), moment)
         known = device.session.status
         if known is not None and known.tick_hz:
             self._components.goals.use_tick(known.tick_hz)
@@ -109,8 +105,8 @@ class FrameHandler:
         if event.event in STOPPED:
             self._on_stopped(event, moment)
         elif event.event == POSITION_LOST:
-            self._position_lost = event.detail
-            self._components.start_over(event.detail, moment)
+            self._position_lost = event.why or plain(event.detail)
+            self._components.start_over(self._position_lost, moment)
         self._components.injections.on_event(event)
 
     def _on_stopped(self, event: EventReport, moment: Moment) -> None:
@@ -118,7 +114,7 @@ class FrameHandler:
         device = self._device
         self._controller.held = (event.stream, event.detail)
         if event.detail == BY_LOST_HEARTBEAT and device.session.renew_heartbeat(moment):
-            device.event("heartbeat_renewed", RENEWED, moment)
+            device.event("heartbeat_renewed", because("device.heartbeat_renewed"), moment)
 
     def _on_shaft(self, report: ShaftReport, arrival: float, moment: Moment) -> None:
         measured = self._device.session.clock.measured(report.t_us, arrival)
@@ -128,15 +124,15 @@ class FrameHandler:
         device, controller = self._device, self._controller
         is_news, is_reboot = device.session.on_state(state, arrival, device.parameters.state_timeout)
         if is_reboot:
-            reason, self._position_lost = self._position_lost or RESTARTED, ""
-            if reason == RESTARTED:
-                device.event("rebooted", f"{reason}: its position and boot id are read anew", moment)
-            self._components.start_over(reason, moment)
+            lost, self._position_lost = self._position_lost, None
+            if lost is None:
+                device.event("rebooted", because("device.restarted.anew"), moment)
+            self._components.start_over(lost or because("device.restarted"), moment)
             self._components.injections.on_reboot()
         if not is_news:
             return
         if not device.session.fits(state):
-            self._components.abort_all(device.not_ready_reason(), moment)
+            self._abort_all(moment)
             self._publish_device(state, moment)
             self._components.command_handler.tell_shown(moment)
             return
@@ -149,11 +145,16 @@ class FrameHandler:
             self._components.streaming.interrupt()
             self._components.goals.on_hold(moment)
         if state.mode in LOST:
-            self._components.abort_all(device.not_ready_reason(), moment)
+            self._abort_all(moment)
         self._components.goals.on_ack()
         self._components.goals.on_state(state, point, moment)
         self._components.stop_foreign_motion(moment)
         self._components.command_handler.tell_shown(moment)
+
+    def _abort_all(self, moment: Moment) -> None:
+        """The device cannot go on, by its newest state."""
+        if (reason := self._device.not_ready_reason()) is not None:
+            self._components.abort_all(reason, moment)
 
     def _publish(self, state: StateFrame, point: PathPoint, moment: Moment) -> None:
         reporter = self._device.reporter
@@ -181,7 +182,7 @@ def publish_event(event: EventReport, device: GatewayDevice, moment: Moment) -> 
     now = moment.monotonic
     happened = device.session.clock.measured(event.t_us, now) if event.t_us else now
     said = _motion(event.event, device) if event.event in MOTION else ""
-    device.event(event.event, event.detail, Moment(moment.unix_at(happened), happened), level, said)
+    device.event(event.event, event.why or event.detail, Moment(moment.unix_at(happened), happened), level, said)
 
 
 def _motion(event: str, device: GatewayDevice) -> str:

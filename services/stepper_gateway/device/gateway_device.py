@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceEvent, DeviceStatus
+from gemelo.schemas.reasons import Reason
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import DEVICE_EVENTS
 from gemelo.services.stepper_gateway.device.configurator import Configuration
@@ -48,41 +49,42 @@ class GatewayDevice:
         """[s] that a board may need after the path's end, where it is sent its steps in messages of that length."""
         return SETTLING * self.arm.device.message_time if self.session.is_open_loop else 0.0
 
-    def unreachable_reason(self, moment: Moment) -> str:
-        """Why the device cannot be reached, empty if it can."""
+    def unreachable_reason(self, moment: Moment) -> Reason | None:
+        """Why the device cannot be reached, None if it can."""
         return self.session.unreachable_reason(moment, self.parameters.state_timeout)
 
-    def not_ready_reason(self) -> str:
-        """Why the device, though it can be reached, cannot start a motion; empty if it can."""
+    def not_ready_reason(self) -> Reason | None:
+        """Why the device, though it can be reached, cannot start a motion; None if it can."""
         return self._unfit_reason() or not_ready_reason(self.arm, self.state)
 
-    def refusal(self, moment: Moment, is_coming_to_rest: bool = False) -> str:
-        """Why no motion may be started now, or `is_coming_to_rest`: as soon as the device rests; empty if one may."""
+    def refusal(self, moment: Moment, is_coming_to_rest: bool = False) -> Reason | None:
+        """Why no motion may be started now, or `is_coming_to_rest`: as soon as the device rests; None if one may."""
         not_ready = self._unfit_reason() if is_coming_to_rest else self.not_ready_reason()
         return self.unreachable_reason(moment) or not_ready or self.commands.not_ready_reason()
 
-    def _unfit_reason(self) -> str:
-        """Why this firmware, or its configuration, cannot be driven at all; empty if it can."""
+    def _unfit_reason(self) -> Reason | None:
+        """Why this firmware, or its configuration, cannot be driven at all; None if it can."""
         status = self.session.status
-        outdated = outdated_reason(self.arm.device.name, status.firmware) if status is not None else ""
+        outdated = outdated_reason(self.arm.device.name, status.firmware) if status is not None else None
         return outdated or self.configuration.mismatch_reason()
 
     def event(
         self,
         event: str,
-        detail: str,
+        about: Reason | str,
         moment: Moment,
         level: LogLevel = LogLevel.WARNING,
         log_text: str = "",
         client: str = "",
     ) -> None:
-        """Tell of something once, on the bus and in the log; there as `log_text`, where that is given.
+        """Report something once, on the bus and in the log; there as `log_text`, where that is given.
 
-        `client` is the node that it is about, if not about everybody.
+        `about` is why, or what the device itself says. `client` is the node that it is about, if not about everybody.
         """
-        name = self.arm.device.name
-        told = DeviceEvent(stamp=moment.unix, device=name, event=event, detail=detail, client=client)
-        self.out.publish(DEVICE_EVENTS, told)
+        name, detail = self.arm.device.name, str(about)
+        why = about if isinstance(about, Reason) else None
+        report = DeviceEvent(stamp=moment.unix, device=name, event=event, detail=detail, client=client, why=why)
+        self.out.publish(DEVICE_EVENTS, report)
         self.out.log(level, log_text or (f"{event}: {detail}" if detail else event))
 
 
@@ -94,7 +96,7 @@ class StatusWatch:
         self._facts: StatusFacts | None = None  # of the last one
         self._reported: DeviceStatus | None = None
 
-    def changed(self, moment: Moment, warning: str) -> DeviceStatus | None:
+    def changed(self, moment: Moment, warning: Reason | None) -> DeviceStatus | None:
         """The status, stamped, if it is another than the last one; `warning` is what else a person has to mend."""
         facts = StatusFacts.of(self._device, moment, warning)
         if facts == self._facts:
@@ -109,29 +111,30 @@ class StatusWatch:
 class StatusFacts(NamedTuple):
     """All of a status that changes; only the boot that says its states is described."""
 
-    unreachable_reason: str
-    not_ready_reason: str
+    unreachable_reason: Reason | None
+    not_ready_reason: Reason | None
     report: StatusReport | None
     boot_id: int
     speaks: bool
     deaf_since: int  # [ns] UNIX time, 0: it hears
-    warning: str
+    warning: Reason | None
 
     @classmethod
-    def of(cls, device: GatewayDevice, moment: Moment, warning: str) -> StatusFacts:
+    def of(cls, device: GatewayDevice, moment: Moment, warning: Reason | None) -> StatusFacts:
         """A silent device is offline, whatever a broker has retained."""
         session, timeout = device.session, device.parameters.state_timeout
         if not (unreachable := device.unreachable_reason(moment)):
-            return cls("", device.not_ready_reason(), session.status, session.boot_id, True, 0, warning)
+            return cls(None, device.not_ready_reason(), session.status, session.boot_id, True, 0, warning)
         speaks, deaf_since = session.is_fresh(moment, timeout), session.deaf_since(moment, timeout)
-        return cls(unreachable, "", session.status, session.boot_id, speaks, deaf_since, warning)
+        return cls(unreachable, None, session.status, session.boot_id, speaks, deaf_since, warning)
 
     def status(self, device: GatewayDevice) -> DeviceStatus:
         """The message, without a stamp."""
         report = self.report or StatusReport(online=False)
+        why = self.unreachable_reason or self.not_ready_reason
         return DeviceStatus(
             online=not self.unreachable_reason,
-            reason=self.unreachable_reason or self.not_ready_reason,
+            reason=str(why or ""),
             device=device.arm.device.name,
             firmware=report.firmware,
             boot_id=self.boot_id,
@@ -145,9 +148,11 @@ class StatusFacts(NamedTuple):
             open_loop=report.open_loop,
             speaks=self.speaks,
             deaf_since=self.deaf_since,
-            warning=self.warning,
+            warning=str(self.warning or ""),
             heap_free=report.heap_free,
             heap_least=report.heap_least,
             stack_least=report.stack_least,
             stack_task=report.stack_task,
+            why=why,
+            warning_why=self.warning,
         )

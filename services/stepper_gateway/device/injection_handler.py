@@ -8,9 +8,10 @@ from typing import NamedTuple
 import msgspec
 from msgspec.structs import replace
 
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import InjectKind, InjectRequest, InjectResponse
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from gemelo.services.stepper_gateway.links.link import Kind
@@ -43,13 +44,10 @@ class InjectionHandler:
                 raise invalid(reason)
             status = self._device.session.status
             if status is None or not status.virtual:
-                raise invalid(
-                    f'device "{self._device.arm.device.name}" is a real one: press its buttons by hand; only a virtual '
-                    "device's are pressed by a request"
-                )
+                raise invalid(because("injection.real_device", device=self._device.arm.device.name))
             translated = replace(request, target=target_of(request, self._device.arm))
         except GoalRejected as rejected:
-            return self._answer(ticket, False, str(rejected))
+            return self._answer(ticket, rejected.reason)
         self._waiting.append(
             PendingInjection(translated, ticket, moment.monotonic + self._device.parameters.command_timeout)
         )
@@ -59,8 +57,7 @@ class InjectionHandler:
     def on_event(self, event: EventReport) -> None:
         """The device has done the oldest one, or refused it."""
         if event.event in (DONE, REFUSED):
-            done = event.event == DONE
-            self._conclude(done, "" if done else event.detail)
+            self._conclude(None if event.event == DONE else plain(event.detail))  # in the device's own words
 
     def on_reboot(self) -> None:
         """The device has started anew."""
@@ -73,25 +70,27 @@ class InjectionHandler:
     def step(self, moment: Moment) -> None:
         """Give up what was not answered in time."""
         while self._waiting and moment.monotonic >= self._waiting[0].deadline:
-            self._conclude(False, f"the device has not answered {self._waiting[0].request.kind} in time")
+            self._conclude(because("injection.unanswered", kind=self._waiting[0].request.kind.value))
 
     def _conclude_if_asked(self, kind: InjectKind) -> None:
         """What cuts the device's link may take its answer along: where it was asked for, it is done."""
         if self._waiting and self._waiting[0].request.kind is kind:
-            self._conclude(True, "")
+            self._conclude(None)
 
-    def _conclude(self, accepted: bool, reason: str) -> None:
+    def _conclude(self, reason: Reason | None) -> None:
         """Answers the oldest one, if there is one, and sends the next."""
         if self._waiting:
-            self._answer(self._waiting.popleft().ticket, accepted, reason)
+            self._answer(self._waiting.popleft().ticket, reason)
             self._send()
 
     def _send(self) -> None:
         if self._waiting:
             self._device.out.send(Kind.INJECT, msgspec.json.encode(self._waiting[0].request))
 
-    def _answer(self, ticket: int, accepted: bool, reason: str) -> None:
-        self._device.out.put(Answer(ticket, InjectResponse(accepted=accepted, reason=reason)))
+    def _answer(self, ticket: int, reason: Reason | None) -> None:
+        """Done where there is no reason why not."""
+        response = InjectResponse(accepted=reason is None, reason=str(reason or ""), why=reason)
+        self._device.out.put(Answer(ticket, response))
 
 
 def target_of(request: InjectRequest, arm: ArmDescription) -> str:
@@ -111,5 +110,5 @@ def target_of(request: InjectRequest, arm: ArmDescription) -> str:
 
 def _known(target: str, names: tuple[str, ...], kind: str) -> str:
     if target not in names:
-        raise invalid(f'there is no {kind} "{target}"{suggestion(target, names)}')
+        raise invalid(because("injection.unknown", nearest(target, names), kind=kind, name=target))
     return target

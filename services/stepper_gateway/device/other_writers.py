@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from gemelo.services.stepper_gateway.links.frames import StateFrame
+from gemelo.schemas.reasons import Reason, because, plain
+from gemelo.services.stepper_gateway.links.frames import NoFrame, StateFrame
 from gemelo.services.stepper_gateway.links.reports import StatusReport
 
 ENOUGH = 8  # states of another boot, each after one of the present one; chosen: 0.15 s, a forger sends single ones
@@ -80,27 +81,26 @@ class Strangers:
     def __init__(self, device: str) -> None:
         self._device = device
         self._arrivals: deque[float] = deque(maxlen=STRANGE)  # [s] monotonic
-        self._text = ""
+        self._reason: Reason | None = None
 
-    def on_message(self, kind: str, why: str, now: float) -> None:
-        """One of `kind` at `now` [s] monotonic; `why` it is no frame."""
-        if not self.text(now):
-            self._text = (
-                f'something else than gemelo\'s firmware writes under the topics of device "{self._device}" ({kind}: '
-                f"{why}): an old sketch, or another program: end it, or give the device another name"
-            )
+    def on_message(self, kind: str, error: NoFrame, now: float) -> None:
+        """One of `kind` at `now` [s] monotonic; `error` says why it is no frame."""
+        if self.reason(now) is None:
+            self._reason = because("device.strangers", plain(str(error)), device=self._device, kind=kind)
         self._arrivals.append(now)
 
-    def text(self, now: float) -> str:
-        """The sentence, the same as long as it goes on; empty where there is none at `now` [s] monotonic."""
+    def reason(self, now: float) -> Reason | None:
+        """That there are some at `now` [s] monotonic; the same as long as it goes on."""
         is_there = len(self._arrivals) == STRANGE and now - self._arrivals[0] <= STRANGE_SPAN
-        return self._text if is_there else ""
+        return self._reason if is_there else None
 
 
-def boot_text(boot_id: int, report: StatusReport | None) -> str:
+def boot_reason(boot_id: int, report: StatusReport | None) -> Reason:
     """`boot 05b8fac7 (virtual, firmware 1.0.0, process 12 on workshop)`, as far as it is known."""
+    boot = f"{boot_id:08x}"
     if report is None:
-        return f"boot {boot_id:08x}"
+        return because("device.boot", boot=boot)
     kind = "virtual" if report.virtual else "board"
-    known = (kind, report.firmware and f"firmware {report.firmware}", report.place)
-    return f"boot {boot_id:08x} ({', '.join(filter(None, known))})"
+    if report.place:
+        return because("device.boot.placed", boot=boot, kind=kind, firmware=report.firmware, place=report.place)
+    return because("device.boot.reported", boot=boot, kind=kind, firmware=report.firmware)

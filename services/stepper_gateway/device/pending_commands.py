@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from gemelo.schemas.device import DeviceCommandKind
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.stepper_gateway.device.clock import ClockSync
 from gemelo.services.stepper_gateway.links.frames import ANY_BOOT, NEVER_EXPIRES, CommandFrame, CommandReply, StateFrame
 from gemelo.services.stepper_gateway.moment import Moment
@@ -116,10 +117,12 @@ class PendingCommands:
     def is_pending(self, kind: DeviceCommandKind) -> bool:
         return bool(self._pending) and any(command.kind == kind for command in self._pending)
 
-    def not_ready_reason(self) -> str:
-        """Why nothing may be started now, empty if it may."""
-        asked = [c.kind.name for c in self._pending if c.tickets and c.kind in EXCLUSIVE]
-        return f"the device has not answered {asked[0]} yet: wait a moment" if asked else ""
+    def not_ready_reason(self) -> Reason | None:
+        """Why nothing may be started now, None if it may."""
+        if not self._pending:
+            return None
+        requested = [c.kind.name for c in self._pending if c.tickets and c.kind in EXCLUSIVE]
+        return because("command.under_way", command=requested[0]) if requested else None
 
     def due(self, moment: Moment, clock: ClockSync, boot_id: int, is_reachable: bool) -> list[CommandFrame]:
         """The frames to send now; to a device that is not reachable, or not known, only those that stop it."""

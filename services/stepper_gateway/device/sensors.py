@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from gemelo.schemas.device import SensorReadings
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import SENSORS
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
@@ -41,13 +42,13 @@ class SensorRelay:
         self._readings = LatestReadings(known, moment.unix_at(measured), arrival)
         if self._is_silent:
             self._is_silent = False
-            self._device.event("sensors_back", "the sensors report again", moment, LogLevel.INFO)
+            self._device.event("sensors_back", because("sensors.back"), moment, LogLevel.INFO)
 
-    def step(self, unreachable_reason: str, moment: Moment) -> None:
+    def step(self, unreachable_reason: Reason | None, moment: Moment) -> None:
         """Republish, or say once that there is nothing to republish."""
         if not self._units:
             return
-        if unreachable_reason:
+        if unreachable_reason is not None:
             self._present_since = None
         elif self._present_since is None:
             self._present_since = moment.monotonic
@@ -65,9 +66,8 @@ class SensorRelay:
     def _fall_silent(self, moment: Moment) -> None:
         if not self._is_silent:
             self._is_silent = True
-            names = ", ".join(self._units)
-            detail = f"no reading of {names} for {SILENCE:g} s: check the board's network and the sensors' wires"
-            self._device.event("sensors_silent", detail, moment)
+            silent = because("sensors.silent", names=tuple(self._units), time=SILENCE)
+            self._device.event("sensors_silent", silent, moment)
 
     def _publish(self, readings: LatestReadings) -> None:
         names = tuple(name for name in self._units if name in readings.values)

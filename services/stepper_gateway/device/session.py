@@ -5,8 +5,9 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.stepper_gateway.device.clock import ClockSync
-from gemelo.services.stepper_gateway.device.other_writers import OtherBoots, boot_text
+from gemelo.services.stepper_gateway.device.other_writers import OtherBoots, boot_reason
 from gemelo.services.stepper_gateway.device.questions import Questions
 from gemelo.services.stepper_gateway.device.state_checks import StateChecks
 from gemelo.services.stepper_gateway.links.frames import (
@@ -33,21 +34,6 @@ STEADY_BEATS = 0.7  # [s] of heartbeats without a pause, after which a device ha
 ASK_STATUS = 1.0  # [s] between two requests for a status that is missing; chosen: a slow network answers by then
 # Chosen: true states are not taken until they are newer than one from so far ahead, which must not look like silence.
 FARTHEST_AHEAD = 0.2  # [s] that a frame's time may be ahead of the device's clock as it is known
-TWIN = (
-    "is asked by another gateway too: nothing moves until there is one. End the other: a forgotten `make up`, a second "
-    "host, or a process that was stopped and goes on"
-)
-NOT_HEARD = "is it switched on, does it use the same broker, and does the broker's ACL let it write?"
-NO_CLOCK = "try again in a second"
-DEAF = (
-    "speaks and does not hear: its states arrive, and it answers nothing that is sent to it. Likely causes: a loose TX "
-    "wire, a broker's ACL that denies the device its subscription, or two boards or programs with one client id. "
-    "Without heartbeats it holds by itself"
-)
-ONE_NAME = (
-    "nothing moves until there is one. Switch one off, or give one another name: a forgotten `make up` in another "
-    "folder, a virtual device beside a board, or two boards that were provisioned alike"
-)
 NUMBERS = {2: "two", 3: "three"}
 MODES = {mode.value: mode for mode in DeviceMode}
 OLD_BOOTS = 16  # remembered, so that a late frame of one is no reboot; chosen: more than a broker keeps frames of
@@ -76,7 +62,7 @@ class DeviceSession:
         self._offline_boot = 0  # whose last will has come
         self._questions = Questions()
         self.link_up = False
-        self.link_reason = "no connection yet"
+        self.link_reason = because("link.none_yet")
         self.latest: StateFrame | None = None  # of any number of joints
         self.state: StateFrame | None = None  # the latest, if it is one of this arm
         self.state_arrival = -1.0e9  # [s] monotonic
@@ -98,7 +84,7 @@ class DeviceSession:
         """True if the state has this arm's joints; a device with another configuration has others."""
         return len(state.steps) == self._joints
 
-    def on_link(self, connected: bool, reason: str) -> None:
+    def on_link(self, connected: bool, reason: Reason) -> None:
         self.link_up, self.link_reason = connected, reason
         if connected:
             self._heartbeat_due = self._sync_due = 0.0
@@ -228,14 +214,14 @@ class DeviceSession:
             return SYNC_AT_FIRST
         return SYNC_UNANSWERED if self._questions.is_late(moment.monotonic) else SYNC
 
-    def second_device(self, moment: Moment) -> str:
-        """The sentence for another device under this one's name; empty while there is none."""
+    def second_device(self, moment: Moment) -> Reason | None:
+        """That another device is there under this one's name."""
         others = self._others.living(moment.monotonic)
         if not others:
-            return ""
-        known = "; ".join(boot_text(boot, self._reports.get(boot)) for boot in (self.boot_id, *others))
+            return None
+        known = (boot_reason(boot, self._reports.get(boot)) for boot in (self.boot_id, *others))
         number = NUMBERS.get(len(others) + 1, "several")
-        return f'{number} devices call themselves "{self._device}": {known}: {ONE_NAME}'
+        return because("device.several", *known, device=self._device, number=number)
 
     def deaf_since(self, moment: Moment, timeout: float) -> int:
         """[ns] UNIX time since when the device does not hear; 0 while it hears, is silent, or is one of two."""
@@ -264,29 +250,29 @@ class DeviceSession:
     def mode(self) -> DeviceMode:
         return MODES[self.latest.mode] if self.latest is not None else DeviceMode.BOOT
 
-    def unreachable_reason(self, moment: Moment, timeout: float) -> str:
+    def unreachable_reason(self, moment: Moment, timeout: float) -> Reason | None:
         """Why the device cannot be reached: no link, no state for `timeout` [s], a second device, no answer, or
-        another gateway; empty if it can."""
+        another gateway; None if it can."""
         name = self._device
         if not self.link_up:
-            return f'no link to device "{name}": {self.link_reason}'
+            return because("device.no_link", self.link_reason, device=name)
         if not self.is_fresh(moment, timeout):
             if self._offline_boot and self.boot_id in (0, self._offline_boot):
-                return f'device "{name}" is offline: switch it on, or check its network'
+                return because("device.offline", device=name)
             if self.latest is None and not self._reports:
-                return f'device "{name}" has not been heard: {NOT_HEARD}'
-            return f'device "{name}" is silent for more than {timeout:g} s: check its power and network'
+                return because("device.never_received", device=name)
+            return because("device.silent", device=name, time=timeout)
         if second := self.second_device(moment):
             return second
         if self._questions.is_deaf(moment.monotonic):
-            return f'device "{name}" {DEAF}'
+            return because("device.deaf", device=name)
         if self._questions.has_twin(moment.monotonic):
-            return f'device "{name}" {TWIN}'
+            return because("device.second_gateway", device=name)
         if self.status is None:
-            return f'device "{name}" has not said yet who it is: wait a second, or restart it'
+            return because("device.unidentified", device=name)
         if not self.clock.is_synchronised:
-            return f'the clock of device "{name}" is not known yet: {NO_CLOCK}'
-        return ""
+            return because("device.clock_unknown", device=name)
+        return None
 
     def _meet(self, boot_id: int) -> bool:
         """Adopt a boot id; true if it replaces another one."""

@@ -16,6 +16,7 @@ from gemelo.schemas.motion import (
     FollowJointTrajectoryResult,
     TrajectoryPoint,
 )
+from gemelo.schemas.reasons import Reason, Value, because
 from gemelo.services.stepper_gateway.goals.goal_validator import MotionStart, ValidatedGoal
 from gemelo.services.stepper_gateway.links.frames import StateFrame
 from gemelo.services.stepper_gateway.moment import Moment
@@ -28,7 +29,7 @@ class GoalEnding(NamedTuple):
 
     status: GoalStatusCode
     code: FollowErrorCode
-    reason: str
+    reason: Reason | None = None  # None: it has succeeded
 
 
 @dataclass
@@ -83,8 +84,7 @@ class ActiveGoal:
                 return GoalEnding(
                     GoalStatusCode.ABORTED,
                     FollowErrorCode.PATH_TOLERANCE_VIOLATED,
-                    f'joint "{joint.name}" is {error:+.2f} steps off its path at {self.elapsed(state):.3f} s, more '
-                    f"than {bound:g} steps",
+                    because("ending.off_path", joint=joint.name, error=error, time=self.elapsed(state), bound=bound),
                 )
         return self._too_fast_or_slow(point, state)
 
@@ -95,19 +95,19 @@ class ActiveGoal:
         for joint, wanted, done, bound in rows:
             error = wanted * scale - done
             if bound is not None and abs(error) > bound:
-                per_unit, unit = joint.steps.per_unit, joint.unit
+                per_unit = joint.steps.per_unit
+                off: dict[str, Value] = {"error": error / per_unit, "bound": bound / per_unit, "unit": joint.unit}
                 return GoalEnding(
                     GoalStatusCode.ABORTED,
                     FollowErrorCode.PATH_TOLERANCE_VIOLATED,
-                    f'joint "{joint.name}" is {error / per_unit:+.5f} {unit}/s off its velocity at '
-                    f"{self.elapsed(state):.3f} s, more than {bound / per_unit:g} {unit}/s",
+                    because("ending.off_velocity", joint=joint.name, time=self.elapsed(state), **off),
                 )
         return None
 
     def account(self, ending: GoalEnding, state: StateFrame | None, now: float) -> str:
         """A sentence for the log at `now` [s] monotonic: what moved where, how long, with what error, why it ended."""
         said = f"goal {self.goal_id} {ending.status.name.lower()} after {now - self.accepted.monotonic:.2f} s"
-        if ending.reason:
+        if ending.reason is not None:
             said += f": {ending.reason}"
         if state is None or len(self.departed) != len(state.steps):
             return f"{said}; nothing moved for it"
@@ -132,8 +132,7 @@ class ActiveGoal:
                 return GoalEnding(
                     GoalStatusCode.ABORTED,
                     FollowErrorCode.GOAL_TOLERANCE_VIOLATED,
-                    f'joint "{joint.name}" was {wanted - done:+.2f} steps off its path as it passed the goal, more '
-                    f"than {bound:g} steps",
+                    because("ending.off_path.passing", joint=joint.name, error=wanted - done, bound=bound),
                 )
         return None
 
@@ -155,14 +154,20 @@ class ActiveGoal:
         errors = self.goal_errors(state)
         bounds = [math.inf if bound is None else bound for bound in self.goal.goal_tolerance.position]
         index = max(range(len(errors)), key=lambda i: abs(errors[i]) - bounds[i])
-        joint, bound = self.joints[index], bounds[index]
+        joint, error = self.joints[index], errors[index]
         return GoalEnding(
             GoalStatusCode.ABORTED,
             FollowErrorCode.GOAL_TOLERANCE_VIOLATED,
-            f'joint "{joint.name}" is {errors[index]:+.2f} steps ({errors[index] / joint.steps.per_unit:+.5f} '
-            f"{joint.unit}) from its goal {now - self.accepted.monotonic:.2f} s after acceptance, when it should have "
-            f"been within {bound:g} steps: the device played the path "
-            f"{self.elapsed(state):.2f} s far",
+            because(
+                "ending.not_reached",
+                joint=joint.name,
+                error=error,
+                distance=error / joint.steps.per_unit,
+                unit=joint.unit,
+                time=now - self.accepted.monotonic,
+                bound=bounds[index],
+                played=self.elapsed(state),
+            ),
         )
 
     def elapsed(self, state: StateFrame) -> float:
@@ -201,11 +206,12 @@ class ActiveGoal:
         """What the client gets at `now` [s]; without a state the steps stay empty."""
         return FollowJointTrajectoryResult(
             error_code=ending.code,
-            error_string=ending.reason,
+            error_string=str(ending.reason or ""),
             joint_names=tuple(joint.name for joint in self.joints),
             commanded_steps=tuple(math.floor(steps + 0.5) for steps in self.commanded),  # as the device rounds
             executed_steps=state.steps if state is not None else (),
             max_following_error=tuple(self.max_error),
             final_error=tuple(self._final_errors(state)) if state is not None else (),
             duration=now - self.accepted.monotonic,
+            why=ending.reason,
         )

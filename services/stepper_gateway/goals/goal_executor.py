@@ -25,15 +25,15 @@ from gemelo.services.stepper_gateway.motion.motion_controller import MotionContr
 from gemelo.services.stepper_gateway.motion.paths import TimedPath
 from gemelo.services.stepper_gateway.outputs import GoalExecuting, GoalFinished, GoalProgress
 
-HELD = {  # by the detail of the device's event
-    "heartbeat": "the device holds because it lost the gateway's heartbeat",
-    "command": "the device holds because somebody else has sent it HOLD or STOP: this gateway has not",
-    "shutdown": "the device holds because it is being shut down",
+HELD = {  # the code, by the detail of the device's event
+    "heartbeat": "ending.held.heartbeat",
+    "command": "ending.held.command",
+    "shutdown": "ending.held.shutdown",
 }
-HELD_SILENTLY = "the device holds by itself and has not said why: see its own log"
-NOT_VERIFIED = "sent, not verified: the board does not say what it has executed"
-UNHEARD = "the device says that it stands and answers nothing: does it hear this gateway? restart it, check its network"
+HELD_SILENTLY = "ending.held.unexplained"
 FAILED = GoalStatusCode.ABORTED, FollowErrorCode.DEVICE_FAILED
+PREEMPTED = GoalStatusCode.PREEMPTED, FollowErrorCode.PREEMPTED
+SUCCEEDED = GoalEnding(GoalStatusCode.SUCCEEDED, FollowErrorCode.SUCCESSFUL)
 
 
 class GoalVerdict(NamedTuple):
@@ -43,6 +43,16 @@ class GoalVerdict(NamedTuple):
     code: FollowErrorCode = FollowErrorCode.SUCCESSFUL
     reason: str = ""
     why: Reason | None = None  # the same as data
+
+    @classmethod
+    def refused(cls, code: FollowErrorCode, why: Reason) -> GoalVerdict:
+        return cls(False, code, str(why), why)
+
+
+class CancelVerdict(NamedTuple):
+    """The answer to a cancel request."""
+
+    why: Reason | None  # there is nothing to cancel; None: it is being cancelled
 
 
 def as_not_verified(result: FollowJointTrajectoryResult) -> FollowJointTrajectoryResult:
@@ -82,7 +92,7 @@ class GoalExecutor:
         """Accept and start a goal, or say why not."""
         controller = self._controller
         if reason := self._device.refusal(moment, controller.comes_to_rest()):
-            return GoalVerdict(False, FollowErrorCode.DEVICE_FAILED, reason)
+            return GoalVerdict.refused(FollowErrorCode.DEVICE_FAILED, reason)
         try:
             if self._current is not None and self._current.ending is not None:
                 raise invalid(because("goal.decelerating", remedy("wait_for_rest")))
@@ -94,7 +104,7 @@ class GoalExecutor:
             motion_start = controller.motion_start(moment)
             path = self._validator.path(checked, motion_start, moment.unix, self._device.parameters)
         except GoalRejected as rejected:
-            return GoalVerdict(False, rejected.code, str(rejected), rejected.reason)
+            return GoalVerdict.refused(rejected.code, rejected.reason)
         self._drop_waiting(moment)
         self._waiting = ActiveGoal(goal_id, checked, self._device.joints, moment)
         if checked.trajectory.stamp <= moment.unix:
@@ -102,23 +112,23 @@ class GoalExecutor:
         self._start_waiting(moment, path)
         return GoalVerdict(True)
 
-    def cancel(self, goal_id: str, moment: Moment) -> str:
-        """Decelerate; empty, or why there is nothing to cancel."""
+    def cancel(self, goal_id: str, moment: Moment) -> Reason | None:
+        """Decelerate; None, or why there is nothing to cancel."""
         if self._next.goal is not None and self._next.goal.goal_id == goal_id:
             if (taken := self._next.cancel()) is not None:
                 self._finish(taken, CANCELED, moment)
-            return ""
+            return None
         execution = next((e for e in (self._current, self._waiting) if e is not None and e.goal_id == goal_id), None)
         if execution is None:
-            return f"goal {goal_id} is not being carried out"
+            return because("goal.not_under_way", goal=goal_id)
         if execution is self._waiting:
             self._waiting = None
             if self._current is not None or self._controller.is_resting():
                 self._finish(execution, CANCELED, moment)
-                return ""
+                return None
             self._current = execution  # what it waited behind has to stop
         self._end(CANCELED, moment)
-        return ""
+        return None
 
     def step(self, moment: Moment, period: float) -> None:
         """Start what has waited, and end what is late or refused; `period` [s] since the last step."""
@@ -132,11 +142,12 @@ class GoalExecutor:
                 self._finish_current(execution.ending, moment)
             elif controller.is_unheard(moment):
                 controller.lost()
-                reason = f"{execution.ending.reason}; {UNHEARD}"
-                self._finish_current(execution.ending._replace(reason=reason), moment)
+                before = () if execution.ending.reason is None else (execution.ending.reason,)
+                unanswered = because("ending.stop_unanswered", *before)
+                self._finish_current(execution.ending._replace(reason=unanswered), moment)
             return
         stream = execution.stream
-        if stream is not None and stream.failure:
+        if stream is not None and stream.failure is not None:
             return self._end(GoalEnding(*FAILED, stream.failure), moment)
         if execution.deadline is not None:
             execution.deadline += period * controller.slowdown_share
@@ -163,15 +174,17 @@ class GoalExecutor:
         if controller.is_resting():
             self._start_waiting(moment)
 
-    def abort(self, reason: str, moment: Moment) -> None:
+    def abort(self, reason: Reason, moment: Moment) -> None:
         """The device can no longer be relied upon: end now, with the last steps known."""
         self._drop_waiting(moment, GoalEnding(*FAILED, reason))
         self._controller.transmission.abandon()
         if self._current is not None:
             ending = self._current.ending
-            self._finish_current(GoalEnding(*FAILED, f"{ending.reason}; then {reason}" if ending else reason), moment)
+            if ending is not None and ending.reason is not None:
+                reason = because("ending.then", ending.reason, reason)
+            self._finish_current(GoalEnding(*FAILED, reason), moment)
 
-    def stop(self, reason: str, moment: Moment) -> None:
+    def stop(self, reason: Reason, moment: Moment) -> None:
         """Decelerate and abort, for a reason outside the goal."""
         self._drop_waiting(moment, GoalEnding(*FAILED, reason))
         if self._current is None:
@@ -182,14 +195,14 @@ class GoalExecutor:
         """The device holds by itself on a path of ours."""
         stream, cause = self._controller.held
         is_this = self._controller.stream is not None and stream == self._controller.stream.id
-        reason = HELD.get(cause, HELD_SILENTLY) if is_this else HELD_SILENTLY
+        reason = because(HELD.get(cause, HELD_SILENTLY) if is_this else HELD_SILENTLY)
         if self._current is None:
             self.stop(reason, moment)
         self._end(GoalEnding(*FAILED, reason), moment)
 
     def on_foreign_motion(self, moment: Moment) -> None:
         """The device played another stream than the present goal's, and is being stopped."""
-        self._end(GoalEnding(*FAILED, "the device moved along another stream"), moment)
+        self._end(GoalEnding(*FAILED, because("ending.other_stream")), moment)
 
     def _accept_next(self, goal_id: str, checked: ValidatedGoal, present: ActiveGoal, moment: Moment) -> GoalVerdict:
         """The goal begins at the end of the present one; raises `GoalRejected`."""
@@ -206,7 +219,7 @@ class GoalExecutor:
             self.scenes.require_newest(goal.goal.planned_in)
         except GoalRejected as rejected:
             self._next.take_away()
-            self._finish(goal, GoalEnding(GoalStatusCode.ABORTED, rejected.code, str(rejected)), moment)
+            self._finish(goal, GoalEnding(GoalStatusCode.ABORTED, rejected.code, rejected.reason), moment)
 
     def _follow(self, execution: ActiveGoal, state: StateFrame, point: PathPoint, moment: Moment) -> None:
         strayed = execution.follow(point, state)
@@ -215,8 +228,7 @@ class GoalExecutor:
             return self._go_on_to_next(execution, state, point, moment)
         is_finished = stream is not None and stream.is_finished and execution.ending is None
         if is_finished and strayed is None and execution.is_reached(state):
-            done = GoalEnding(GoalStatusCode.SUCCEEDED, FollowErrorCode.SUCCESSFUL, "")
-            return self._finish_current(done, moment)
+            return self._finish_current(SUCCEEDED, moment)
         if is_finished and execution.deadline is None:  # no time would bring more steps
             return self._finish_current(strayed or execution.late(state, moment.monotonic), moment)
         if strayed is not None and execution.ending is None:
@@ -229,7 +241,7 @@ class GoalExecutor:
         if (missed := execution.passing_error(point, state)) is not None:
             return self._end(missed, moment)
         following = self._next.begin(state, moment)
-        self._finish_current(GoalEnding(GoalStatusCode.SUCCEEDED, FollowErrorCode.SUCCESSFUL, ""), moment)
+        self._finish_current(SUCCEEDED, moment)
         self._current, ending, following.ending = following, following.ending, None
         self._device.out.put(GoalExecuting(following.goal_id))
         if ending is not None:  # it was cancelled when its knots were on their way
@@ -262,7 +274,7 @@ class GoalExecutor:
             self.scenes.require_newest(execution.goal.planned_in)
             path = path or self._validator.path(execution.goal, motion_start, moment.unix, self._device.parameters)
         except GoalRejected as rejected:
-            ending = GoalEnding(GoalStatusCode.ABORTED, rejected.code, str(rejected))
+            ending = GoalEnding(GoalStatusCode.ABORTED, rejected.code, rejected.reason)
             return self._finish(execution, ending, moment)
         self._preempt(moment)
         self._begin(execution, PathKnots(path), moment)
@@ -289,22 +301,19 @@ class GoalExecutor:
     def _stop_what_failed(self, moment: Moment) -> None:
         """The motion that a goal waits behind must come to an end."""
         controller = self._controller
-        has_failed = controller.transmission.owns_motion and controller.stream and controller.stream.failure
-        if self._waiting is not None and has_failed:
+        stream = controller.stream if controller.transmission.owns_motion else None
+        if self._waiting is not None and stream is not None and stream.failure is not None:
             controller.stop(moment)
 
     def _preempt(self, moment: Moment) -> None:
         if self._current is not None:
-            reason = "a newer goal took over"
-            self._finish_current(GoalEnding(GoalStatusCode.PREEMPTED, FollowErrorCode.PREEMPTED, reason), moment)
+            self._finish_current(GoalEnding(*PREEMPTED, because("ending.preempted")), moment)
 
     def _drop_waiting(self, moment: Moment, ending: GoalEnding | None = None) -> None:
         execution, self._waiting = self._waiting, None
         if execution is not None:
-            reason = "a newer goal took over before this one began"
-            self._finish(
-                execution, ending or GoalEnding(GoalStatusCode.PREEMPTED, FollowErrorCode.PREEMPTED, reason), moment
-            )
+            never_began = GoalEnding(*PREEMPTED, because("ending.preempted.never_began"))
+            self._finish(execution, ending or never_began, moment)
 
     def _end(self, ending: GoalEnding, moment: Moment) -> None:
         """Decelerate; the goal ends once the arm stands."""
@@ -326,17 +335,22 @@ class GoalExecutor:
     def _drop_next(self, present: ActiveGoal, ending: GoalEnding, moment: Moment) -> None:
         """What was to follow does not."""
         if (dropped := self._next.take_away()) is not None:
-            reason = f"goal {present.goal_id}, which it was to follow, {ending.status.name.lower()}: {ending.reason}"
+            before = () if ending.reason is None else (ending.reason,)
+            reason = because("ending.before_it", *before, goal=present.goal_id, status=ending.status.name)
             self._finish(dropped, GoalEnding(GoalStatusCode.ABORTED, ending.code, reason), moment)
 
     def _finish(self, execution: ActiveGoal, ending: GoalEnding, moment: Moment) -> None:
         is_open_loop = self._device.session.is_open_loop
         if is_open_loop:
-            reason = f"{ending.reason}; {NOT_VERIFIED}" if ending.reason else NOT_VERIFIED
-            ending = ending._replace(reason=reason)
+            ending = ending._replace(reason=_not_verified(ending.reason))
         result = execution.result(ending, self._device.state, moment.monotonic)
         result = as_not_verified(result) if is_open_loop else result
         self._device.out.put(GoalFinished(execution.goal_id, ending.status, result))
         self._next.ended(execution.goal_id, ending.status)
         level = LogLevel.INFO if ending.status == GoalStatusCode.SUCCEEDED else LogLevel.WARNING
         self._device.out.log(level, execution.account(ending, self._device.state, moment.monotonic))
+
+
+def _not_verified(ended: Reason | None) -> Reason:
+    """Of a board that does not say what it has executed: `ended` is why the goal ended before its end."""
+    return because("ending.not_verified") if ended is None else because("ending.ended_not_verified", ended)

@@ -15,7 +15,7 @@ from gemelo.services.stepper_gateway.motion.knots import Knot
 from gemelo.services.stepper_gateway.motion.motion_controller import MotionController
 from gemelo.services.stepper_gateway.motion.paths import TimedPath
 
-CANCELED = GoalEnding(GoalStatusCode.CANCELED, FollowErrorCode.CANCELED, "the arm decelerated on its path")
+CANCELED = GoalEnding(GoalStatusCode.CANCELED, FollowErrorCode.CANCELED, because("ending.canceled"))
 
 
 class NextGoal:

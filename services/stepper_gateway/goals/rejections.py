@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from gemelo.schemas.motion import FollowErrorCode
-from gemelo.schemas.reasons import Reason, plain
+from gemelo.schemas.reasons import Reason
 
 
 class GoalRejected(Exception):
     """A goal that is not carried out."""
 
-    def __init__(self, code: FollowErrorCode, reason: Reason | str) -> None:
+    def __init__(self, code: FollowErrorCode, reason: Reason) -> None:
         super().__init__()
         self.code = code
-        self.reason = reason if isinstance(reason, Reason) else plain(reason)
+        self.reason = reason
 
     def __str__(self) -> str:
         return str(self.reason)
 
 
-def invalid(reason: Reason | str) -> GoalRejected:
+def invalid(reason: Reason) -> GoalRejected:
     return GoalRejected(FollowErrorCode.INVALID_GOAL, reason)
 
 
-def invalid_joints(reason: Reason | str) -> GoalRejected:
+def invalid_joints(reason: Reason) -> GoalRejected:
     return GoalRejected(FollowErrorCode.INVALID_JOINTS, reason)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from gemelo.schemas.reasons import because, remedy
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected
 
 MOST_UNHEARD = 10_000  # chosen: edits of one scene that may be missed in a row; more is no planner's version
@@ -86,15 +86,11 @@ class SceneVersions:
             raise _changed("goal.scene.changed", planned.version, newest.version)
 
     @property
-    def rivals(self) -> str:
-        """The sentence for two living planners that have both published a scene; empty if there is one at most."""
+    def rivals(self) -> Reason | None:
+        """That two living planners have both published a scene, the older one first; None if there is one at most."""
         if len(self._living) < 2 or len(both := sorted(self._living & self._newest.keys())) < 2:
-            return ""
-        older, newer = map(_process, both[-2:])
-        return (
-            f"two planners live, {older} and {newer}: which scene stands around the arm is not known. The older one "
-            "ends by itself within seconds; if not, end it"
-        )
+            return None
+        return because("goal.scene.two_planners", *map(_process, both[-2:]))
 
     @property
     def _scene(self) -> SceneVersion | None:
@@ -119,11 +115,11 @@ class SceneVersions:
         return ""
 
 
-def _process(instance: str) -> str:
+def _process(instance: str) -> Reason:
     """`process 123 on this-host`."""
     _, _, place = instance.partition(".")
     pid, _, host = place.partition(".")
-    return f"process {pid} on {host}" if host else "a process that does not sign with its instance"
+    return because("goal.scene.process", pid=pid, host=host) if host else because("goal.scene.unsigned_process")
 
 
 def _changed(code: str, version: int, newest: int) -> GoalRejected:

@@ -10,6 +10,7 @@ from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceCommandResponse, DeviceMode
 from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
 from gemelo.schemas.motion import FollowErrorCode
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import GRIPPER_STATE
 from gemelo.services.stepper_gateway.device.command_handler import CommandHandler, OnAnswer
@@ -67,8 +68,8 @@ class GripperExecutor:
         try:
             jaws = self._require(goal, moment)
         except GoalRejected as rejected:
-            return GoalVerdict(False, rejected.code, str(rejected), rejected.reason)
-        self._end(GoalStatusCode.PREEMPTED, "a newer goal took over", moment)
+            return GoalVerdict.refused(rejected.code, rejected.reason)
+        self._end(GoalStatusCode.PREEMPTED, because("ending.preempted"), moment)
         now = moment.monotonic
         arrival = now + jaws.travel_time(goal.position)
         self._stalled = False
@@ -76,21 +77,21 @@ class GripperExecutor:
         self._commands.have_sent(*jaws.sending(goal.position), self._answer_to(goal_id), moment)
         return GoalVerdict(True)
 
-    def cancel(self, goal_id: str, moment: Moment) -> str:
-        """Let the jaws stay where they are; empty, or why there is nothing to cancel."""
+    def cancel(self, goal_id: str, moment: Moment) -> Reason | None:
+        """Let the jaws stay where they are; None, or why there is nothing to cancel."""
         if self._grip is None or self._grip.goal_id != goal_id:
-            return f"goal {goal_id} is not being carried out"
+            return because("goal.not_under_way", goal=goal_id)
         self._keep_jaws(moment)
-        self._end(GoalStatusCode.CANCELED, "cancelled", moment)
-        return ""
+        self._end(GoalStatusCode.CANCELED, because("gripper.canceled"), moment)
+        return None
 
-    def stop(self, reason: str, moment: Moment) -> None:
+    def stop(self, reason: Reason, moment: Moment) -> None:
         """Let the jaws stay where they are, and abort what was under way."""
         if self._grip is not None:
             self._keep_jaws(moment)
             self._end(GoalStatusCode.ABORTED, reason, moment)
 
-    def abort(self, reason: str, moment: Moment) -> None:
+    def abort(self, reason: Reason, moment: Moment) -> None:
         """What was under way is not watched any more."""
         self._end(GoalStatusCode.ABORTED, reason, moment)
 
@@ -103,9 +104,9 @@ class GripperExecutor:
         if grip is None:
             return
         if state.mode == DeviceMode.ESTOP:
-            return self._end(GoalStatusCode.ABORTED, "the emergency stop is pressed", moment)
+            return self._end(GoalStatusCode.ABORTED, because("gripper.estop"), moment)
         if grip.answered is not None and self._jaws.is_overruled(grip.position):
-            self._end(GoalStatusCode.ABORTED, "the gripper was stopped, or switched by somebody else", moment)
+            self._end(GoalStatusCode.ABORTED, because("gripper.overruled"), moment)
 
     def on_readings(self, report: SensorReport, arrival: float) -> None:
         """What the board has measured; `arrival` [s] monotonic."""
@@ -129,25 +130,21 @@ class GripperExecutor:
 
     def _require(self, goal: GripperCommandGoal, moment: Moment) -> Jaws:
         if self._jaws is None or self._gripper is None:
-            raise invalid(f"{self._device.arm.name} has no gripper: write a [gripper] into its robot.toml")
+            raise invalid(because("gripper.none", robot=self._device.arm.name))
         if reason := self._device.unreachable_reason(moment) or self._device.configuration.mismatch_reason():
             raise GoalRejected(FollowErrorCode.DEVICE_FAILED, reason)
         state = self._device.state
         if state is None:
-            raise GoalRejected(FollowErrorCode.DEVICE_FAILED, self._device.not_ready_reason())
+            unknown = because("device.joints_unknown", device=self._device.arm.device.name)
+            raise GoalRejected(FollowErrorCode.DEVICE_FAILED, unknown)
         if state.mode == DeviceMode.ESTOP:
-            raise GoalRejected(
-                FollowErrorCode.DEVICE_FAILED,
-                "gripper: the emergency stop is pressed: release it and run `gemelo reset` first",
-            )
+            raise GoalRejected(FollowErrorCode.DEVICE_FAILED, because("gripper.refused.estop"))
         self._jaws.require(goal.position)
         if goal.max_effort < 0.0:
-            raise invalid(f"gripper: max_effort is {goal.max_effort:g} N: write 0 for no bound, or more")
+            raise invalid(because("gripper.effort.negative", value=goal.max_effort))
         if 0.0 < goal.max_effort < self._gripper.effort:
-            raise invalid(
-                f"gripper: it presses with {self._gripper.effort:g} N and cannot be told to press with at most "
-                f"{goal.max_effort:g} N: leave max_effort out, or open it only as far as the object needs"
-            )
+            effort = self._gripper.effort
+            raise invalid(because("gripper.effort.too_small", value=goal.max_effort, effort=effort))
         return self._jaws
 
     def _answer_to(self, goal_id: str) -> OnAnswer:
@@ -156,7 +153,7 @@ class GripperExecutor:
             if grip is None or grip.goal_id != goal_id:
                 return
             if not answer.accepted:
-                return self._end(GoalStatusCode.ABORTED, answer.reason, moment)
+                return self._end(GoalStatusCode.ABORTED, answer.why, moment)
             grip.arrival += moment.monotonic - grip.began
             grip.answered = grip.still_since = moment.monotonic
             grip.still_at = self._position(moment)
@@ -170,13 +167,13 @@ class GripperExecutor:
             if abs(position - grip.still_at) > STILL:
                 grip.still_at, grip.still_since = position, now
             if self._is_there(grip, jaws, moment):
-                return self._end(GoalStatusCode.SUCCEEDED, "", moment, reached=True)
+                return self._end(GoalStatusCode.SUCCEEDED, None, moment, reached=True)
             if self._is_stalled(grip, jaws, moment):
                 self._stalled = True
-                return self._end(GoalStatusCode.SUCCEEDED, "", moment)
+                return self._end(GoalStatusCode.SUCCEEDED, None, moment)
         if now >= grip.deadline:
-            there = f"it stands at {position * 1000:.1f} mm after {now - grip.began:.1f} s"
-            return self._end(GoalStatusCode.ABORTED, f"the gripper has not arrived: {there}", moment)
+            late = because("gripper.not_arrived", position=position, time=now - grip.began)
+            return self._end(GoalStatusCode.ABORTED, late, moment)
         if grip.answered is not None and now >= grip.feedback_due:
             grip.feedback_due = next_beat(grip.feedback_due, now, PERIOD)
             feedback = GripperCommandFeedback(stamp=moment.unix, position=position, effort=self._effort(moment))
@@ -227,7 +224,7 @@ class GripperExecutor:
             effort=self._effort(moment),
         )
 
-    def _end(self, status: GoalStatusCode, reason: str, moment: Moment, reached: bool = False) -> None:
+    def _end(self, status: GoalStatusCode, reason: Reason | None, moment: Moment, reached: bool = False) -> None:
         grip = self._grip
         if grip is None:
             return
@@ -238,12 +235,13 @@ class GripperExecutor:
             stalled=self._stalled,
             reached_goal=reached,
             measured=self._is_measured(moment),
-            error_string=reason,
+            error_string=str(reason or ""),
+            why=reason,
         )
         self._grip = None
         self._device.out.put(GripperFinished(grip.goal_id, status, result))
         level = LogLevel.INFO if status is GoalStatusCode.SUCCEEDED else LogLevel.WARNING
-        became = reason or ("stalled" if self._stalled else "is there")
+        became = str(reason or "") or ("stalled" if self._stalled else "is there")
         wanted = f"gripper to {grip.position * 1000:g} mm"
         self._device.out.log(level, f"{wanted}: {became}, at {position * 1000:.1f} mm")
         self._due = 0.0  # the state is told at once

@@ -8,6 +8,7 @@ from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.model.gripper import opening_of, pulse_of
 from gemelo.schemas.device import DeviceCommandKind
 from gemelo.schemas.grippers.gripper import PulseDrive, SwitchDrive
+from gemelo.schemas.reasons import because
 from gemelo.services.stepper_gateway.device.pending_commands import Arguments
 from gemelo.services.stepper_gateway.goals.rejections import invalid
 from gemelo.services.stepper_gateway.links.frames import StateFrame
@@ -97,10 +98,8 @@ class OutputJaws(Jaws):
         drive = self._drive
         _require_within(position, drive.closed, drive.open)
         if not self._is_closed(position) and abs(position - drive.open) > SLACK:
-            raise invalid(
-                f"gripper: {position * 1000:g} mm: output {drive.output!r} knows only closed, "
-                f"{drive.closed * 1000:g} mm, and open, {drive.open * 1000:g} mm: choose one of them"
-            )
+            ends = {"closed": drive.closed, "open": drive.open}
+            raise invalid(because("gripper.opening.between", value=position, output=drive.output, **ends))
 
     def sending(self, position: float) -> Sending:
         is_on = self._is_closed(position) == self._drive.closes
@@ -146,7 +145,4 @@ def jaws_of(arm: ArmDescription) -> Jaws | None:
 
 def _require_within(position: float, closed: float, opened: float) -> None:
     if not closed - SLACK <= position <= opened + SLACK:
-        raise invalid(
-            f"gripper: {position * 1000:g} mm is not between its {closed * 1000:g} mm closed and {opened * 1000:g} mm "
-            "open: choose an opening between them, or correct [gripper] in robot.toml"
-        )
+        raise invalid(because("gripper.opening.beyond", value=position, closed=closed, open=opened))

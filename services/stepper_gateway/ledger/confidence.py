@@ -23,6 +23,7 @@ from msgspec import Struct
 
 from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.ledger import VerifiedBy
+from gemelo.schemas.reasons import Reason, Remedy, because, remedy
 
 HALF = 0.35  # load at which half of all motors would lose steps; chosen: below the stated torque, as rotors swing
 STEEPNESS = 3.0  # chosen: one motor in 6 fails at 0.2 of its stated torque, one in 44 at 0.1
@@ -132,34 +133,30 @@ def _learned(evidence: Evidence, is_off: bool) -> tuple[float, float, int]:
     return max(evidence.proven, load), 0.0 if evidence.suspicion else evidence.refuted, 0
 
 
-def open_loop_reason() -> str:
+def open_loop_reason() -> Reason:
     """Of a board with another dialect."""
-    return (
-        "this board does not say what it has executed: no joint can be verified over its wire, and a message that it "
-        "has lost without falling silent is not noticed"
-    )
+    return because("ledger.open_loop")
 
 
-def remedy(joint: Joint) -> str:
+def verifying(joint: Joint) -> Remedy:
     """How the joint can be verified."""
-    if joint.drive.homing is not None:
-        return "`gemelo verify`"
-    return f"it has no switch: `gemelo reference --joints {joint.name}=...`"
+    return remedy("verify") if joint.drive.homing is not None else remedy("reference_joint", joint=joint.name)
 
 
-def doubt(joint: Joint, evidence: Evidence, is_referenced: bool, now: int) -> str:
+def doubt(joint: Joint, evidence: Evidence, is_referenced: bool, now: int) -> Reason:
     """What lowers the joint's confidence most, at `now` [ns UNIX]."""
-    name = f'joint "{joint.name}"'
     if not is_referenced or evidence.verified_by is VerifiedBy.NOTHING:
-        return f"{name}: its place was not verified: {remedy(joint)}"
+        return because("ledger.unverified", verifying(joint), joint=joint.name)
     if evidence.lost:
-        return f"{name} was {evidence.lost:+d} steps off when it passed its switch: `gemelo home {joint.name}`"
+        home = remedy("home_joint", joint=joint.name)
+        return because("ledger.steps_lost", home, joint=joint.name, lost=evidence.lost)
     age = max(0, now - evidence.verified_at) * 1e-9
+    by = {"joint": joint.name, "by": evidence.verified_by.value}
     parts = {
-        f"it was asked for {evidence.load:.0%} of its pull-out torque": 1.0 - strong_enough(evidence),
-        f"its motor has made {evidence.turns:.0f} turns": evidence.turns / TURNS,
-        f"that was {age / 3600.0:.1f} hours ago": age / AGE,
-        "since then the device had faults or restarts": evidence.incidents,
+        "ledger.doubt.load": (1.0 - strong_enough(evidence), {"load": evidence.load}),
+        "ledger.doubt.turns": (evidence.turns / TURNS, {"turns": evidence.turns}),
+        "ledger.doubt.age": (age / AGE, {"hours": age / 3600.0}),
+        "ledger.doubt.incidents": (evidence.incidents, {}),
     }
-    what = max(parts, key=lambda part: parts[part])
-    return f"{name}, verified by {evidence.verified_by.value}: {what}: {remedy(joint)}"
+    code = max(parts, key=lambda part: parts[part][0])
+    return because(code, verifying(joint), **by, **parts[code][1])

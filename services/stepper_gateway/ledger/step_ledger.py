@@ -135,6 +135,7 @@ class LedgerKeeper:
         following = [wanted - done + off for wanted, done, off in zip(point, state.steps, lost, strict=True)]
         columns = self._jacobian.columns(self._device.reporter.positions(state.steps))
         least = min(range(len(joints)), key=lambda index: sure[index])
+        why = doubt(self._rows[least].watch.joint, evidence[least], self._rows[least].is_referenced, moment.unix)
         return StepLedger(
             stamp=moment.unix,
             name=names,
@@ -149,12 +150,13 @@ class LedgerKeeper:
             confidence=sure,
             arm_confidence=math.prod(sure),
             doubtful=names[least],
-            reason=doubt(self._rows[least].watch.joint, evidence[least], self._rows[least].is_referenced, moment.unix),
+            reason=str(why),
             lost=lost,
             bound=wide,
             tool_error=known_shift(joints, columns, following),
             tool_bound=tool_shift(joints, columns, wide),
             level=LEVEL,
+            why=why,
         )
 
     def _unknown(self, names: tuple[str, ...], moment: Moment) -> StepLedger:
@@ -164,12 +166,13 @@ class LedgerKeeper:
         state = self._device.state
         sent = state.steps if state is not None else (0,) * count
         columns = self._jacobian.columns(self._device.reporter.positions(sent))
+        why = open_loop_reason()
         return StepLedger(
             stamp=moment.unix, name=names, commanded=tuple(map(float, sent)), confidence=(0.0,) * count,
             verified=(0,) * count, verified_at=(0,) * count, verified_by=(VerifiedBy.NOTHING,) * count,
             found_off=(0,) * count, turns=(0.0,) * count, load=(0.0,) * count, lost=(0.0,) * count,
-            doubtful=names[0], reason=open_loop_reason(), bound=wide, tool_bound=tool_shift(joints, columns, wide),
-            open_loop=True, level=LEVEL,
+            doubtful=names[0], reason=str(why), bound=wide, tool_bound=tool_shift(joints, columns, wide),
+            open_loop=True, level=LEVEL, why=why,
         )  # fmt: skip
 
     def _meet(self, identity: tuple[bool, int], state: StateFrame) -> None:

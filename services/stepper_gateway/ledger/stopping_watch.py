@@ -11,6 +11,7 @@ from gemelo.libraries.arm.kinematics.tool_jacobian import ToolJacobian
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.ledger import StoppingDistance
 from gemelo.schemas.message import Vector
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.topics import STOPPING_DISTANCE
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.links.frames import StateFrame
@@ -24,9 +25,6 @@ PERIOD = 1.0 / (STOPPING_DISTANCE.rate or 10.0)  # [s]
 SLOTS = 0.004  # [s] that the device prepares ahead, and a slot for each decision: standard, firmware/core
 JITTER = 1.5  # chosen: times the longest round trip of late, that the device's last heartbeat may have taken one way
 STILL = 1.0  # [steps/s] chosen: slower joints stop within a step
-
-NOT_OURS = "the device plays a path that this gateway has not sent"
-OPEN_LOOP = "this board does not say what it does, nor does it watch a heartbeat"
 
 
 class StoppingWatch:
@@ -52,13 +50,16 @@ class StoppingWatch:
         """The distance from this moment on."""
         device, state = self._device, self._device.state
         session = device.session
-        reason = device.unreachable_reason(moment) or (OPEN_LOOP if session.is_open_loop else "")
-        if reason or state is None:
-            return StoppingDistance(stamp=moment.unix, reason=reason or device.not_ready_reason())
+        if reason := device.unreachable_reason(moment):
+            return _unknown(reason, moment)
+        if session.is_open_loop:
+            return _unknown(because("stopping.open_loop"), moment)
+        if state is None:
+            return _unknown(because("device.joints_unknown", device=device.arm.device.name), moment)
         longest = session.clock.longest_round_trip
         stop, reaction = self._stop(state, moment, longest)
         if stop is None:
-            return StoppingDistance(stamp=moment.unix, reason=NOT_OURS, round_trip=longest)
+            return _unknown(because("stopping.other_path"), moment, longest)
         return StoppingDistance(
             stamp=moment.unix,
             is_known=True,
@@ -143,3 +144,8 @@ class StoppingWatch:
             distance += math.hypot(*column) * speed * (reaction + 0.5 * braking)
             duration = max(duration, reaction + braking)
         return StoppingPath(distance, duration), reaction
+
+
+def _unknown(why: Reason, moment: Moment, round_trip: float = 0.0) -> StoppingDistance:
+    """That it is not known; `round_trip` [s]."""
+    return StoppingDistance(stamp=moment.unix, reason=str(why), round_trip=round_trip, why=why)

@@ -7,6 +7,7 @@ from typing import Annotated, TypeVar
 import msgspec
 from msgspec import Meta
 
+from gemelo.schemas.reasons import Reason
 from gemelo.services.stepper_gateway.links.frames import NoFrame
 
 Word = Annotated[int, Meta(ge=0, lt=2**32)]
@@ -52,6 +53,7 @@ class EventReport(Report, frozen=True, kw_only=True):
     t_us: Micros = 0
     stream: Word = 0
     detail: str = ""
+    why: Reason | None = None  # `detail` as data, of a board of another dialect, whose device is part of the gateway
 
 
 class ConfigAckReport(Report, frozen=True, kw_only=True):

@@ -6,6 +6,7 @@ from collections import deque
 
 from gemelo.schemas.device import DeviceCommandKind, DeviceMode
 from gemelo.schemas.message import Vector
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import COMMAND_ACKS, COMMANDS
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.goals.goal_validator import MotionStart
@@ -238,7 +239,7 @@ class MotionController:
             return False
         if moment.monotonic - self._stop_asked < STOP_AGAIN:
             return False
-        self._device.event("stopping", f"the device moves along stream {state.stream}, which nobody follows", moment)
+        self._device.event("stopping", because("device.foreign_stream", stream=state.stream), moment)
         self.stop(moment)
         return True
 

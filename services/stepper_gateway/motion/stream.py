@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.device import DeviceMode
+from gemelo.schemas.reasons import Reason, Value, because
 from gemelo.services.stepper_gateway.device.clock import ClockSync
 from gemelo.services.stepper_gateway.links.frames import (
     NO_JOINT,
@@ -62,7 +63,7 @@ class Stream:
     acked: int = 0  # the device wants this one next
     is_complete: bool = False  # the LAST chunk has been sent
     is_abandoned: bool = False  # nothing more is to be sent
-    failure: str = ""  # why the device refuses it for good
+    failure: Reason | None = None  # why the device refuses it for good
     _credits: int = 0
     _play: StateFrame | None = None
     _round_trip: float = 0.02  # [s] smoothed
@@ -183,14 +184,17 @@ class Stream:
         return [] if self.is_abandoned else [chunk for chunk in self.unacked if chunk.sent <= instant]
 
 
-def refusal(ack: Ack, joints: tuple[Joint, ...]) -> str:
-    """The device's refusal of a chunk as a sentence."""
-    code = code_name(ack.code)
+def refusal(ack: Ack, joints: tuple[Joint, ...]) -> Reason:
+    """The device's refusal of a chunk; value and limit in the unit of its code, where it is about a joint."""
+    chunk: dict[str, Value] = {"chunk": ack.seq, "answer": code_name(ack.code)}
     if ack.joint == NO_JOINT or ack.joint >= len(joints):
-        return f"the device refuses chunk {ack.seq} ({code}: {ack.value}, limit {ack.limit})"
-    joint = joints[ack.joint]
-    unit = UNITS.get(ack.code, "steps")
-    return (
-        f'the device refuses chunk {ack.seq}, knot {ack.knot} ({code}): joint "{joint.name}" {ack.value / 256.0:.2f} '
-        f"{unit}, limit {ack.limit / 256.0:.2f}"
+        return because("ending.chunk_refused", value=ack.value, limit=ack.limit, **chunk)
+    return because(
+        "ending.knot_refused",
+        knot=ack.knot,
+        joint=joints[ack.joint].name,
+        value=ack.value / 256.0,
+        limit=ack.limit / 256.0,
+        unit=UNITS.get(ack.code, "steps"),
+        **chunk,
     )

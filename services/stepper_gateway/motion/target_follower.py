@@ -6,6 +6,7 @@ Whoever streams must go on sending (0.5 s by default), also to keep a far target
 from __future__ import annotations
 
 from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from gemelo.services.stepper_gateway.moment import Moment
@@ -30,13 +31,13 @@ class TargetFollower:
         self._targets.note_message(moment.monotonic, silence)
         try:
             if goal_is_active:
-                raise invalid("a goal is being carried out; cancel it first")
+                raise invalid(because("target.goal_active"))
             if reason := self._device.refusal(moment):
                 raise invalid(reason)
             self._targets.require_uninterrupted(silence)
             columns = self._targets.checked(targets)
         except GoalRejected as rejected:
-            return self._complain(str(rejected), moment)
+            return self._complain(rejected.reason, moment)
         self._targets.take(columns, self._controller.motion_start(moment).start.position)
         self._begin(moment)
 
@@ -44,7 +45,7 @@ class TargetFollower:
         """Brake on silence, begin when the arm rests, notice the end."""
         stream = self._controller.stream
         if self._targets.is_active and (stream is None or not self._controller.transmission.is_open):
-            self._end(stream is not None and bool(stream.failure), moment)
+            self._end(None if stream is None else stream.failure, moment)
         if self._targets.is_silent(moment.monotonic, self._device.parameters.stream_silence):
             self._fall_silent(moment)
         self._begin(moment)
@@ -76,18 +77,17 @@ class TargetFollower:
         controller.lead = self._device.parameters.streaming_lead
         controller.begin(self._targets.motion(start), start.position, moment)
 
-    def _end(self, failed: bool, moment: Moment) -> None:
-        stream = self._controller.stream
-        if failed and stream is not None:
-            self._complain(stream.failure, moment)
+    def _end(self, failure: Reason | None, moment: Moment) -> None:
+        if failure is not None:
+            self._complain(failure, moment)
             self._controller.stop(moment)
-        self._targets.end(interrupted=failed)
+        self._targets.end(interrupted=failure is not None)
 
-    def _complain(self, reason: str, moment: Moment) -> None:
+    def _complain(self, reason: Reason, moment: Moment) -> None:
         """Once a second at most: targets come fast."""
         if moment.monotonic - self._complained < COMPLAINT:
             self._unsaid += 1
             return
-        more = f" (and {self._unsaid} more)" if self._unsaid else ""
+        about = because("target.and_more", reason, count=self._unsaid) if self._unsaid else reason
         self._complained, self._unsaid = moment.monotonic, 0
-        self._device.event("target_refused", reason + more, moment)
+        self._device.event("target_refused", about, moment)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.message import Vector
+from gemelo.schemas.reasons import because
 from gemelo.services.stepper_gateway.goals.limit_checks import SLACK, beyond
 from gemelo.services.stepper_gateway.goals.rejections import invalid, invalid_joints
 from gemelo.services.stepper_gateway.goals.trajectory_checks import require_known
@@ -38,9 +39,10 @@ class TargetStream:
         """Column and position [rad] or [m] of every joint named; raises `GoalRejected`."""
         require_known(targets.name, self._joints)
         if not targets.name:
-            raise invalid_joints("a target names no joint")
+            raise invalid_joints(because("target.joints.none"))
         if len(targets.position) != len(targets.name):
-            raise invalid(f"a target names {len(targets.name)} joints and gives {len(targets.position)} positions")
+            named, given = len(targets.name), len(targets.position)
+            raise invalid(because("target.positions.count", named=named, given=given))
         names = [joint.name for joint in self._joints]
         columns = {names.index(name): position for name, position in zip(targets.name, targets.position, strict=True)}
         for column, position in columns.items():
@@ -58,10 +60,7 @@ class TargetStream:
     def require_uninterrupted(self, silence: float) -> None:
         """Raises `GoalRejected` until no target has come for `silence` [s] after an interruption."""
         if self._is_interrupted:
-            raise invalid(
-                f"streaming was interrupted, and nothing resumes by itself: send no target for {silence:g} s, then "
-                "start again"
-            )
+            raise invalid(because("target.interrupted", time=silence))
 
     def take(self, columns: dict[int, float], present: Vector) -> None:
         """The newest target [rad] or [m] by column; joints that it does not name keep theirs, or stand still."""
