@@ -13,7 +13,7 @@ from gemelo.api.scene_files import load_mesh, read_scene, write_scene
 from gemelo.api.session import PATIENCE, Session
 from gemelo.api.targets import number, point, quaternion, vector
 from gemelo.schemas.frames import Transform
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import because, plain
 from gemelo.schemas.scene import (
     AllowedPair,
     BoxShape,
@@ -253,10 +253,9 @@ class Scene:
         response = self._session.call(SCENE_EDIT, SceneRequest(edit=edit), TO_ANSWER)
         if not response.accepted:
             changed = edit.object if isinstance(edit, SceneAdd) else edit
-            raise Refused(
-                f"refused: {response.reason}", check="scene", subject=getattr(changed, "name", ""),
-                reason=response.reason,
-            )  # fmt: skip
+            why = response.why or plain(response.reason)
+            name = getattr(changed, "name", "")
+            raise Refused(because("refused.plan", why), check="scene", subject=name, reason=why)
         heard = self._session.latest(SCENE).message
         self._version, self._epoch = response.version, heard.epoch if heard is not None else 0
         return response

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import because, remedy
+
 HEADER, ROW = 80, 50  # bytes: free text; a normal, three corners and two more
 MAX_TRIANGLES = 500_000
 
 
-class BadStl(ValueError):
-    """A file that holds no triangles; the text says why."""
+class BadStl(ReasonedError, ValueError):
+    """A file that holds no triangles; the reason says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,17 +31,17 @@ def read_stl(content: bytes) -> Triangles:
     """The file's triangles without those that have no area; raises `BadStl`."""
     corners = _binary(content) if _is_binary(content) else _text(content)
     if not len(corners):
-        raise BadStl("it holds no triangle")
+        raise BadStl(because("stl.empty"))
     if len(corners) > MAX_TRIANGLES:
-        raise BadStl(f"it holds {len(corners)} triangles, more than {MAX_TRIANGLES}; simplify it")
+        raise BadStl(because("stl.large", remedy("simplify_it"), count=len(corners), limit=MAX_TRIANGLES))
     if not np.isfinite(corners).all():
-        raise BadStl("a corner of it is not finite")
+        raise BadStl(because("stl.not_finite"))
     vertices, numbers = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     faces = numbers.reshape(-1, 3).astype(np.int32)
     first, second, third = faces.T
     faces = faces[(first != second) & (second != third) & (third != first)]
     if not len(faces):
-        raise BadStl("none of its triangles has an area")
+        raise BadStl(because("stl.flat"))
     return Triangles(np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
 
 
@@ -60,12 +63,12 @@ def _binary(content: bytes) -> NDArray[np.float64]:
 def _text(content: bytes) -> NDArray[np.float64]:
     """(f, 3, 3) corners; every `facet` has an outer loop of three `vertex` lines."""
     if not content.lstrip()[:5].lower() == b"solid":
-        raise BadStl(f"it is no STL file: {len(content)} bytes that are neither the binary form nor begin with solid")
+        raise BadStl(because("stl.kind", size=len(content)))
     lines = [line.split() for line in content.decode("utf-8", "replace").splitlines()]
     vertices = [words[1:] for words in lines if words and words[0].lower() == "vertex"]
     if len(vertices) % 3:
-        raise BadStl(f"it has {len(vertices)} vertex lines, no multiple of three: was it cut off?")
+        raise BadStl(because("stl.cut_off", count=len(vertices)))
     try:
         return np.array([[float(x), float(y), float(z)] for x, y, z in vertices]).reshape(-1, 3, 3)
     except ValueError as error:
-        raise BadStl(f"a vertex line of it is not three numbers ({error})") from None
+        raise BadStl(because("stl.vertex", detail=str(error))) from None

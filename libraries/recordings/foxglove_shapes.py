@@ -10,6 +10,7 @@ from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.libraries.arm.model.urdf import SIZES, Geometry, UrdfLink, urdf_of
 from gemelo.libraries.arm.stl import BadStl, read_stl
 from gemelo.libraries.recordings import foxglove_schemas as fox
+from gemelo.schemas.reasons import because
 from gemelo.schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, Shape, SphereShape
 
 LINK = fox.Color(r=0.85, g=0.85, b=0.87, a=1.0)
@@ -107,7 +108,7 @@ def _cylinder(pose: fox.Pose, radius: float, length: float, color: fox.Color) ->
 def _triangles(pose: fox.Pose, data: bytes, scale: Sequence[float], color: fox.Color) -> fox.TriangleListPrimitive:
     mesh = read_stl(data)
     if len(mesh.faces) > MAX_TRIANGLES:
-        raise BadStl(f"{len(mesh.faces)} triangles are more than a recording draws")
+        raise BadStl(because("stl.too_many_to_draw", count=len(mesh.faces)))
     corners = (mesh.vertices * scale)[mesh.faces.reshape(-1)]
     return fox.TriangleListPrimitive(pose=pose, points=tuple(_vector(row) for row in corners.tolist()), color=color)
 

@@ -114,7 +114,7 @@ class JogService:
     @property
     def _not_ready(self) -> Reason | None:
         status = self._device.message
-        return None if status is None or not status.reason else plain(status.reason)
+        return None if status is None or not status.reason else status.why or plain(status.reason)
 
     @property
     def _goal_is_active(self) -> bool:

@@ -47,8 +47,6 @@ ERRORS = (
     "Error",
     "Lost",
     "Canceled",
-    "SceneError",
-    "BadStl",
 )
 
 
@@ -87,9 +85,7 @@ def _part(node: ast.expr) -> str:
 
 
 PARTS = [
-    "services/planner/scene",
-    *("services/planner/collision/scene_shapes.py", "services/planner/collision/arm_geometry.py"),
-    *("libraries/runtime/requests/client.py", "libraries/runtime/requests/limits.py", "libraries/arm/stl.py"),
+    *("libraries/runtime/requests/client.py", "libraries/runtime/requests/limits.py"),
     *("services/panel/model", "gemelo"),
 ]
 WITHIN_OTHERS = {  # parts of sentences, which are tested as a whole below
@@ -191,8 +187,6 @@ def test_a_stop_that_is_refused_says_why(kind: StopKind):
          "it in the image, lit, and not behind the arm? `gemelo camera view`", "9.1 s; después no se vio: overhead no "
          "ve cup"),
         ("gripper: 20.0 mm, stopped by what is between the jaws (commanded, not measured), holds cup", "lleva cup"),
-        ('refused: object "x": its data is no usable STL file: it is no STL file: 17 bytes that are neither the binary '
-         "form nor begin with solid", "«x»: el archivo no sirve. No es un archivo STL (17 bytes)."),
         ("cup: it is seen 2 times: take the others away, or give each a tag of its own", "cup: se ve 2 veces"),
     ],
 )  # fmt: skip

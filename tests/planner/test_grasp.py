@@ -21,6 +21,7 @@ from gemelo.schemas.frames import Transform
 from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import PlanCode, ValidityRequest
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.scene import (
     AllowedPair,
     BoxShape,
@@ -133,9 +134,10 @@ def test_without_a_gripper_or_a_place_it_says_so() -> None:
     cell = Cell("rm1")
     bare = SceneStore(replace(cell.arm, gripper=None))
     answer = bare.edit(SceneRequest(edit=SceneGrip()), lambda: cell.links, 1)
-    assert answer.reason == "rm1 has no gripper: write a [gripper] into its robot.toml"
+    assert answer.why == because("scene.grip.no_gripper", remedy("write_gripper"), robot="rm1")
     answer = cell.store.edit(SceneRequest(edit=SceneGrip()), lambda: None, 1)
-    assert "it is not known where the arm is" in answer.reason
+    assert answer.why == because("scene.grip.arm_unknown", remedy("start_gateway"))
+    assert answer.reason == str(answer.why)
 
 
 @examples(quick=20, full=60)

@@ -16,6 +16,7 @@ from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.scene import (
     BoxShape,
     PlanningScene,
@@ -127,7 +128,10 @@ def test_what_is_put_onto_the_arm_is_shown_to_touch_it_until_it_is_taken_away(as
 
 def test_a_bad_edit_is_refused_by_name_and_changes_nothing(asker: Node) -> None:
     response = edit(asker, SceneRemove(name="block"))
-    assert response == SceneResponse(reason='there is no object "block"; none is known')
+    assert response == SceneResponse(
+        reason='there is no object "block"; none is known',
+        why=because("scene.object.unknown", remedy("none_known"), object="block"),
+    )
     response = edit(asker, SceneAdd(object=SceneObject(name="ball", shape=SphereShape(radius=0.0))))
     assert response.reason.startswith('object "ball": radius of the sphere is 0 m')
     assert response.version == 0

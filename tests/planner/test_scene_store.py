@@ -207,14 +207,14 @@ def test_refusals_name_the_thing_the_value_and_the_remedy() -> None:
     assert scene.edit(SceneAttach(name="table", link=TOOL)).startswith('object "table" is a plane')
     assert scene.edit(SceneResize(name="cup", shape=PlaneShape())).startswith('object "cup" is a plane')
     pairs = {
-        ("*", "*"): 'the pair "*" and "*" allows everything to touch everything',
-        ("cup", "cup"): 'the pair "cup" and "cup" allows "cup" to touch itself',
+        ("*", "*"): "the pair allows everything to touch everything",
+        ("cup", "cup"): 'the pair allows "cup" to touch itself',
         ("cup", "tabel"): 'there is no link or object "tabel"; did you mean "table"?',
     }
     for (first, second), reason in pairs.items():
         assert scene.edit(SceneAllow(pair=AllowedPair(first=first, second=second))).startswith(reason)
     assert scene.edit(SceneDisallow(pair=AllowedPair(first="cup", second="table"))).startswith(
-        '"cup" and "table" are not allowed to touch by this scene: allowed is nothing'
+        '"cup" and "table" are not allowed to touch by this scene, which allows nothing'
     )
     twice = PlanningScene(objects=(SceneObject(name="a", shape=sphere), SceneObject(name="a", shape=sphere)))
     assert scene.edit(SceneReplace(scene=twice)).startswith('the scene has two objects "a"')

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
+from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.frames import Transform
+from gemelo.schemas.reasons import because
 
 Point = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -13,6 +15,10 @@ Rigid = tuple[Point, Quaternion]
 IDENTITY: Rigid = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 _RIGHT_ANGLE = 1e-8  # cosine of a pitch below which roll and yaw are one to rounding
 _NEARLY_PARALLEL = 1.0 - 1e-9  # cosine above which slerp is linear to rounding
+
+
+class BadTransform(ReasonedError, ValueError):
+    """A message that is no transform; the reason says what of it."""
 
 
 def rotate(rotation: Quaternion, point: Point) -> Point:
@@ -109,13 +115,13 @@ def to_message(rigid: Rigid) -> Transform:
 
 
 def from_message(transform: Transform) -> Rigid:
-    """The transform as tuples, its quaternion of length one; ValueError where it is none."""
+    """The transform as tuples, its quaternion of length one; raises `BadTransform` where it is none."""
     translation, rotation = transform.translation, transform.rotation
     if len(translation) != 3 or len(rotation) != 4:
-        raise ValueError(f"a transform has 3 + 4 numbers, not {len(translation)} + {len(rotation)}")
+        raise BadTransform(because("transform.numbers", translation=len(translation), rotation=len(rotation)))
     x, y, z, w = rotation
     length = math.sqrt(x * x + y * y + z * z + w * w)
     if abs(length - 1.0) > 1e-3:
-        raise ValueError(f"the quaternion {rotation} has length {length:.6f}, not 1")
+        raise BadTransform(because("transform.quaternion", rotation=rotation, length=length))
     px, py, pz = translation
     return (px, py, pz), (x / length, y / length, z / length, w / length)

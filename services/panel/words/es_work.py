@@ -5,97 +5,6 @@ A key is the sentence as `gemelo` or the planner say it; `sentences.py` says how
 
 from __future__ import annotations
 
-# The scene and its files
-_SCENE: dict[str, str] = {
-    "the scene has {count} objects, more than {most}: merge some into meshes": "La escena tiene {count} objetos, más "
-    "de "
-    "{most}: una algunos en mallas.",
-    'object "{name}" is a plane, which has no end and cannot be carried; make it a box': "«{name}» es un plano sin "
-    "fin y "
-    "no se puede llevar: haga de él una caja.",
-    'object "{name}" cannot be attached: {robot} has no link "{link}"': "«{name}» no se puede sujetar: {robot} no "
-    "tiene "
-    "un eslabón «{link}».",
-    'object "{name}" cannot touch it: {robot} has no link "{link}"': "«{name}» no puede tocarlo: {robot} no tiene un "
-    "eslabón «{link}».",
-    'the pair "{first}" and "{second}" allows {which}; name two different things': "Nombre dos cosas distintas que "
-    "puedan "
-    "tocarse, no «{first}» y «{second}».",
-    '"{name}" is no name for an object; give 1 to {most} printable characters without blanks at the ends': "«{name}» "
-    "no "
-    "es un nombre para un objeto: de 1 a {most} caracteres que se vean, sin espacios a los lados.",
-    '"*" stands for any name and cannot be an object\'s; give it another one': "«*» vale por cualquier nombre: elija "
-    "otro "
-    "para el objeto.",
-    '"{name}" is a jaw of the gripper; give the object another name': "«{name}» es una mordaza de la pinza: elija otro "
-    "nombre para el objeto.",
-    '"{name}" is a link of {robot}; give the object another name': "«{name}» es un eslabón de {robot}: elija otro "
-    "nombre "
-    "para el objeto.",
-    "the meshes of the scene have {size} bytes, more than {most}: simplify or remove some": "Las mallas de la escena "
-    "suman {size} bytes, más de {most}: simplifique o quite alguna.",
-    'object "{name}": nothing is known of its mesh {digest}; add it with its file': "No se conoce la malla de «{name}» "
-    "({digest}): añada el objeto con su archivo.",
-    "the scene is too large: {size}": "La escena es demasiado grande ({size}).",
-    'object "{name}": its mesh has {size} bytes, more than {most}; simplify it, or write it as a binary STL file': "La "
-    "malla de «{name}» tiene {size} bytes, más de {most}: simplifíquela, o guárdela como STL binario.",
-    'the scene has two objects "{name}"; give one of them another name': "La escena tiene dos objetos «{name}»: "
-    "cambie el "
-    "nombre de uno.",
-    'object "{name}" stands in "{link}" without being attached to it': "«{name}» está en «{link}» sin estar sujeto.",
-    'there is no link or object "{name}"': "No hay un eslabón ni un objeto «{name}».",
-    'there is no object "{name}"': "No hay un objeto «{name}».",
-    'object "{name}" is not attached to any link; there is nothing to detach': "«{name}» no está sujeto: no hay nada "
-    "que "
-    "soltar.",
-    '"{first}" and "{second}" are not allowed to touch by this scene: allowed is {names} (what the SRDF allows is '
-    "changed "
-    "there)": "La escena no permite que «{first}» y «{second}» se toquen; permite: {names}.",
-    'object "{name}" cannot be placed by "{link}": it is not known where the arm is (no fresh joint_states); start the '
-    "stepper_gateway, or give the pose in the base frame": "«{name}» no se puede poner respecto a «{link}»: no se sabe "
-    "dónde está el brazo.",
-    "it is not known where the arm is (no fresh joint_states): start the stepper_gateway": "No se sabe dónde está el "
-    "brazo: vea si el equipo está conectado.",
-    "the scene is changed, but {file} cannot be written ({error}): a restart forgets it": "La escena cambió, pero "
-    "{file} "
-    "no se puede escribir ({error}): se olvidará al reiniciar.",
-    'object "{name}" is attached to "{link}", which {robot} does not have': "«{name}» está sujeto a «{link}», que "
-    "{robot} "
-    "no tiene.",
-    'object "{name}": padding is {value} m; give 0 m or more': "«{name}»: el margen no puede ser {value} m.",
-    'object "{name}": {error}; give x y z in m and a unit quaternion x y z w': "«{name}»: su lugar no vale ({error}).",
-    'object "{name}" is at {place} m, beyond {limit} m: is that in mm?': "«{name}» está en {place} m, más allá de "
-    "{limit} "
-    "m: ¿serán mm?",
-    'object "{name}": a {kind} has {count} sizes ({names}), not {given}': "«{name}»: {kind} lleva {count} medidas "
-    "({names}), no {given}.",
-    'object "{name}": {edge} of the {kind} is {value} m; give more than 0 m': "«{name}»: {edge} no puede ser {value} "
-    "m: "
-    "dé más de 0 m.",
-    'object "{name}": scale of the mesh is {value}; give three numbers that are not 0': "«{name}»: la escala de la "
-    "malla "
-    "no puede ser {value}.",
-    'object "{name}": {path} is no usable STL file: {reason}': "«{name}»: el archivo no sirve. {reason}",
-    'object "{name}": mesh path "{path}" leads elsewhere; give one relative to the project or to the robot\'s folder, '
-    "or "
-    "the file's content": "«{name}»: la ruta «{path}» lleva a otra parte.",
-    'object "{name}": there is no mesh "{path}" in {folders}': "«{name}»: no hay una malla «{path}» en {folders}.",
-    'object "{name}": mesh {path} cannot be read: {error}': "«{name}»: la malla {path} no se puede leer ({error}).",
-    '"{path}": {reason}': "{reason}",
-    "it holds no triangle": "La malla no tiene ningún triángulo.",
-    "it holds {count} triangles, more than {most}; simplify it": "La malla tiene {count} triángulos, más de {most}: "
-    "simplifíquela.",
-    "a corner of it is not finite": "Un vértice de la malla no es un número.",
-    "none of its triangles has an area": "Ningún triángulo de la malla tiene área.",
-    "it is no STL file: {count} bytes that are neither the binary form nor begin with solid": "No es un archivo STL "
-    "({count} bytes).",
-    "it has {count} vertex lines, no multiple of three: was it cut off?": "La malla tiene {count} líneas de vértices, "
-    "que "
-    "no son de tres en tres: ¿se cortó?",
-    "a vertex line of it is not three numbers ({error})": "Una línea de vértices de la malla no tiene tres números "
-    "({error}).",
-}
-
 # Things, cameras and picking
 _THINGS: dict[str, str] = {
     "{word} is not seen by {cameras}, and nothing else: is it in the image, lit, and not behind the arm? `gemelo "
@@ -218,4 +127,4 @@ _ARGUMENTS: dict[str, str] = {
     "{reason}; {more}": "{reason} {more}",
 }
 
-WORK: dict[str, str] = _ARGUMENTS | _SCENE | _THINGS | _ASKED | _SILENT | _HINTS
+WORK: dict[str, str] = _ARGUMENTS | _THINGS | _ASKED | _SILENT | _HINTS

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics, frame_of_link
 from gemelo.libraries.arm.kinematics.self_collisions import driver_of, load_collision_geometry, shape_reach
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.reasons import because
 from gemelo.schemas.scene import PlanningScene, SceneObject
 from gemelo.services.planner.collision.scene_shapes import SceneError, is_read_from_a_file, shape_of
 from gemelo.services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
@@ -71,7 +72,8 @@ class ArmGeometry:
             placed = pin.GeometryObject(item.name, 0, 0, self._base.act(inner), geometry)
             return PlacedObject(shape, placed, 0, box_around(shape, geometry), np.zeros(len(self.drivers)))
         if item.frame not in self.arm.model.link_names:
-            raise SceneError(f'object "{item.name}" is attached to "{item.frame}", which {self.arm.name} does not have')
+            named = {"object": item.name, "link": item.frame, "robot": self.arm.name}
+            raise SceneError(because("scene.link.gone", **named))
         number = frame_of_link(self.pinocchio, item.frame)
         frame = self.pinocchio.frames[number]
         joint = int(frame.parentJoint)

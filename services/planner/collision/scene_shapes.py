@@ -8,9 +8,11 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from gemelo.libraries.arm.frames.transforms import Rigid, from_message
+from gemelo.libraries.arm.frames.transforms import BadTransform, Rigid, from_message
 from gemelo.libraries.arm.stl import BadStl, read_stl
+from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.message import Vector
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.scene import AllowedPair, BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, SphereShape
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
@@ -23,8 +25,8 @@ MOST_KNOWN = 2048  # objects whose solids are kept: those of a scene before a ch
 LARGEST = 1e4  # [m] that a size or a coordinate may have; chosen: more is a number in millimetres
 
 
-class SceneError(ValueError):
-    """A scene that cannot be; the text names the object, the value and the remedy."""
+class SceneError(ReasonedError, ValueError):
+    """A scene that cannot be; the reason names the object, the value and the remedy."""
 
 
 def shape_of(item: SceneObject, folders: Folders = ()) -> CollisionShape:
@@ -47,7 +49,8 @@ def _known(item: SceneObject) -> CollisionShape:
 
 def _shape_of(item: SceneObject, folders: Folders) -> CollisionShape:
     if not 0.0 <= item.padding <= LARGEST:
-        raise SceneError(f'object "{item.name}": padding is {item.padding:g} m; give 0 m or more')
+        would_do = remedy("no_padding")
+        raise SceneError(because("scene.object.padding", would_do, object=item.name, value=item.padding))
     kind, size, mesh = _form(item, folders)
     return CollisionShape(item.name, kind, size, pose_of(item), mesh, item.padding)
 
@@ -56,10 +59,11 @@ def pose_of(item: SceneObject) -> Rigid:
     """The object's pose in its frame; raises `SceneError`."""
     try:
         pose = from_message(item.pose)
-    except ValueError as error:
-        raise SceneError(f'object "{item.name}": {error}; give x y z in m and a unit quaternion x y z w') from None
+    except BadTransform as error:
+        raise SceneError(because("scene.object.pose", error.reason, remedy("give_pose"), object=item.name)) from None
     if max(map(abs, pose[0])) > LARGEST:
-        raise SceneError(f'object "{item.name}" is at {item.pose.translation} m, beyond {LARGEST:g} m: is that in mm?')
+        place = item.pose.translation
+        raise SceneError(because("scene.object.far", object=item.name, position=place, limit=LARGEST))
     return pose
 
 
@@ -89,22 +93,26 @@ def _form(item: SceneObject, folders: Folders) -> tuple[ShapeKind, tuple[float, 
 
 def _sizes(name: str, what: str, names: Sequence[str], values: Vector) -> Vector:
     if len(values) != len(names):
-        raise SceneError(f'object "{name}": a {what} has {len(names)} sizes ({", ".join(names)}), not {len(values)}')
+        counts = {"needed": len(names), "count": len(values)}
+        raise SceneError(because("scene.shape.count", object=name, kind=what, sizes=tuple(names), **counts))
     for called, value in zip(names, values, strict=True):
         if not 0.0 < value <= LARGEST:
-            raise SceneError(f'object "{name}": {called} of the {what} is {value:g} m; give more than 0 m')
+            named = {"object": name, "size": called, "kind": what}
+            raise SceneError(because("scene.shape.size", remedy("more_than_nothing"), **named, value=value))
     return values
 
 
 def _mesh(name: str, shape: MeshShape, folders: Folders) -> TriangleMesh:
     if len(shape.scale) != 3 or not all(0.0 < abs(factor) <= LARGEST for factor in shape.scale):
-        raise SceneError(f'object "{name}": scale of the mesh is {shape.scale}; give three numbers that are not 0')
+        would_do = remedy("three_numbers")
+        raise SceneError(because("scene.mesh.scale", would_do, object=name, scale=tuple(shape.scale)))
     x, y, z = shape.scale
     try:
         return _triangles(_content(name, shape, folders), (x, y, z))
     except BadStl as error:
-        what = f'"{shape.path}"' if shape.path else "its data"
-        raise SceneError(f'object "{name}": {what} is no usable STL file: {error}') from None
+        if shape.path:
+            raise SceneError(because("scene.mesh.file", error.reason, object=name, path=shape.path)) from None
+        raise SceneError(because("scene.mesh.data", error.reason, object=name)) from None
 
 
 @lru_cache(maxsize=64)
@@ -119,24 +127,21 @@ def _triangles(content: bytes, scale: tuple[float, float, float]) -> TriangleMes
 def _content(name: str, shape: MeshShape, folders: Folders) -> bytes:
     if not shape.path:
         if shape.digest and not shape.data:
-            raise SceneError(f'object "{name}": nothing is known of its mesh {shape.digest}; add it with its file')
+            would_do = remedy("add_with_file")
+            raise SceneError(because("scene.mesh.unknown", would_do, object=name, digest=shape.digest))
         if len(shape.data) > LARGEST_FILE:
-            raise SceneError(
-                f'object "{name}": its mesh has {len(shape.data)} bytes, more than {LARGEST_FILE}; simplify it, or '
-                "write it as a binary STL file"
-            )
+            either, size = (remedy("simplify_it"), remedy("binary_stl")), len(shape.data)
+            raise SceneError(because("scene.mesh.large", *either, object=name, size=size, limit=LARGEST_FILE))
         return shape.data
     relative = PurePosixPath(shape.path)
     if relative.is_absolute() or ".." in relative.parts:
-        raise SceneError(
-            f'object "{name}": mesh path "{shape.path}" leads elsewhere; give one relative to the project or to the '
-            "robot's folder, or the file's content"
-        )
+        either = remedy("relative_path"), remedy("give_content")
+        raise SceneError(because("scene.mesh.elsewhere", *either, object=name, path=shape.path))
     for folder in folders:
         if _is_file(folder / relative):
             return _read(name, folder / relative)
-    looked = " and ".join(str(folder) for folder in folders) or "no folder"
-    raise SceneError(f'object "{name}": there is no mesh "{shape.path}" in {looked}')
+    looked = tuple(str(folder) for folder in folders)
+    raise SceneError(because("scene.mesh.none", object=name, path=shape.path, folders=looked))
 
 
 def _is_file(path: Path) -> bool:
@@ -151,4 +156,5 @@ def _read(name: str, path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise SceneError(f'object "{name}": mesh {path} cannot be read: {error.strerror}') from None
+        detail = error.strerror or str(error)
+        raise SceneError(because("scene.mesh.unreadable", object=name, path=str(path), detail=detail)) from None

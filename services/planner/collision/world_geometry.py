@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.scene import AllowedPair, PlanningScene
 from gemelo.services.planner.collision.arm_geometry import Mask, arm_geometry
 from gemelo.services.planner.collision.scene_shapes import ANY, SceneError
@@ -60,12 +61,12 @@ class WorldGeometry:
     def _require_distinct(self) -> None:
         objects = self.shape_names[self._links :]
         if len(set(objects)) != len(objects):
-            raise SceneError("two objects of the scene have one name; give one of them another")
+            raise SceneError(because("scene.names.same", remedy("other_name_for_one")))
 
     def _require_all(self, expected: int) -> None:
         """A shape that silently is not there would make everything look free."""
         if self.model.ngeoms != expected:
-            raise SceneError(f"the checker has {self.model.ngeoms} of {expected} shapes; are two objects of one name?")
+            raise SceneError(because("scene.shapes.missing", count=int(self.model.ngeoms), needed=expected))
 
     def _checked(self, joints: NDArray[np.int_]) -> tuple[NDArray[np.int_], int]:
         """The pairs (k, 2) that a joint can move apart and that nothing allows to touch: links among themselves, then

@@ -13,6 +13,7 @@ from gemelo.libraries.arm.frames.transforms import Rigid, compose, from_message,
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.model.jaws import jaw_edges
 from gemelo.schemas.frames import Transform
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.scene import PlaneShape, PlanningScene, SceneObject
 from gemelo.services.planner.collision.scene_shapes import Folders, SceneError, pose_of, shape_of
 from gemelo.services.planner.collision_geometry.coal_shapes import geometry_of
@@ -38,9 +39,9 @@ def find_grasp(
     `links`: poses in the base. Raises `SceneError` without a gripper, or where it is not known where the arm is.
     """
     if arm.gripper is None:
-        raise SceneError(f"{arm.name} has no gripper: write a [gripper] into its robot.toml")
+        raise SceneError(because("scene.grip.no_gripper", remedy("write_gripper"), robot=arm.name))
     if links is None:
-        raise SceneError("it is not known where the arm is (no fresh joint_states): start the stepper_gateway")
+        raise SceneError(because("scene.grip.arm_unknown", remedy("start_gateway")))
     along, _, beyond = jaw_edges(arm.gripper)
     space = coal.Box(along, arm.gripper.open, beyond)
     middle = np.array([0.0, 0.0, beyond / 2.0])

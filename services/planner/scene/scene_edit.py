@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping
 
 import msgspec
 
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.frames import Transform
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.scene import (
     AllowedPair,
     PlanningScene,
@@ -85,7 +86,8 @@ class SceneEditor:
         for item in self._scene.objects:
             if item.name == name:
                 return item
-        raise SceneError(f'there is no object "{name}"{suggestion(name, [item.name for item in self._scene.objects])}')
+        known = [item.name for item in self._scene.objects]
+        raise SceneError(because("scene.object.unknown", nearest(name, known), object=name))
 
     def put(self, item: SceneObject) -> PlanningScene:
         """The object in the place of the one of its name, or as the last."""
@@ -117,7 +119,7 @@ class SceneEditor:
     def attach(self, edit: SceneAttach) -> PlanningScene:
         """The object attached from where it is now, be that in the base or on another link."""
         item = self.named(edit.name)
-        require_link(self._arm, edit.link, f'object "{edit.name}" cannot be attached')
+        require_link(self._arm, edit.link, "scene.link.attach", edit.name)
         pose = to_message(compose(inverse(self._frame(edit.link, edit.name)), self._in_base(item)))
         return self.put(replace(item, pose=pose, frame=edit.link, attached=True, touch_links=edit.touch_links))
 
@@ -125,7 +127,7 @@ class SceneEditor:
         """The scene with the object standing in the base where it is now; raises `SceneError`."""
         item = self.named(name)
         if not item.attached:
-            raise SceneError(f'object "{name}" is not attached to any link; there is nothing to detach')
+            raise SceneError(because("scene.object.not_attached", object=name))
         pose = to_message(self._in_base(item))
         return self.put(replace(item, pose=pose, frame="", attached=False, touch_links=(), gripped=False))
 
@@ -152,11 +154,11 @@ class SceneEditor:
     def disallow(self, pair: AllowedPair) -> PlanningScene:
         """The scene without the allowed pair; raises `SceneError` if it was not allowed."""
         if not self._is_allowed(pair):
-            named = "; ".join(f'"{old.first}" and "{old.second}"' for old in self._scene.allowed) or "nothing"
-            raise SceneError(
-                f'"{pair.first}" and "{pair.second}" are not allowed to touch by this scene: allowed is {named} '
-                "(what the SRDF allows is changed there)"
-            )
+            named = {"first": pair.first, "second": pair.second}
+            allowed = tuple(f"{old.first} / {old.second}" for old in self._scene.allowed)
+            if not allowed:
+                raise SceneError(because("scene.pair.none_allowed", **named))
+            raise SceneError(because("scene.pair.not_allowed", **named, allowed=allowed))
         return replace(self._scene, allowed=tuple(old for old in self._scene.allowed if not _same(old, pair)))
 
     def replace_by(self, scene: PlanningScene) -> PlanningScene:
@@ -180,13 +182,11 @@ class SceneEditor:
         """Where a frame is in the base now."""
         if frame in ("", self._arm.base_frame):
             return IDENTITY
-        require_link(self._arm, frame, f'object "{name}" cannot be placed')
+        require_link(self._arm, frame, "scene.link.place", name)
         poses = self._links()
         if poses is None:
-            raise SceneError(
-                f'object "{name}" cannot be placed by "{frame}": it is not known where the arm is (no fresh '
-                "joint_states); start the stepper_gateway, or give the pose in the base frame"
-            )
+            would_do = remedy("start_gateway"), remedy("pose_in_base")
+            raise SceneError(because("scene.object.placed_by", *would_do, object=name, link=frame))
         return from_message(poses[frame])
 
 

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import because
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.scene_meshes import by_digest, digests_in, mesh_digest, meshes_in, with_meshes
 
@@ -14,8 +16,8 @@ FILE = "scene.json"
 MESHES, STL = "scene_meshes", ".stl"  # the folder beside it, and its files, by their digests
 
 
-class DamagedScene(ValueError):
-    """A file that holds no scene; the text says why, and where it lies now."""
+class DamagedScene(ReasonedError, ValueError):
+    """A file that holds no scene; the reason says why."""
 
 
 def save_scene(path: Path, scene: PlanningScene) -> None:
@@ -42,7 +44,7 @@ def load_scene(path: Path) -> PlanningScene | None:
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:
-        raise DamagedScene(f"{path} holds no scene: {error}") from None
+        raise DamagedScene(because("scene.file.damaged", file=str(path), detail=str(error))) from None
     contents = ((digest, _read(_mesh_file(path.parent / MESHES, digest))) for digest in digests_in(scene))
     return with_meshes(scene, {digest: content for digest, content in contents if mesh_digest(content) == digest})
 

@@ -21,6 +21,7 @@ from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import Vector
 from gemelo.schemas.planning import PlanCode, PlanResponse
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.scene import (
     Contacts,
     PlanningScene,
@@ -169,7 +170,9 @@ class SceneKeeper:
         if showing.contacts is not None:
             self._tell_what_touches_here(showing.contacts)
         unsaved = self._save(self._store.scene)
-        return encoded(msgspec.structs.replace(response, reason=unsaved)) if unsaved else answer
+        if unsaved is None:
+            return answer
+        return encoded(msgspec.structs.replace(response, reason=str(unsaved), why=unsaved))
 
     def _take_opening(self, request: SceneRequest) -> None:
         """Who grips says how far the jaws are apart: what is planned next must not wait for their next state."""
@@ -232,17 +235,17 @@ class SceneKeeper:
         """Where the arm stands, or None without a fresh joint state of all joints."""
         return standing(self._arm, self._states.message, self._states.age())
 
-    def _save(self, scene: PlanningScene) -> str:
+    def _save(self, scene: PlanningScene) -> Reason | None:
         """What went wrong; the scene is changed nevertheless, and saved as soon as that is possible."""
         try:
             save_scene(self._file, scene)
         except OSError as error:
             self._is_unsaved = True
             self._node.unwritten.failed(self._what, error)
-            return f"the scene is changed, but {self._file} cannot be written ({error.strerror}): a restart forgets it"
+            return because("scene.unsaved", file=str(self._file), detail=error.strerror or str(error))
         self._is_unsaved = False
         self._node.unwritten.written(self._what)
-        return ""
+        return None
 
     def _save_again(self) -> None:
         if self._is_unsaved:
@@ -258,7 +261,7 @@ class SceneKeeper:
         usable, reasons = usable_part(self._arm, scene, self._folders)
         if reasons:
             aside = put_aside(self._file)
-            self._node.log.error(f"left out of the scene, as {aside} still has it: {'; '.join(reasons)}")
+            self._node.log.error(f"left out of the scene, as {aside} still has it: {'; '.join(map(str, reasons))}")
             usable = msgspec.structs.replace(usable, epoch=drawn_epoch(self._node.clock))
             self._save(usable)
         return usable

@@ -13,6 +13,8 @@ import msgspec
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.runtime.bus.wire import TooLarge, encoded
 from gemelo.libraries.runtime.clock import SYSTEM, Clock
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import because, plain
 from gemelo.schemas.scene import PlanningScene, SceneGrip, SceneRelease, SceneRequest, SceneResponse
 from gemelo.schemas.scene_meshes import by_digest, edit_with_meshes, meshes_in
 from gemelo.services.planner.collision.scene_shapes import Folders, SceneError
@@ -93,7 +95,7 @@ class SceneStore:
                 self.scene = changed
                 self.meshes.keep(changed)
         except SceneError as error:
-            return SceneResponse(reason=str(error), version=self.scene.version)
+            return SceneResponse(reason=str(error), version=self.scene.version, why=error.reason)
         return SceneResponse(accepted=True, version=self.scene.version, name=name, width=width)
 
 
@@ -111,9 +113,10 @@ def changed(
         return response, None
     try:
         return response, built(store.scene)
-    except (SceneError, ValueError) as error:
+    except ValueError as error:
         store.scene = before
-        return SceneResponse(reason=str(error), version=before.version), None
+        why = error.reason if isinstance(error, ReasonedError) else plain(str(error))
+        return SceneResponse(reason=str(why), version=before.version, why=why), None
     except BaseException:
         store.scene = before
         raise
@@ -124,7 +127,7 @@ def _require_sendable(scene: PlanningScene) -> None:
     try:
         encoded(by_digest(scene))
     except TooLarge as error:
-        raise SceneError(f"the scene is too large: {error}") from error
+        raise SceneError(because("scene.too_large", size=error.size, limit=error.limit)) from error
 
 
 def drawn_epoch(clock: Clock) -> int:
