@@ -59,6 +59,11 @@ class LinkInput(_Input, frozen=True):
     why: Reason | None = None  # `reason` as data
 
 
+def link_input(connected: bool, why: Reason | None) -> LinkInput:
+    """How the wire is; `why` it is not connected."""
+    return LinkInput(connected, str(why or ""), why)
+
+
 class FrameInput(_Input, frozen=True):
     """One payload from the device."""
 

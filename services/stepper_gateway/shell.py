@@ -68,7 +68,6 @@ from gemelo.services.stepper_gateway.inputs import (
     InjectInput,
     Input,
     JoinControlInput,
-    LinkInput,
     ParametersInput,
     PlannerInput,
     Reply,
@@ -77,6 +76,7 @@ from gemelo.services.stepper_gateway.inputs import (
     StopInput,
     TakeControlInput,
     TargetsInput,
+    link_input,
 )
 from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile
 from gemelo.services.stepper_gateway.links import link as links
@@ -122,7 +122,7 @@ class Shell:
         self._inputs = InputLog(core, began, self._moment(), node.publisher(GATEWAY_INPUTS).put)
         self._told = began.parameters
         self._link: links.Link | None = None
-        self._link_told: tuple[bool, str] | None = None  # what the core was given of it last
+        self._link_told: tuple[bool, Reason | None] | None = None  # what the core was given of it last
         self._silent = False
         self._is_woken = threading.Event()
         self._callers: dict[int, Pending[Any]] = {}  # by ticket: who waits for the device's answer
@@ -183,7 +183,7 @@ class Shell:
             return
         if self._link_told != (present := (link.connected, link.reason)):
             self._link_told = present
-            self._handle(LinkInput(*present))
+            self._handle(link_input(*present))
         received = link.take(AT_ONCE)
         for payload in received:
             self._handle(FrameInput(*payload))

@@ -8,8 +8,8 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from gemelo.schemas.device import DeviceStatus
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import DEVICE_STATUS
-from gemelo.services.stepper_gateway.device.session import DEAF
 from tests.panel.memory_page import MemoryPage, memory_page
 from tests.runtime.support import until
 
@@ -31,14 +31,14 @@ def test_the_page_says_for_how_long_a_device_has_not_heard_though_its_states_com
             online=False,
             speaks=True,
             device="rm1",
-            reason=f'device "rm1" {DEAF}',
+            why=because("device.deaf", device="rm1"),
             deaf_since=time.time_ns() - 12 * 10**9,
         )
         gateway.node.publisher(DEVICE_STATUS).put(deaf)
         gateway.round_trip_age = 40.0
         assert until(lambda: shows(page, "speaks and does not hear", "a loose TX wire", " (for 1", "measured 40 s ago"))
         gateway.round_trip_age = 0.0
-        well = replace(deaf, online=True, deaf_since=0, reason="", warning="two planners live, a and b")
+        well = replace(deaf, online=True, deaf_since=0, why=None, warning="two planners live, a and b")
         gateway.node.publisher(DEVICE_STATUS).put(well)
         assert until(lambda: shows(page, "two planners live, a and b") and not shows(page, "does not hear"))
         assert until(lambda: not shows(page, "measured"))

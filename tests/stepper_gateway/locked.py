@@ -87,8 +87,8 @@ def reason_of(section: MqttSection) -> str:
     """What a gateway's link says of the broker: nothing where it is connected."""
     link = MqttLink(gateway_access(section, {}), "rm1", lambda: None)
     try:
-        wait_for(lambda: link.connected or "no connection yet" not in link.reason)
-        return link.reason
+        wait_for(lambda: link.connected or "no connection yet" not in str(link.reason))
+        return str(link.reason or "")
     finally:
         link.close()
 

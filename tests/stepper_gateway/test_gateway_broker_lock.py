@@ -103,7 +103,7 @@ def test_an_acl_that_denies_is_said_with_its_topic_though_mosquitto_drops_silent
             link.send(Kind.HB, b"x")
             link.send(kind, b"x")
             wait_for(lambda link=link: not link.connected)
-            assert f'does not let user "gateway" write gemelo/v1/rm1/{kind}: its ACL must allow it' in link.reason
+            assert f'does not let user "gateway" write gemelo/v1/rm1/{kind}: its ACL must allow it' in str(link.reason)
         acl.write_text(kept)
 
 
@@ -132,7 +132,7 @@ def test_a_refused_gateway_asks_ever_more_seldom_and_a_vanished_broker_is_met_ag
         with closing(MqttLink(gateway_access(section), "rm1", lambda: None)) as link:
             wait_for(lambda: link.connected)
             broker.stop()
-            wait_for(lambda: "no MQTT broker answers" in link.reason)
+            wait_for(lambda: "no MQTT broker answers" in str(link.reason))
             broker.start()
             began = time.monotonic()
             wait_for(lambda: link.connected)

@@ -39,7 +39,7 @@ def test_a_link_to_a_broker_outlives_the_want_of_descriptors(access, kind, free)
     device = "rm1" if kind is MqttLink else rm1()
     with few_descriptors(free):
         link = kind(access, device, lambda: None)
-        seen = until(lambda: NONE_LEFT in link.reason, 60.0)
+        seen = until(lambda: NONE_LEFT in str(link.reason), 60.0)
     with closing(link):
         assert seen, link.reason
         assert until(lambda: link.connected, 60.0), link.reason
@@ -51,7 +51,7 @@ def test_a_serial_link_outlives_the_want_of_descriptors():
         port = os.ttyname(line)
         with few_descriptors():
             link = SerialLink(port, 921_600, lambda: None)
-            seen = until(lambda: NONE_LEFT in link.reason, 60.0)
+            seen = until(lambda: NONE_LEFT in str(link.reason), 60.0)
         with closing(link):
             assert seen, link.reason
             assert until(lambda: link.connected, 60.0), link.reason

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.control import ControlGive, ControlJoin, ControlTake
@@ -17,7 +19,10 @@ from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTolerance
 from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.schemas.topics import CONTROL, DEVICE_CONFIGURATION, DEVICE_EVENTS, DEVICE_STATUS, STEP_LEDGER
 from gemelo.services.stepper_gateway.links.link import TO_DEVICE
-from gemelo.tools.virtual_arm.gateway_driver import CancelInput
+from gemelo.services.stepper_gateway.links.serial_port import complaint, open_port
+from gemelo.tools.virtual_arm.gateway_driver import CancelInput, GatewayDriver
+from gemelo.tools.virtual_arm.sketch_arm import SketchArm
+from gemelo.tools.virtual_arm.text_arm import TextArm
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import move
 
@@ -38,7 +43,7 @@ def refused(arm: VirtualArm) -> Reason:
     return verdict.why
 
 
-def ended(arm: VirtualArm, goal_id: str = "g") -> Reason:
+def ended(arm: GatewayDriver, goal_id: str = "g") -> Reason:
     """Why a goal has ended, whose sentence is in the old field."""
     status, result = arm.finish(goal_id)
     assert status is not GoalStatusCode.SUCCEEDED
@@ -198,3 +203,34 @@ def test_another_configuration_is_named_with_both_sums() -> None:
     before = [each for each in arm.messages(DEVICE_CONFIGURATION) if each.why is not None]
     assert [each.reason for each in before] == [str(each.why) for each in before]
     assert before
+
+
+def test_a_board_that_answers_no_line_is_a_reason_within_that_of_the_link() -> None:
+    arm = TextArm()
+    arm.answers_lines = False
+    arm.referenced()
+    assert arm.run(3.0, lambda: arm.messages(DEVICE_STATUS)[-1].why is not None)
+    why = arm.messages(DEVICE_STATUS)[-1].why
+    assert why.code == "device.no_link"
+    assert [cause.code for cause in why.causes] == ["link.board_silent"]
+
+
+def test_a_sketch_that_fell_silent_in_a_message_has_lost_its_position() -> None:
+    arm = SketchArm().referenced()
+    assert arm.goal(move(HOME, (0.5, 0.0, 0.0), arm=arm.arm)).accepted
+    assert arm.run(20.0, lambda: abs(arm.sketch.motors[0].remaining) > 200)
+    arm.sketch.restart(1.1)
+    why = ended(arm)
+    assert why.code == "ending.ended_not_verified"
+    assert [cause.code for cause in why.causes] == ["position.sketch_silent"]
+    lost = next(event for event in arm.messages(DEVICE_EVENTS) if event.event == "position_lost")
+    assert lost.why.code == "position.sketch_silent"
+    assert lost.detail == str(lost.why)
+
+
+def test_a_port_that_is_not_there_is_named_with_those_that_are() -> None:
+    with pytest.raises(OSError, match="ttyNONE") as error:
+        open_port("/dev/ttyNONE", 115_200)
+    why = complaint("/dev/ttyNONE", error.value)
+    assert (why.code, why.values) == ("link.port.absent", {"port": "/dev/ttyNONE"})
+    assert [each.code for each in why.remedies] in (["other_ports"], ["no_ports"], ["ports_unseen"])

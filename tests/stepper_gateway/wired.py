@@ -18,9 +18,9 @@ from gemelo.tools.virtual_arm.gateway_driver import (
     GatewayDriver,
     InjectInput,
     Kind,
-    LinkInput,
     Moment,
     StepInput,
+    link_input,
 )
 from gemelo.tools.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.harness import move
@@ -64,7 +64,7 @@ class WiredGateway(GatewayDriver):
                 self.handle(StepInput())
             self._woken.wait(max(0.0, due - time.monotonic()))
             self._woken.clear()
-            self.handle(LinkInput(self.link.connected, self.link.reason))
+            self.handle(link_input(self.link.connected, self.link.reason))
             for received in self.link.take(64):
                 self.handle(FrameInput(*received))
         return until is None or until()

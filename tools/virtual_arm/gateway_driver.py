@@ -60,6 +60,7 @@ from gemelo.services.stepper_gateway.inputs import (
     StopInput,
     TakeControlInput,
     TargetsInput,
+    link_input,
 )
 from gemelo.services.stepper_gateway.ledger.confidence import LedgerRecord
 from gemelo.services.stepper_gateway.links.link import Kind
@@ -82,6 +83,7 @@ from gemelo.services.stepper_gateway.parameters import GatewayParameters
 __all__ = [
     "CancelInput", "ConfigureInput", "EchoInput", "FrameInput", "GatewayDriver", "GatewayParameters", "GripCancelInput",
     "InjectInput", "Kind", "LinkInput", "Moment", "PlannerInput", "SceneInput", "StepInput", "TargetsInput", "asked",
+    "link_input",
 ]  # fmt: skip
 
 Ended = tuple[GoalStatusCode, FollowJointTrajectoryResult]

@@ -10,11 +10,12 @@ import msgspec
 
 from gemelo.libraries.arm.model.description import ArmDescription, heard_by_the_board
 from gemelo.schemas.device import DeviceCommandKind
+from gemelo.schemas.reasons import Reason
 from gemelo.schemas.robot import Dialect
 from gemelo.services.stepper_gateway.links.foreign.text_device import TextDevice
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.tools.virtual_arm.foreign_arm import ForeignArm
-from gemelo.tools.virtual_arm.gateway_driver import GatewayParameters, LinkInput
+from gemelo.tools.virtual_arm.gateway_driver import GatewayParameters, link_input
 from gemelo.tools.virtual_arm.virtual_arm import GATEWAY_ZERO, rm1
 
 STEP = 0.001  # [s] of virtual time
@@ -41,9 +42,9 @@ class TextArm(ForeignArm):
         self._answers: list[tuple[float, bytes]] = []  # that are under way, with [s] of their arrival
         boots = itertools.count(1001)
         self.device = TextDevice(self.arm, lambda: next(boots), GATEWAY_ZERO, BAUD)
-        self._link = (True, "")
+        self._link: tuple[bool, Reason | None] = (True, None)
         self.start_core(self.arm, seed, GatewayParameters())
-        self.handle(LinkInput(*self._link))
+        self.handle(link_input(*self._link))
 
     def send(self, kind: Kind, payload: bytes) -> None:
         if not self.device.objection:
@@ -55,10 +56,10 @@ class TextArm(ForeignArm):
             self.device.hear(self._answers.pop(0)[1], monotonic)
         for line in self.device.advance(monotonic):
             self._read(line)
-        link = (not self.device.objection, self.device.objection)
+        link = (self.device.objection is None, self.device.objection)
         if link != self._link:
             self._link = link
-            self.handle(LinkInput(*link))
+            self.handle(link_input(*link))
         for kind, report in self.device.take():
             self.receive(kind, report)
 

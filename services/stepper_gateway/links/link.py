@@ -5,6 +5,8 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import NamedTuple, Protocol
 
+from gemelo.schemas.reasons import Reason
+
 
 class Kind(StrEnum):
     """The channels of firmware/PROTOCOL.md; the values are the last part of the MQTT topics."""
@@ -46,8 +48,8 @@ class Link(Protocol):
     def connected(self) -> bool: ...
 
     @property
-    def reason(self) -> str:
-        """Why it is not connected, as a sentence with a remedy."""
+    def reason(self) -> Reason | None:
+        """Why it is not connected, with what would do; None while it is."""
 
     def send(self, kind: Kind, payload: bytes, urgent: bool = False) -> bool:
         """False: not connected, or no room, which an urgent payload needs none of, and nothing was queued."""

@@ -18,6 +18,7 @@ from gemelo.libraries.mqtt.access import BrokerAccess
 from gemelo.libraries.mqtt.client import NO_ANSWER, OLD_BROKER, MqttClient, code_of, is_failure
 from gemelo.libraries.mqtt.failures import denial, failure, needs_a_person, refusal, silence
 from gemelo.schemas.device_topics import topic
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
 from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, Kind, Received
 
@@ -40,7 +41,7 @@ class MqttLink:
         self._wake = wake
         self._inbox = ReceiveQueue(wake)
         self._client: MqttClient | None = None
-        self._reason = f"no connection yet to {access}"
+        self._reason = because("link.none_yet_to", access=str(access))
         self._speaks_5 = True
         self._was_answered = False  # on this connection
         self._refusals = 0  # in a row
@@ -58,8 +59,8 @@ class MqttLink:
         return self._client is not None
 
     @property
-    def reason(self) -> str:
-        return "" if self._client is not None else self._reason
+    def reason(self) -> Reason | None:
+        return None if self._client is not None else self._reason
 
     def send(self, kind: Kind, payload: bytes, urgent: bool = False) -> bool:
         """All is sent at once, so nothing waits that an urgent payload could overtake."""
@@ -106,7 +107,7 @@ class MqttLink:
             client.loop_start()
         except OSError as error:
             self._refusals += needs_a_person(error)
-            self._lose(failure(error, self._access))
+            self._lose(plain(failure(error, self._access)))
             return self._after(refusals, False)
         self._lost.wait()
         was_connected = self._client is not None
@@ -141,9 +142,9 @@ class MqttLink:
             client.subscribe([(self._prefix + kind, _qos(kind)) for kind in FROM_DEVICE])
         elif self._speaks_5 and code_of(reason) == OLD_BROKER:
             self._speaks_5 = False
-            self._lose(f"{self._access} speaks no MQTT 5: trying again with 3.1.1")
+            self._lose(because("link.old_mqtt", access=str(self._access)))
         else:
-            self._refuse(refusal(code_of(reason), str(reason), self._access))
+            self._refuse(plain(refusal(code_of(reason), str(reason), self._access)))
 
     def _on_subscribe(
         self, client: paho.Client, _data: object, _id: int, reasons: Iterable[object], _props: object
@@ -151,7 +152,7 @@ class MqttLink:
         """Only now nothing that the device answers can be missed."""
         denied = [kind for kind, reason in zip(FROM_DEVICE, reasons, strict=False) if is_failure(reason)]
         if denied:
-            self._refuse(denial(self._prefix + denied[0], self._access, "read"))
+            self._refuse(plain(denial(self._prefix + denied[0], self._access, "read")))
             return
         assert isinstance(client, MqttClient)  # ours, see `_new_client`
         self._client = client
@@ -161,26 +162,26 @@ class MqttLink:
         """The broker has taken a message, or its ACL denies it: then the device must not be believed reachable."""
         kind = self._sent.pop(message_id, None)
         if is_failure(reason) and kind is not None and kind not in DISPENSABLE:
-            self._refuse(denial(self._prefix + kind, self._access))
+            self._refuse(plain(denial(self._prefix + kind, self._access)))
 
     def _on_disconnect(
         self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object
     ) -> None:
         assert isinstance(client, MqttClient)
         if self._was_answered or code_of(reason) == NO_ANSWER:
-            self._lose(f"the connection to {self._access} is lost ({reason})")
+            self._lose(because("link.lost", access=str(self._access), error=str(reason)))
         elif client.failure is not None:
-            self._refuse(failure(client.failure, self._access))
+            self._refuse(plain(failure(client.failure, self._access)))
         else:
             self._speaks_5 = not self._speaks_5  # some old brokers only hang up on a version that they do not know
-            self._refuse(silence(self._access))
+            self._refuse(plain(silence(self._access)))
 
-    def _refuse(self, reason: str) -> None:
+    def _refuse(self, reason: Reason) -> None:
         if not self._lost.is_set():
             self._refusals += 1
         self._lose(reason)
 
-    def _lose(self, reason: str) -> None:
+    def _lose(self, reason: Reason) -> None:
         """The first reason counts: what comes after it follows from it."""
         if self._lost.is_set():
             return

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Callable
 
 from gemelo.libraries.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
 from gemelo.services.stepper_gateway.links.frames import FrameType
 from gemelo.services.stepper_gateway.links.link import Kind, Received
@@ -45,7 +46,7 @@ class SerialLink:
         self._outgoing: deque[bytes] = deque()
         self._has_outgoing = threading.Event()
         self._line: OpenPort | None = None
-        self._reason = f"the serial port {port} has not been opened yet"
+        self._reason = because("link.port.unopened", port=port)
         self._stop = threading.Event()
         self._thread = threading.Thread(
             target=keep_connected, args=(self._connection, self._stop), name="serial-link", daemon=True
@@ -57,8 +58,8 @@ class SerialLink:
         return self._line is not None
 
     @property
-    def reason(self) -> str:
-        return "" if self._line is not None else self._reason
+    def reason(self) -> Reason | None:
+        return None if self._line is not None else self._reason
 
     def send(self, kind: Kind, payload: bytes, urgent: bool = False) -> bool:
         has_room = urgent or sum(map(len, tuple(self._outgoing))) + len(payload) <= BACKLOG
@@ -91,7 +92,7 @@ class SerialLink:
         try:
             self._read(line)
         except OSError as error:
-            self._lose(f"the serial port {self._port} has failed ({error}): is the board still plugged in?")
+            self._lose(because("link.port.failed", port=self._port, error=str(error)))
         self._line = None
         self._has_outgoing.set()
         writer.join()
@@ -120,9 +121,9 @@ class SerialLink:
                     line.write(self._outgoing.popleft())
             except OSError as error:
                 self._line = None
-                self._lose(f"the serial port {self._port} takes nothing ({error}): is the board still plugged in?")
+                self._lose(because("link.port.takes_nothing", port=self._port, error=str(error)))
 
-    def _lose(self, reason: str) -> None:
+    def _lose(self, reason: Reason) -> None:
         self._reason = reason
         self._wake()
 

@@ -11,7 +11,7 @@ from typing import Protocol
 import serial
 from serial.tools import list_ports
 
-from gemelo.libraries.runtime.process.unwritten import remedy_of
+from gemelo.schemas.reasons import Reason, Remedy, because, remedy
 
 READ_TIMEOUT = 0.1  # [s] after which the reader looks whether it is to end; chosen: a stop of the process is not felt
 WRITE_TIMEOUT = 0.5  # [s] after which a line that takes nothing is given up; chosen: as a heartbeat's silence
@@ -40,27 +40,28 @@ def open_port(port: str, baud: int) -> OpenPort:
     return line
 
 
-def complaint(port: str, error: Exception) -> str:
+def complaint(port: str, error: Exception) -> Reason:
     """Why `port` is not open, with a remedy."""
     match code := getattr(error, "errno", None):
         case errno.ENOENT | errno.ENODEV | errno.ENXIO:
-            return f"there is no serial port {port}: plug the board in, or name it in [serial] device; {_ports()}"
+            return because("link.port.absent", _ports(), port=port)
         case errno.EACCES | errno.EPERM:
             group = _group(port)
-            return f"no permission for {port}: `sudo usermod -aG {group} $USER`, then log in anew"
+            return because("link.port.forbidden", port=port, group=group)
         case errno.EBUSY | errno.EAGAIN:
-            return f"another program holds {port}: close the serial monitor, flasher or other gateway that uses it"
+            return because("link.port.held", port=port)
         case errno.EMFILE | errno.ENFILE:
-            return f"{port} cannot be opened ({os.strerror(code)}): {remedy_of(OSError(code, ''))}"
+            return because("link.port.no_descriptor", port=port, error=os.strerror(code))
         case _:
-            return f"{port} cannot be used as a serial port ({error}): name the board's in [serial] device; {_ports()}"
+            return because("link.port.unusable", _ports(), port=port, error=str(error))
 
 
-def _ports() -> str:
+def _ports() -> Remedy:
+    """The ports that there are."""
     with suppress(OSError):
-        found = sorted(port.device for port in list_ports.comports())
-        return f"there are {', '.join(found)}" if found else "there is none at all"
-    return "which there are cannot be seen"
+        found = tuple(sorted(port.device for port in list_ports.comports()))
+        return remedy("other_ports", ports=found) if found else remedy("no_ports")
+    return remedy("ports_unseen")
 
 
 def _group(port: str) -> str:

@@ -10,6 +10,7 @@ import msgspec
 from gemelo.libraries.arm.device.device_config import reference_steps
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.motors.relative_moves import MARGIN, loop_of, ramp_of
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.stepper_gateway.links.foreign import ra_messages
 from gemelo.services.stepper_gateway.links.foreign.ra_sender import RaSender
 from gemelo.services.stepper_gateway.links.foreign.stand_in import Report, StandIn
@@ -21,19 +22,7 @@ AT_REST = 10.0  # words of its telemetry that a sketch may miss before it counts
 IN_A_MESSAGE = 3.0  # words that it may miss while it has a message to do, but never less than a network delays one
 LONGEST_SILENCE = 1.0  # [s] whatever its telemetry is; chosen: a restart takes longer
 UNSEEN = 1.0  # [s] after which the broker has not passed a message on; chosen: longer than a slow network takes
-SILENT = (
-    "the sketch was silent for {silence:.2f} s with a message to do: it has started anew, lost its network or stood "
-    "still, and where the arm is is not known. Put it into its reference pose, then run `gemelo reference`"
-)
-LOST = (
-    "the broker has not passed on the last message of steps: it was lost with a connection, and where the arm is is "
-    "not known. Put it into its reference pose, then run `gemelo reference`"
-)
 OWN = 64  # messages of ours that are known when the broker sends them back; chosen: those of a minute and more
-OTHER = (
-    "another program sends ra/juntas too, and the sketch has moved by it: where the arm is is not known. End that "
-    "program, then run `gemelo reference`"
-)
 COMPLAINTS = 1.0  # [s] between two about messages that cannot be read; chosen: the log stays readable
 
 
@@ -150,15 +139,16 @@ class RaDevice:
             self._told_others = -1.0e9
         if now - self._told_others >= COMPLAINTS:
             self._told_others = now
-            self._say_lost(f"{OTHER} ({self._others} so far: {payload.decode(errors='replace')})", now)
+            message = payload.decode(errors="replace")
+            self._say_lost(because("position.other_program", count=self._others, message=message), now)
 
     def _watch(self, now: float) -> None:
         """Presence: what a sketch that fell silent in a message did of it is not known, and no motion goes on."""
         silence = now - self._heard
         if self._is_online and not self._sender.is_done and silence > self._patience(IN_A_MESSAGE):
-            return self._lose(SILENT.format(silence=silence), now)
+            return self._lose(because("position.sketch_silent", time=silence), now)
         if self._is_online and self._is_unseen and now - self._moved > UNSEEN:
-            return self._lose(LOST, now)
+            return self._lose(because("position.message_lost"), now)
         is_present = silence <= self._patience(AT_REST)
         if self._is_online and not is_present and (self._stand_in.is_moving or not self._is_settled):
             self._start(True, now)  # nothing of the motion was sent yet
@@ -172,9 +162,9 @@ class RaDevice:
         telemetry_time = self._loop.telemetry_time
         return min(LONGEST_SILENCE, max(words * telemetry_time, telemetry_time + MARGIN))
 
-    def _lose(self, detail: str, now: float) -> None:
+    def _lose(self, why: Reason, now: float) -> None:
         self._start(False, now)
-        self._say_lost(detail, now)
+        self._say_lost(why, now)
 
     def _start(self, is_known: bool, now: float) -> None:
         """Begin anew where all that was sent ends; `is_known`: the sketch has done all of it."""
@@ -183,9 +173,9 @@ class RaDevice:
         self._sender.heard(self._heard)
         self._unseen = None
 
-    def _say_lost(self, detail: str, now: float) -> None:
+    def _say_lost(self, why: Reason, now: float) -> None:
         t_us = self._stand_in.device_us(now)
-        self._say(Kind.EVENT, {"event": "position_lost", "t_us": t_us, "detail": detail})
+        self._say(Kind.EVENT, {"event": "position_lost", "t_us": t_us, "detail": str(why), "why": why})
 
     def _tell(self, values: dict[str, float], now: float) -> None:
         t_us = self._stand_in.device_us(now)

@@ -18,6 +18,7 @@ from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.mqtt.access import BrokerAccess
 from gemelo.libraries.mqtt.client import CONNECT_TIMEOUT, MqttClient, code_of, is_failure
 from gemelo.libraries.mqtt.failures import failure, refusal
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.services.stepper_gateway.links.connection import keep_connected
 from gemelo.services.stepper_gateway.links.foreign import ra_messages
 from gemelo.services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor
@@ -32,7 +33,7 @@ class RaLink:
     def __init__(self, access: BrokerAccess, arm: ArmDescription, wake: Callable[[], None]) -> None:
         self._access, self._wake = access, wake
         self._client: MqttClient | None = None
-        self._reason = f"no connection yet to {access}"
+        self._reason = because("link.none_yet_to", access=str(access))
         self._lost, self._stop = threading.Event(), threading.Event()
         self._device = RaDevice(arm, lambda: secrets.randbelow((1 << 32) - 1) + 1, time.monotonic())
         self._adapter = Adapter(self._device, self._write, wake)
@@ -46,8 +47,8 @@ class RaLink:
         return self._client is not None
 
     @property
-    def reason(self) -> str:
-        return "" if self.connected else self._reason
+    def reason(self) -> Reason | None:
+        return None if self.connected else self._reason
 
     def send(self, kind: Kind, payload: bytes, urgent: bool = False) -> bool:
         return self.connected and self._adapter.put(FrameFor(kind, payload))
@@ -79,7 +80,7 @@ class RaLink:
             client.connect(self._access.host, self._access.port, keepalive=KEEP_ALIVE)
             client.loop_start()
         except OSError as error:
-            self._lose(failure(error, self._access))
+            self._lose(plain(failure(error, self._access)))
             return False
         self._lost.wait()
         was_connected, self._client = self._client is not None, None
@@ -91,7 +92,7 @@ class RaLink:
 
     def _on_connect(self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
         if is_failure(reason):
-            return self._lose(refusal(code_of(reason), str(reason), self._access))
+            return self._lose(plain(refusal(code_of(reason), str(reason), self._access)))
         client.subscribe([(ra_messages.STATES, 0), (ra_messages.SENSORS, 0), (ra_messages.JOINTS, 0)])
         assert isinstance(client, MqttClient)  # ours, see `_connection`
         self._client = client
@@ -100,9 +101,9 @@ class RaLink:
     def _on_disconnect(
         self, _client: paho.Client, _data: object, _flags: object, reason: object, _props: object
     ) -> None:
-        self._lose(f"the connection to {self._access} is lost ({reason})")
+        self._lose(because("link.lost", access=str(self._access), error=str(reason)))
 
-    def _lose(self, reason: str) -> None:
+    def _lose(self, reason: Reason) -> None:
         self._reason = reason
         self._lost.set()
         self._wake()

@@ -10,6 +10,7 @@ import msgspec
 
 from gemelo.libraries.arm.device.device_config import reference_steps
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.stepper_gateway.links.foreign.stand_in import Report, StandIn
 from gemelo.services.stepper_gateway.links.foreign.text_exchange import TextExchange
 from gemelo.services.stepper_gateway.links.foreign.text_messages import AnswerReader, line_of
@@ -23,10 +24,6 @@ STILL_SILENT = 0.4  # [s] the same, of a board that has not answered since it wa
 PROBE = 1.0  # [s] between two repetitions of the newest line to a board that is not there; chosen: it is back at once
 TELLING = 10.0  # [s] between two summaries of the line; chosen: the log stays readable
 MOST_QUESTIONS = 8  # that wait for a line; chosen: more than the gateway asks between two
-MUTE = "no line was answered for {silence:g} s: is the wire plugged in, is it this port, has the board {baud} baud?"
-LOST_IN_A_MOTION = (
-    "{mute} It was in a motion, and where the arm is is not known: run `gemelo reference` when it answers"
-)
 
 
 class Question(NamedTuple):
@@ -55,12 +52,12 @@ class TextDevice:
         self._is_missed = False  # it has not answered since it was missed last
         self._waiting: list[Question] = []  # for the next line
         self._carried: OrderedDict[int, list[Question]] = OrderedDict()  # by the number of the line that they wait for
-        self._objection = ""
+        self._objection: Reason | None = None
         self._reports: list[Report] = []
 
     @property
-    def objection(self) -> str:
-        """Why the board counts as not there; empty if it is."""
+    def objection(self) -> Reason | None:
+        """Why the board counts as not there; None if it is."""
         return self._objection
 
     def receive(self, kind: Kind, payload: bytes, now: float) -> None:
@@ -160,7 +157,7 @@ class TextDevice:
         if self._asked_at is not None and now - self._asked_at > longest and not self._objection:
             self._miss(longest, now)
         elif self._objection and self._asked_at is None:
-            self._objection = ""
+            self._objection = None
             self._stand_in.report_status()
         if now - self._told >= TELLING and self.exchange.counts.lines:
             self._told = now
@@ -168,16 +165,16 @@ class TextDevice:
 
     def _miss(self, silence: float, now: float) -> None:
         """The board is silent: at rest it counts as not there until it answers, and a motion is lost."""
-        mute = MUTE.format(silence=silence, baud=self._baud)
         self._is_missed = True
         if not self._stand_in.is_moving and self._is_settled:
-            self._objection, self._probed = mute, now
+            self._objection, self._probed = because("link.board_silent", time=silence, baud=self._baud), now
             return
         self._stand_in.start(self._stand_in.steps, False, now)
         self._target, self._is_confirmed, self._asked_at = None, True, None
         self._waiting.clear()
         self._carried.clear()
-        self._say({"event": "position_lost", "detail": LOST_IN_A_MOTION.format(mute=mute)}, now)
+        lost = because("position.board_silent", time=silence, baud=self._baud)
+        self._say({"event": "position_lost", "detail": str(lost), "why": lost}, now)
 
     def _say(self, event: dict[str, object], now: float) -> None:
         report = {**event, "t_us": self._stand_in.device_us(now)}

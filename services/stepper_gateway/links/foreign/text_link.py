@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import partial
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.stepper_gateway.links.connection import keep_connected
 from gemelo.services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor
 from gemelo.services.stepper_gateway.links.foreign.text_device import TextDevice
@@ -22,7 +23,7 @@ class TextLink:
     def __init__(self, port: str, baud: int, arm: ArmDescription, wake: Callable[[], None]) -> None:
         self._port, self._baud, self._wake = port, baud, wake
         self._line: OpenPort | None = None
-        self._reason = f"the serial port {port} has not been opened yet"
+        self._reason = because("link.port.unopened", port=port)
         self._stop = threading.Event()
         self.device = TextDevice(arm, lambda: secrets.randbelow((1 << 32) - 1) + 1, time.monotonic(), baud)
         self._adapter = Adapter(self.device, self._write, wake)
@@ -33,13 +34,14 @@ class TextLink:
 
     @property
     def connected(self) -> bool:
-        return self._line is not None and not self.device.objection
+        return self._line is not None and self.device.objection is None
 
     @property
-    def reason(self) -> str:
+    def reason(self) -> Reason | None:
         if self._line is None:
             return self._reason
-        return f"{self.device.objection} (port {self._port})" if self.device.objection else ""
+        objection = self.device.objection
+        return None if objection is None else because("link.on_port", objection, port=self._port)
 
     def send(self, kind: Kind, payload: bytes, urgent: bool = False) -> bool:
         return self.connected and self._adapter.put(FrameFor(kind, payload))
@@ -64,7 +66,7 @@ class TextLink:
         try:
             self._read(line)
         except OSError as error:
-            self._lose(f"the serial port {self._port} has failed ({error}): is the board still plugged in?")
+            self._lose(because("link.port.failed", port=self._port, error=str(error)))
         self._line = None
         line.close()
         self._wake()
@@ -85,8 +87,8 @@ class TextLink:
             line.write(payload)
         except OSError as error:
             self._line = None
-            self._lose(f"the serial port {self._port} takes nothing ({error}): is the board still plugged in?")
+            self._lose(because("link.port.takes_nothing", port=self._port, error=str(error)))
 
-    def _lose(self, reason: str) -> None:
+    def _lose(self, reason: Reason) -> None:
         self._reason = reason
         self._wake()
