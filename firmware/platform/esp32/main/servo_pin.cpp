@@ -26,14 +26,10 @@ void ServoPin::drive(uint16_t pulse_us) {
     if (pin_ == kNone || pulse_us == pulse_us_) return;
     const bool is_running = pulse_us_ != 0;
     pulse_us_ = pulse_us;
-    if (pulse_us == 0) {
-        ESP_ERROR_CHECK(ledc_stop(kMode, kChannel, 0));
-    } else if (is_running) {
-        ESP_ERROR_CHECK(ledc_set_duty(kMode, kChannel, duty_of(pulse_us)));
-        ESP_ERROR_CHECK(ledc_update_duty(kMode, kChannel));
-    } else {
-        start(duty_of(pulse_us));
-    }
+    if (!is_running) return start(duty_of(pulse_us));
+    // Also to none: that takes effect at the end of a period, where ledc_stop() would cut the pulse that is under way.
+    ESP_ERROR_CHECK(ledc_set_duty(kMode, kChannel, duty_of(pulse_us)));
+    ESP_ERROR_CHECK(ledc_update_duty(kMode, kChannel));
 }
 
 void ServoPin::start(uint32_t duty) {

@@ -263,10 +263,6 @@ esp_err_t ledc_update_duty(ledc_mode_t, ledc_channel_t) {
     chip.servo_duty = chip.servo_next_duty;
     return ESP_OK;
 }
-esp_err_t ledc_stop(ledc_mode_t, ledc_channel_t, uint32_t) {
-    chip.servo_duty = 0;
-    return ESP_OK;
-}
 
 int64_t esp_timer_get_time(void) { return static_cast<int64_t>(chip.now_us); }
 void esp_rom_delay_us(uint32_t us) { chip.now_us += us; }
