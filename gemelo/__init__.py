@@ -122,7 +122,7 @@ _MODULE_OF = {name: module for module, names in MODULES.items() for name in name
 def __getattr__(name: str) -> object:
     """The public name, from its module (PEP 562)."""
     if name in _MODULE_OF:
-        value: object = getattr(import_module(_MODULE_OF[name]), name)
+        value: object = getattr(import_module("gemelo.api.errors").imported(_MODULE_OF[name]), name)
     elif name in TABLES:
         value = import_module(f"gemelo.schemas.{name}")
     else:

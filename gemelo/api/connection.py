@@ -29,11 +29,12 @@ def connect(
 ) -> Arm:
     """The arm that runs: the only one on the router, the one that `gemelo use` has chosen, or `robot`.
 
-    `robot`: a folder of urdf/, a path to one, or what `load_robot` has read. `deployment`: a file that says where the
-    router is, else $GEMELO_CONFIG, or what this folder has started. `name`: of this script's node; its file's name and
-    process if left out. `timeout` [s]: that the twin may take to be there. `needs_gateway=False` also takes
-    a twin that cannot move, for what the planner alone answers. Raises `Lost` where the twin does not run, `Error`
-    where its files are wrong.
+    `robot`: a folder of urdf/, a path to one, what `load_robot` has read, or the address of a router, as tcp/lab:7447:
+    from there the arm's description comes over the bus, and no file is needed here. `deployment`: a file that says
+    where the router is, else $GEMELO_CONFIG, or what this folder has started. `name`: of this script's node; its
+    file's name and process if left out. `timeout` [s]: that the twin may take to be there. `needs_gateway=False` also
+    takes a twin that cannot move, for what the planner alone answers. Raises `Lost` where the twin does not run,
+    `Error` where its files are wrong.
 
     >>> with gemelo.connect() as second:
     ...     second.joints == arm.joints

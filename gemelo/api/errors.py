@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from gemelo.api.arguments import Target
@@ -171,3 +173,15 @@ class Interrupted(KeyboardInterrupt):
         self.result = result  # of the motion: executed steps and errors; None where nothing moved, or it is not known
         self.stopped_at = dict(stopped_at or {})  # [rad] or [m] by joint; empty where it is not known
         self.homing = homing  # how far it came, where it was a homing
+
+
+def imported(module: str) -> ModuleType:
+    """The module; raises `Error`, which names the extra, where a package is missing that a client goes without."""
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        from gemelo.libraries.runtime.extras import missing_extra  # for who lacks one alone
+
+        if (reason := missing_extra(error)) is None:
+            raise
+        raise Error(reason) from error

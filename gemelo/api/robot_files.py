@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
+from gemelo.api.addresses import is_address
 from gemelo.api.errors import BadArgument, Error, Lost, reason_of
 from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.model import description as descriptions
@@ -59,10 +60,16 @@ def load_robot(robot: str = "", *, deployment: str | Path | None = None) -> Robo
 def find_robot(robot: str = "", *, deployment: str | Path | None = None, ask: bool = True) -> Robot:
     """The arm that runs, with the files that its twin was started with; that of this folder where none runs.
 
+    The address of a router, as tcp/lab:7447 or tcp/lab:7447/rm1, asks for the files there: none are needed here.
     `robot`, else $GEMELO_ROBOT or $GEMELO_CONFIG, is the one that is meant; else the only one on the router, else the
     one that `gemelo use` has chosen. Raises `Error` where a file is wrong or several run, `BadArgument` where there is
     no such arm. Without `ask` nobody is asked, and it is what this folder has started last.
     """
+    if is_address(robot):
+        from gemelo.api.bus_files import deployment_at  # slow to load, for who has no files
+
+        found = deployment_at(robot)
+        return Robot(found, descriptions.load_arm(Path(found.robot)))
     environ = dict(os.environ) if deployment is None else {**os.environ, CONFIG: str(deployment)}
     try:
         found = find_deployment(robot, environ, ask=ask)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
-from importlib import import_module
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self, overload
@@ -22,7 +21,7 @@ from msgspec.structs import replace
 
 from gemelo.api.arguments import Joints
 from gemelo.api.arm import Arm
-from gemelo.api.errors import BadArgument, Error, reason_of
+from gemelo.api.errors import BadArgument, Error, imported, reason_of
 from gemelo.api.robot_files import Robot, load_robot
 from gemelo.api.session import Session
 from gemelo.api.targets import named_joints, require_joint, require_within
@@ -77,7 +76,7 @@ class Simulation:
         """`seed`: of everything that is drawn; the same one gives the same bytes. `time_scale`: virtual seconds in a
         real one, 1.0 is real time; as fast as the machine computes if left out."""
         try:
-            self._clock: VirtualClock = import_module(f"{ROOM}.virtual_clock").VirtualClock(seed, time_scale)
+            self._clock: VirtualClock = imported(f"{ROOM}.virtual_clock").VirtualClock(seed, time_scale)
         except ValueError as error:
             raise BadArgument(because("argument.time_scale", value=str(time_scale))) from error
         self._folder = tempfile.TemporaryDirectory(prefix="gemelo-simulation-")
@@ -133,7 +132,7 @@ class Simulation:
         twin = self._twin(
             arm,
             deployment,
-            start=import_module(f"{ROOM}.twin").Start(*_start(arm, start)),
+            start=imported(f"{ROOM}.twin").Start(*_start(arm, start)),
             motors=_motors(arm, motors or {}),
             wire=_wire(wire),
         )
@@ -159,7 +158,7 @@ class Simulation:
 
     def _twin(self, arm: ArmDescription, deployment: object, **options: object) -> Twin:
         folder = Path(self._folder.name) / f"{len(self._twins)}-{arm.name}"
-        room = import_module(f"{ROOM}.twin")
+        room = imported(f"{ROOM}.twin")
         try:
             twin: Twin = room.Twin(self._clock, arm, deployment, folder, **options)
         except room.NotReady as error:

@@ -31,6 +31,7 @@ MQTT_FILES = (
 )
 ROUTER_FILES = ("configuration", "ca", "certificate", "key")
 PREFIX = "GEMELO_"
+HOME = "GEMELO_HOME"  # the project's folder, for a process that is neither in it nor of it
 CONFIG = "GEMELO_CONFIG"  # names another file than DEFAULT_FILE
 ARMS = "arms"  # folder in `paths.run` with a deployment for each of several arms that `make up ARMS=...` started last
 REMEDIES = {
@@ -48,11 +49,13 @@ class DeploymentError(ConfigurationError):
 
 
 def project_root() -> Path:
-    """The folder of deploy/local.toml, above this file or above the working directory."""
+    """The folder of deploy/local.toml: above this file, above the working directory, or $GEMELO_HOME."""
     for start in (Path(__file__).resolve(), Path.cwd() / "here"):
         for folder in start.parents:
             if (folder / DEFAULT_FILE).is_file():
                 return folder
+    if home := os.environ.get(HOME):
+        return Path(home)
     raise DeploymentError(f"no {DEFAULT_FILE} above this program or the working directory: run it from the project")
 
 

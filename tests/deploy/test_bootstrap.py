@@ -105,7 +105,8 @@ def test_a_host_with_extras_installs_only_those_in_the_locks_versions_and_all_wh
     machine.bootstrap(EXTRAS=extras)
     (first,) = (line for line in (machine.home / "uv.log").read_text().splitlines() if "--requirement" in line)
     chosen = "".join(f" --extra {extra}" for extra in extras.split())
-    assert first.endswith(f"--requirement pyproject.toml --extra build --constraints requirements.lock{chosen}")
+    of_every_host = "--requirement pyproject.toml --extra stack --extra build --constraints requirements.lock"
+    assert first.endswith(f"{of_every_host}{chosen}")
     assert "Python packages" in machine.bootstrap().stdout
     assert "--require-hashes --requirement requirements.lock" in (machine.home / "uv.log").read_text()
 

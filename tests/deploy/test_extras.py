@@ -10,9 +10,16 @@ from importlib.metadata import PackageNotFoundError, packages_distributions, req
 
 import pytest
 
+from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.runtime.deployment import project_root
+from gemelo.libraries.runtime.extras import EXTRA_OF
+from gemelo.libraries.runtime.node import Node
+from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
+from gemelo.schemas.topics import DESCRIPTION
+from gemelo.services.state_publisher.main import describe
 from gemelo.tools.hosts.layout import BROKER, SERVICES, extras
 from tests.hosts.sites import EXAMPLE, site
+from tests.runtime.support import RouterProcess
 
 ROOT = project_root()
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -29,7 +36,12 @@ NEVER_ON_A_GATEWAY = {
     "scipy",
     "mcap",
 }
-IN_A_PREFIX = {"pinocchio": ["pin"], "coal": ["coal"], "hppfcl": ["coal"]}  # where metadata names no module
+IN_A_PREFIX = {
+    "pinocchio": ["pin"],
+    "coal": ["coal"],
+    "hppfcl": ["coal"],
+    "ruckig": ["ruckig"],
+}  # where metadata names no module
 IMPORT = """
 import importlib, importlib.machinery, sys
 blocked = set({blocked!r})
@@ -96,17 +108,21 @@ def module_of(service: str) -> str:
 
 @pytest.mark.parametrize("service", SERVICES)
 def test_a_service_is_imported_with_only_the_extras_that_it_names(service):
-    loaded_by(module_of(service), SERVICES[service].extras)
+    loaded_by(module_of(service), ("stack", *SERVICES[service].extras))
 
 
 def test_the_block_is_real():
     with pytest.raises(AssertionError, match="ModuleNotFoundError"):
-        loaded_by("gemelo.services.planner.main", ())
+        loaded_by("gemelo.services.planner.main", ("stack",))
 
 
-@pytest.mark.parametrize("module", [module_of("stepper_gateway"), "gemelo.tools.cli.main", "gemelo"])
-def test_a_gateway_host_and_a_person_need_no_extra(module):
-    assert not loaded_by(module, ()) & NEVER_ON_A_GATEWAY
+def test_a_gateway_host_needs_the_stack_alone():
+    assert not loaded_by(module_of("stepper_gateway"), ("stack",)) & NEVER_ON_A_GATEWAY
+
+
+@pytest.mark.parametrize("module", ["gemelo.tools.cli.main", "gemelo"])
+def test_a_person_s_script_and_command_line_need_no_extra(module):
+    loaded_by(module, ())
 
 
 def test_every_extra_that_a_service_names_is_there_and_every_extra_for_use_is_named():
@@ -117,6 +133,7 @@ def test_every_extra_that_a_service_names_is_there_and_every_extra_for_use_is_na
         "dev",
         "bench",
         "build",
+        "stack",  # of every host that runs a service
     }  # the embedded broker is for one machine: a site has mosquitto
     assert not SERVICES[BROKER].extras
 
@@ -127,3 +144,48 @@ def test_a_host_needs_the_extras_of_its_services(tmp_path):
     assert extras(example, "cell") == ()
     assert extras(example, "brain") == ("planner", "record")
     assert extras(example, "desk") == ("panel",)
+
+
+CLIENT = """
+import gemelo
+from gemelo.tools.cli.main import run
+with gemelo.connect({address!r}) as arm:
+    assert len(arm.joint_names) == 3
+assert run(["--robot", {address!r}, "node", "list"]) == 0
+assert run(["--simulate", "state"]) == 1
+try:
+    gemelo.simulate("rm1")
+except gemelo.Error as error:
+    assert error.reason.code == "extra.missing", error
+"""
+
+
+def test_a_client_connects_with_zenoh_and_msgspec_alone_and_says_what_it_lacks(tmp_path):
+    router = RouterProcess(tmp_path)
+    program = tmp_path / "client_of_mine.py"
+    program.write_text(CLIENT.format(address=f"tcp/127.0.0.1:{router.port}"))
+    whole = f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n" + IMPORT.format(
+        blocked=blocked_for(()), module="client_of_mine"
+    )
+    try:
+        with (
+            Node("stepper_gateway", router.deployment, robot="rm1", stop=ShutdownRequest()),
+            Node("state_publisher", router.deployment, robot="rm1", stop=ShutdownRequest()) as publisher,
+        ):
+            publisher.publisher(DESCRIPTION).put(describe(load_arm(ROOT / "urdf/rm1")))
+            done = subprocess.run([sys.executable, "-c", whole], cwd=ROOT, capture_output=True, text=True, check=False)
+    finally:
+        router.kill()
+    assert done.returncode == 0, done.stderr
+    assert "stepper_gateway" in done.stdout
+    assert 'pip install "gemelo[stack]"' in done.stderr
+
+
+def test_every_module_of_an_extra_for_use_names_it():
+    modules = {**IN_A_PREFIX, **packages_distributions()}
+    used = {extra: {name_of(each) for each in EXTRAS[extra]} for extra in set(EXTRA_OF.values())}
+    for module, extra in EXTRA_OF.items():
+        owners = {name_of(each) for each in modules.get(module, [])}
+        assert not owners or owners & used[extra], f"{module} is none of {extra}"
+    told = {name_of(owner) for module in EXTRA_OF for owner in modules.get(module, [])}
+    assert {name for names in used.values() for name in names} <= told

@@ -13,6 +13,7 @@ from pathlib import Path
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
 
+STACK = ("stack",)  # of every host that runs a service
 EXTRAS = ("record", "planner", "view", "panel", "eyes")
 GOAL = FigureGoal(median=150.0)  # [MB] of a host with nothing but a gateway
 INSTALLED_WITHIN = 600.0  # [s] of one environment
@@ -22,8 +23,8 @@ def extra_mb() -> Figure:
     """What an environment of a gateway's host takes [MB], its bytecode too; with each extra as the references."""
     uv = _uv(project_root())
     with tempfile.TemporaryDirectory() as temporary:
-        base = installed_mb(uv, Path(temporary) / "base", ())
-        sizes = {extra: installed_mb(uv, Path(temporary) / extra, (extra,)) for extra in EXTRAS}
+        base = installed_mb(uv, Path(temporary) / "base", STACK)
+        sizes = {extra: installed_mb(uv, Path(temporary) / extra, (*STACK, extra)) for extra in EXTRAS}
     note = "the base runs router, stepper_gateway, state_publisher, virtual_esp32 and gemelo; references: with an extra"
     return of_samples([base], GOAL, {f"with {extra}": round(size, 1) for extra, size in sizes.items()}, note)
 

@@ -53,9 +53,12 @@ def choose_robot(name: str) -> None:
 
     Raises `CommandError` where there is no such robot.
     """
-    from gemelo.libraries.runtime.deployment import overriding  # slow to load, for --robot alone
+    from gemelo.api.addresses import is_address  # slow to load, for --robot alone
+    from gemelo.libraries.runtime.deployment import overriding
     from gemelo.libraries.runtime.started import deployment_of_arm
 
+    if is_address(name):
+        return choose_address(name)
     file = deployment_of_arm(name)
     if file is None:
         os.environ["GEMELO_ROBOT"] = robot_folder(name)
@@ -63,6 +66,23 @@ def choose_robot(name: str) -> None:
     for variable in overriding(os.environ):  # what they said when it was started stands in the file
         del os.environ[variable]
     os.environ["GEMELO_CONFIG"] = str(file)
+
+
+def choose_address(address: str) -> None:
+    """The arm at the address of a router: its files come from there. Raises `CommandError`."""
+    import gemelo
+    from gemelo.api.bus_files import deployment_at  # slow to load, for an address alone
+
+    try:
+        found = deployment_at(address)
+    except gemelo.Error as error:
+        raise CommandError(error, ExitCode.NO_STACK if isinstance(error, gemelo.Lost) else ExitCode.USAGE) from error
+    os.environ |= {
+        "GEMELO_ROBOT": found.robot,
+        "GEMELO_ROUTER_HOST": found.router.host,
+        "GEMELO_ROUTER_PORT": str(found.router.port),
+        "GEMELO_PATHS_RUN": found.paths.run,
+    }
 
 
 def robot_folder(name: str) -> str:
@@ -117,6 +137,13 @@ def _run(given: list[str]) -> ExitCode:
     except CommandError as error:
         print(f"gemelo: {error}", file=sys.stderr)
         return error.code
+    except ModuleNotFoundError as error:
+        from gemelo.libraries.runtime.extras import missing_extra  # for who lacks one alone
+
+        if (reason := missing_extra(error)) is None:
+            raise
+        print(f"gemelo: {language.sentence(reason)}", file=sys.stderr)
+        return ExitCode.FAILED
     except KeyboardInterrupt:
         return ExitCode.CANCELLED
     except BrokenPipeError:
