@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import polib
+
+from gemelo.schemas.reasons.catalogue import LANGUAGES
 from gemelo.tools.cli.commands import COMMANDS, Command
 from gemelo.tools.cli.completion import options_of
-from tests.cli.test_api_sentences import sentences
 
 ROOT = Path(__file__).parents[2]
 OF_ALL = {"--robot", "--json", "--simulate", "--help"}
@@ -18,12 +21,32 @@ CLASS = re.compile(r"\b[A-Z][a-z]+(?:[A-Z][a-z0-9]+)+\b")
 FAMILIES = {command.words[0] for command in COMMANDS}
 
 
+def sentences(file: Path) -> Iterator[str]:
+    """The texts in the code of a module, its docstrings left out; "x" for what is put in at run time."""
+    tree = ast.parse(file.read_text())
+    parts = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    alone = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            yield "".join(part.value if isinstance(part, ast.Constant) else "x" for part in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and not {id(node)} & (parts | alone):
+            yield node.value
+
+
+def templates(file: Path) -> Iterator[str]:
+    """The texts of a catalogue's file, "x" for each value."""
+    yield from (re.sub(r"\{[^{}]*\}", "x", entry.msgstr) for entry in polib.pofile(str(file)))
+
+
 def advised() -> Iterator[tuple[str, str]]:
     """The file and the words behind `gemelo` of every command in a sentence."""
     for room in ("gemelo", "libraries", "services", "tools"):
         for file in sorted((ROOT / room).rglob("*.py")):
             for text in sentences(file):
                 yield from ((str(file.relative_to(ROOT)), words) for words in ADVICE.findall(text))
+    for file in sorted(LANGUAGES.rglob("*.po")):
+        for text in templates(file):
+            yield from ((file.name, words) for words in ADVICE.findall(text))
 
 
 def command_of(words: list[str]) -> Command | None:
