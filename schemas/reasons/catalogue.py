@@ -2,9 +2,10 @@
 
 `languages/es/goal.po` has the Spanish of all codes `goal.*`. An entry's msgid is the code; its msgctxt is empty, or
 names the front end that has words of its own for it (`page`), or is `explain`: what the code means, or all codes that
-begin with it. A template has the names of the reason's values in braces, and behind a colon the unit of one:
-`{depth:m}`. The reasons behind it are `{causes}`, `{cause_1}` and `{cause_2}` one by one, or `{lines}` where each has a
-line of its own; what would do is `{remedies}`, which else follows the sentence.
+begin with it, or `help`: a text of the command line's help, whose English is the msgid. A template has the names of
+the reason's values in braces, and behind a colon the unit of one: `{depth:m}`. The reasons behind it are `{causes}`,
+`{cause_1}` and `{cause_2}` one by one, or `{lines}` where each has a line of its own; what would do is `{remedies}`,
+which else follows the sentence.
 
 `compiled.py` makes one file of a language's, which takes 1 ms to read. (Fluent's runtime takes some 100 ms to import
 and 0.3 ms for each message, and so does Babel, on which it stands.)
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 LANGUAGES = Path(__file__).resolve().parent / "languages"
 COMPILED = "gemelo.mo"
 ENGLISH = "en"
-EXPLAIN = "explain"
+EXPLAIN, HELP = "explain", "help"
 WORD = "word."  # before a word that stands in for a value
 INDEX, ENTRY, PART = "index", "\x1e", "\x1f"  # as compiled.py writes it
 
@@ -62,6 +63,12 @@ def explanation(code: str, language: str) -> str:
     names = [".".join(parts[:count]) for count in range(len(parts), 0, -1)]
     texts = ((name, known.pgettext(EXPLAIN, name)) for name in names) if known is not None else ()
     return next((text for name, text in texts if text != name), "")
+
+
+def help_text(text: str, language: str) -> str:
+    """The English text in the language; itself where the language does not have it."""
+    known = _catalogue(language)
+    return text if known is None else known.pgettext(HELP, text)
 
 
 @cache

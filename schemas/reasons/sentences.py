@@ -62,6 +62,7 @@ class _Writer(string.Formatter):
 
     What stands behind a value's colon is its unit, or how it is worded: `word`, one that the catalogue translates,
     `names`, each in the quotation marks of the language, and `argument`, of which each front end has a name of its own.
+    `either` puts the word for or between several.
     Of several numbers each has the unit; of numbers by their joints' names each has its own, where the unit is a value
     with as many. `word.phase` are words of that kind alone.
     """
@@ -104,6 +105,8 @@ class _Writer(string.Formatter):
         """One value as it is written."""
         if format_spec == "names":
             return ", ".join(self._word("quoted").format(name=name) for name in _each(value))
+        if format_spec == "either":
+            return f" {self._word('or')} ".join(_each(value))
         if format_spec == "argument":
             return self._all_of([self._argument(name) for name in _each(value)])
         if isinstance(value, str):

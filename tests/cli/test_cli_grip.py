@@ -34,8 +34,8 @@ def test_words_and_lengths_are_openings(text: str, meant: str | float) -> None:
     ("text", "words"),
     [
         ("25", "25 without a unit is in m, and more than 10 m: did you mean 25mm"),
-        ("0.06", "0.06 is not between 0mm closed and 50mm open"),
-        ("51mm", "51mm is not between 0mm closed and 50mm open"),
+        ("0.06", "an opening of 60mm is not 0mm to 50mm between the jaws"),
+        ("51mm", "an opening of 51mm is not 0mm to 50mm between the jaws"),
         ("shut", '"shut" is not a length'),
         ("30deg", "must be in m or mm"),
         ("nan", '"nan" is not a length'),

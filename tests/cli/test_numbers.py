@@ -35,17 +35,17 @@ from tests.table import table
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 SPELLINGS = {
-    ANGLE.noun: [("30deg", math.pi / 6), ("-30°", -math.pi / 6), ("0.5rad", 0.5)],
-    ANGULAR_SPEED.noun: [("10deg/s", math.pi / 18), ("0.2rad/s", 0.2)],
-    LENGTH.noun: [("40mm", 0.04), ("0.04m", 0.04), ("0.04", 0.04), ("4e1mm", 0.04)],
-    SPEED.noun: [("50mm/s", 0.05), ("0.05m/s", 0.05), ("0.05", 0.05)],
-    ACCELERATION.noun: [("200mm/s2", 0.2), ("0.2m/s^2", 0.2), ("0.2", 0.2)],
-    TIME.noun: [("500ms", 0.5), ("0.5s", 0.5), ("0.5", 0.5)],
-    SHARE.noun: [("50%", 0.5), ("0.5%", 0.005)],
+    ANGLE.name: [("30deg", math.pi / 6), ("-30°", -math.pi / 6), ("0.5rad", 0.5)],
+    ANGULAR_SPEED.name: [("10deg/s", math.pi / 18), ("0.2rad/s", 0.2)],
+    LENGTH.name: [("40mm", 0.04), ("0.04m", 0.04), ("0.04", 0.04), ("4e1mm", 0.04)],
+    SPEED.name: [("50mm/s", 0.05), ("0.05m/s", 0.05), ("0.05", 0.05)],
+    ACCELERATION.name: [("200mm/s2", 0.2), ("0.2m/s^2", 0.2), ("0.2", 0.2)],
+    TIME.name: [("500ms", 0.5), ("0.5s", 0.5), ("0.5", 0.5)],
+    SHARE.name: [("50%", 0.5), ("0.5%", 0.005)],
 }
 FOREIGN = {
-    ANGLE.noun: "30deg", ANGULAR_SPEED.noun: "10deg/s", LENGTH.noun: "40mm", SPEED.noun: "5mm/s",
-    ACCELERATION.noun: "5mm/s2", TIME.noun: "3s", SHARE.noun: "5%",
+    ANGLE.name: "30deg", ANGULAR_SPEED.name: "10deg/s", LENGTH.name: "40mm", SPEED.name: "5mm/s",
+    ACCELERATION.name: "5mm/s2", TIME.name: "3s", SHARE.name: "5%",
 }  # fmt: skip
 LINE = "--to 0.2 0.1 0.1 --line"
 
@@ -156,7 +156,7 @@ each_option = pytest.mark.parametrize("option", OPTIONS, ids=lambda option: opti
 
 @each_option
 def test_every_spelling_of_a_number_is_the_same_in_si(option):
-    for text, value in SPELLINGS[option.quantity.noun]:
+    for text, value in SPELLINGS[option.quantity.name]:
         if value > 0.0 or (option.quantity is ANGLE and "rpy" in option.line):
             assert si_of(option, text) == pytest.approx(value, rel=1e-12), text
 
@@ -187,8 +187,8 @@ def test_zero_needs_no_unit(option, capsys):
 def test_a_unit_of_another_quantity_is_refused(option, capsys):
     for quantity in QUANTITIES:
         if quantity is not option.quantity:
-            assert f"{FOREIGN[quantity.noun]} must be in {option.quantity.choice}" in refusal_of(
-                option, FOREIGN[quantity.noun], capsys
+            assert f"{FOREIGN[quantity.name]} must be in {' or '.join(option.quantity.units)}" in refusal_of(
+                option, FOREIGN[quantity.name], capsys
             )
 
 

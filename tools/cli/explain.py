@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from gemelo.schemas.reasons import FrontEnd, Reason, because, remedy, say
-from gemelo.schemas.reasons.catalogue import ENGLISH, EXPLAIN, codes, entries, explanation, languages, template
+from gemelo.schemas.reasons.catalogue import ENGLISH, EXPLAIN, HELP, codes, entries, explanation, languages, template
 from gemelo.schemas.reasons.examples import example_of
 from gemelo.tools.cli.common.errors import ExitCode, nearest, unknown, usage
 from gemelo.tools.cli.common.language import language, sentence
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from gemelo.tools.cli.parser import Parser
 
 WIDTH = 100
-HELP = "help"  # the context of texts whose English stands in the program itself
 NEEDED = ("", EXPLAIN, HELP)  # contexts of texts that each language has; words of one front end are as many as it likes
 
 

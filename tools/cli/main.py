@@ -27,7 +27,8 @@ EPILOG = (
 
 def parse(arguments: Sequence[str]) -> Options:
     """The options of one command line; ends the process with a sentence if it cannot be understood."""
-    return build(COMMANDS, GROUPS, ABOUT, EPILOG, arguments).parse_args(arguments)
+    options: Options = build(COMMANDS, GROUPS, ABOUT, EPILOG, arguments).parse_args(arguments)
+    return options
 
 
 def with_leading_options(arguments: list[str]) -> list[str]:

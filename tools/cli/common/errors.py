@@ -61,11 +61,11 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
     return inside[0] if inside else None
 
 
-def unknown(kind: str, name: str, known: Iterable[str]) -> CommandError:
+def unknown(kind: str, name: str, known: Iterable[str], *, is_sorted: bool = True) -> CommandError:
     """`no topic "joint_state": did you mean "joint_states"?`, or the list of all known names."""
     from gemelo.schemas.reasons import because, remedy  # 30 ms, where something is refused
 
-    known = sorted(known)
+    known = sorted(known) if is_sorted else list(known)
     if guess := nearest(name, known):
         hint = remedy("did_you_mean", name=guess)
     else:

@@ -40,6 +40,15 @@ def of_environment(environ: Mapping[str, str]) -> str:
     return name if name not in ("", "c", "posix", ENGLISH) and name in known() else ENGLISH
 
 
+def translated(text: str) -> str:
+    """A text of the help, whose English stands in the program; itself where the language does not have it."""
+    if language() == ENGLISH or not text:
+        return text
+    from gemelo.schemas.reasons.catalogue import help_text  # 30 ms, for another language than English alone
+
+    return help_text(text, language())
+
+
 def sentence(reason: Reason) -> str:
     """In the language of this command line, with its commands."""
     from gemelo.schemas.reasons import FrontEnd, say  # 30 ms, where something is refused

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple, Protocol
 
 import gemelo
+from gemelo.schemas.reasons import Reason, Remedy, because, remedy
 from gemelo.tools.cli.common.errors import CommandError, unknown, usage
 from gemelo.tools.cli.parser import comma_hint
 
@@ -29,28 +30,23 @@ _SPELLINGS = {"°": "deg", "°/s": "deg/s", "m/s^2": "m/s2", "m/s²": "m/s2", "m
 class Quantity(NamedTuple):
     """A physical quantity: its units with their factors to SI, and the unit of a number without one."""
 
-    noun: str
+    name: str  # as `word.quantity` of the catalogue has it
     units: Mapping[str, float]
     bare: str = ""  # empty: only 0 needs no unit
 
-    @property
-    def choice(self) -> str:
-        """The units, as `deg or rad`."""
-        return " or ".join(self.units)
 
-
-ANGLE = Quantity("an angle", {"deg": DEGREE, "rad": 1.0})
-ANGULAR_SPEED = Quantity("an angular speed", {"deg/s": DEGREE, "rad/s": 1.0})
-LENGTH = Quantity("a length", {"m": 1.0, "mm": MILLIMETRE}, "m")
-SPEED = Quantity("a speed", {"m/s": 1.0, "mm/s": MILLIMETRE}, "m/s")
-ACCELERATION = Quantity("an acceleration", {"m/s2": 1.0, "mm/s2": MILLIMETRE}, "m/s2")
-TIME = Quantity("a time", {"s": 1.0, "ms": 0.001}, "s")
-SHARE = Quantity("a share", {"%": 0.01})
+ANGLE = Quantity("angle", {"deg": DEGREE, "rad": 1.0})
+ANGULAR_SPEED = Quantity("angular_speed", {"deg/s": DEGREE, "rad/s": 1.0})
+LENGTH = Quantity("length", {"m": 1.0, "mm": MILLIMETRE}, "m")
+SPEED = Quantity("speed", {"m/s": 1.0, "mm/s": MILLIMETRE}, "m/s")
+ACCELERATION = Quantity("acceleration", {"m/s2": 1.0, "mm/s2": MILLIMETRE}, "m/s2")
+TIME = Quantity("time", {"s": 1.0, "ms": 0.001}, "s")
+SHARE = Quantity("share", {"%": 0.01})
 FAR = {"m": 10.0, "m/s": 10.0}  # chosen as in gemelo.api.targets: without a unit, more was meant in millimetres
 QUANTITIES = (ANGLE, ANGULAR_SPEED, LENGTH, SPEED, ACCELERATION, TIME, SHARE)
 POSITION_OF = {"rad": ANGLE, "m": LENGTH}  # of a joint, by its SI unit
 SPEED_OF = {"rad": ANGULAR_SPEED, "m": SPEED}
-VERB_OF = {"rad": "turns", "m": "slides"}
+OF_JOINT = {"rad": "cli.unit.of_joint.turns", "m": "cli.unit.of_joint.slides"}
 
 
 class NamedJoint(Protocol):
@@ -66,40 +62,46 @@ class NamedJoint(Protocol):
 
 def parse_quantity(text: str, quantity: Quantity, owner: str = "") -> float:
     """`text` in the SI unit of `quantity`; raises `CommandError` naming `owner`, the units and the readings."""
-    lead = f"{owner}: " if owner else ""
-    match = _VALUE.fullmatch(text)
-    if match is None and (hint := comma_hint(text)):
-        raise usage(f'{lead}"{text}" is not {quantity.noun}: {hint}')
+    found = _value_of(text, quantity)
+    if isinstance(found, float):
+        return found
+    raise usage(because("cli.unit.of", found, owner=owner) if owner else found)
+
+
+def _value_of(text: str, quantity: Quantity) -> float | Reason:
+    """In the SI unit, or why it is none."""
+    match, units = _VALUE.fullmatch(text), tuple(quantity.units)
     if match is None:
-        raise usage(f'{lead}"{text}" is not {quantity.noun}: write a number and a unit, {quantity.choice}')
+        hint = comma_hint(text) or remedy("write_with_unit", units=units)
+        return because("cli.unit.not_a_quantity", hint, text=text, quantity=quantity.name)
     number, suffix = match.groups()
     if suffix is None and not quantity.bare and float(number):
-        raise usage(f"{lead}{number} what: {_readings(number, quantity)}?")
+        return because("cli.unit.without", remedy("with_unit", readings=_readings(number, quantity)), number=number)
     unit = _SPELLINGS.get(suffix, suffix) or quantity.bare or next(iter(quantity.units))
     if unit not in quantity.units:
-        known = any(unit in each.units for each in QUANTITIES)
-        said = text.strip() if known else f'"{suffix}" is not a unit: {text.strip()}'
-        raise usage(f"{lead}{said} must be in {quantity.choice}")
+        if any(unit in each.units for each in QUANTITIES):
+            return because("cli.unit.other", text=text.strip(), units=units)
+        return because("cli.unit.unknown", text=text.strip(), unit=str(suffix), units=units)
     value = float(number) * quantity.units[unit]
     if suffix is None and unit in FAR and math.isfinite(value) and abs(value) > FAR[unit]:
-        most = f"{FAR[unit]:g} {unit}"
-        raise usage(f"{lead}{number} without a unit is in {unit}, and more than {most}: {_smaller(number, unit)}?")
-    if not math.isfinite(value):
-        raise usage(f"{lead}{text} is not finite")
-    return value
+        return because("cli.unit.large", _smaller(number, unit), number=number, unit=unit, most=FAR[unit])
+    return value if math.isfinite(value) else because("cli.unit.not_finite", text=text)
 
 
-def _smaller(number: str, unit: str) -> str:
+def _smaller(number: str, unit: str) -> Remedy:
     """What was likely meant by a number of metres, or metres a second, that no arm has."""
-    centimetres = f" or {0.01 * float(number):g} for {number} cm" if unit == "m" and abs(float(number)) < 100.0 else ""
-    return f"did you mean {number}m{unit}{centimetres}"
+    meant = f"{number}m{unit}"
+    if unit != "m" or abs(float(number)) >= 100.0:
+        return remedy("did_you_mean_smaller", text=meant)
+    return remedy("did_you_mean_centimetres", text=meant, metres=0.01 * float(number), number=number)
 
 
-def _readings(number: str, quantity: Quantity) -> str:
+def _readings(number: str, quantity: Quantity) -> tuple[str, ...]:
     """What a number without a unit might mean."""
     if quantity is SHARE:
-        return f"{number}% or {100.0 * float(number):g}%" if abs(float(number)) <= 1.0 else f"{number}%"
-    return " or ".join(f"{number}{unit}" for unit in quantity.units)
+        small = (f"{100.0 * float(number):g}%",) if abs(float(number)) <= 1.0 else ()
+        return (f"{number}%", *small)
+    return tuple(f"{number}{unit}" for unit in quantity.units)
 
 
 def parse_joints(
@@ -115,14 +117,17 @@ def parse_joints(
     for assignment in assignments:
         name, equals, text = assignment.partition("=")
         if not equals:
-            raise usage(f'"{assignment}" is not a joint and its value: write {next(iter(by_name), "joint")}=30deg')
+            example = next(iter(by_name), "joint")
+            raise usage(because("cli.unit.no_assignment", text=assignment, joint=example))
         joint = by_name.get(name.strip()) or by_wire_name.get(name.strip())
         if joint is None:
             raise unknown("joint", name.strip(), by_name)
         if joint.name in values:
-            raise usage(f'joint "{joint.name}" is given twice')
-        owner = f'joint "{joint.name}" {VERB_OF[joint.unit]}'
-        values[joint.name] = parse_quantity(text, quantity_of[joint.unit], owner)
+            raise usage(because("cli.unit.joint_twice", joint=joint.name))
+        found = _value_of(text, quantity_of[joint.unit])
+        if isinstance(found, Reason):
+            raise usage(because(OF_JOINT[joint.unit], found, joint=joint.name))
+        values[joint.name] = found
     return values
 
 
@@ -130,8 +135,8 @@ def parse_rotation(text: str, owner: str = "") -> float:
     """One of roll, pitch and yaw [rad]; more than a turn in radians is refused, for degrees were meant."""
     value = parse_quantity(text, ANGLE, owner)
     if abs(value) > MOST_OF_A_TURN and "rad" in text:
-        lead = f"{owner}: " if owner else ""
-        raise usage(f"{lead}{text} is more than a turn: write {text.replace('rad', 'deg')} for degrees")
+        why = because("cli.unit.more_than_a_turn", text=text, degrees=text.replace("rad", "deg"))
+        raise usage(because("cli.unit.of", why, owner=owner) if owner else why)
     return value
 
 
@@ -169,7 +174,7 @@ def positive_seconds(text: str) -> float:
     """An argument's type: a time [s] above 0."""
     value = parse_quantity(text, TIME)
     if value <= 0.0:
-        raise usage(f"{text} is not above 0")
+        raise usage(because("cli.unit.not_positive", text=text))
     return value
 
 
@@ -178,5 +183,5 @@ def positive_length(text: str) -> float:
     """An argument's type: a length [m] above 0."""
     value = parse_quantity(text, LENGTH)
     if value <= 0.0:
-        raise usage(f"{text} is not above 0")
+        raise usage(because("cli.unit.not_positive", text=text))
     return value

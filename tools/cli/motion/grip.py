@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
 from gemelo.tools.cli.common.output import control
 from gemelo.tools.cli.common.session import connect_arm, load_robot
@@ -43,10 +44,8 @@ def run(options: Options) -> ExitCode:
             return _show(arm, options.json)
     to = opening(options.to)
     if isinstance(to, float) and not gripper.closed <= to <= gripper.open:
-        raise usage(
-            f"an opening of {options.to} is not between {gripper.closed * 1000:g}mm closed and "
-            f"{gripper.open * 1000:g}mm open"
-        )
+        limits = {"least": gripper.closed, "most": gripper.open}
+        raise usage(because("argument.grip.range", value=to, **limits))
     with connect_arm(robot) as arm:
         return grip(arm, to, options.max_effort, options.json)
 
@@ -58,7 +57,7 @@ def choices(robot: Robot | None) -> Choices:
 
 def opening(text: str) -> Grip:
     """ "open", "close", or an opening [m]; raises `CommandError` for a number that is no length."""
-    return text if text in WORDS else parse_quantity(text, LENGTH, "the opening")
+    return text if text in WORDS else parse_quantity(text, LENGTH, "opening")
 
 
 def grip(arm: Arm, to: Grip, max_effort: float, as_json: bool) -> ExitCode:
