@@ -48,8 +48,13 @@ def reason_text(status: DeviceStatus, now: int) -> str:
     return str(why_not_usable(status, now))
 
 
+def why_offline(status: DeviceStatus, now: int) -> Reason:
+    """As `why_not_usable`, of a device that is offline or, where its states arrive, not usable."""
+    return because("device.is_not_usable" if status.speaks else "device.is_offline", why_not_usable(status, now))
+
+
 def offline_text(status: DeviceStatus, now: int) -> str:
-    """As `reason_text`, after `offline` or, where the device's states arrive, `not usable`."""
+    """`offline: ...` or, where the device's states arrive, `not usable: ...`."""
     return f"{offline_word(status.speaks)}: {reason_text(status, now)}"
 
 

@@ -10,14 +10,14 @@ from types import TracebackType
 from typing import Self
 
 from gemelo.api import control_file
-from gemelo.api.errors import Lost, Refused
+from gemelo.api.errors import Lost, Refused, why_of
 from gemelo.api.session import Session
 from gemelo.libraries.runtime import errors as runtime
 from gemelo.libraries.runtime.clock import token
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlState, ControlTake
 from gemelo.schemas.deployment import Deployment
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.topics import CONTROL, CONTROL_GIVE, CONTROL_JOIN, CONTROL_TAKE
 
 TO_REST = 15.0  # [s] that the arm may take to come to rest, where another moves it
@@ -158,19 +158,14 @@ class Control:
         if self._own is None or self.is_mine:
             return
         state = self.state
-        now = f"{state.name} holds it, from node {state.node} on {state.host}" if state.held else "nobody holds it"
-        raise Refused(
-            f"refused: this connection has lost control of the arm, and {now}: {REMEDY} anew",
-            check="control",
-            subject=state.name,
-            remedy=REMEDY,
-        )
+        anew, holder = remedy("take_control_anew"), {"name": state.name, "node": state.node, "host": state.host}
+        lost = because("client.control.lost_to", anew, **holder) if state.held else because("client.control.lost", anew)
+        raise Refused(lost, check="control", subject=state.name, remedy=REMEDY)
 
     def _require(self, answer: ControlAnswer, what: str) -> ControlAnswer:
         if not answer.accepted:
-            raise Refused(
-                f"{what} control refused: {answer.reason}", check="control", reason=answer.why or answer.reason
-            )
+            why = why_of(answer)
+            raise Refused(because("client.control.refused", why, what=what), check="control", reason=why)
         return answer
 
 

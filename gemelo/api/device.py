@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from gemelo.api.errors import BadArgument, Lost, Refused
+from gemelo.api.errors import BadArgument, Lost, Refused, why_of
 from gemelo.api.homing import joint_name
 from gemelo.api.session import PATIENCE, Session
 from gemelo.api.targets import number
@@ -29,8 +29,8 @@ from gemelo.schemas.device import (
     StopKind,
 )
 from gemelo.schemas.device_faults import fault_text
-from gemelo.schemas.device_link import offline_text
-from gemelo.schemas.reasons import because, remedy
+from gemelo.schemas.device_link import why_offline
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURATION,
@@ -78,7 +78,7 @@ class Device:
             return self._session.newest(DEVICE_STATE)
         except Lost:
             if status.message is not None and not status.message.online:
-                raise Lost(f"the device is {offline_text(status.message, self._session.node.now())}") from None
+                raise Lost(why_offline(status.message, self._session.node.now())) from None
             raise
 
     @property
@@ -162,11 +162,8 @@ class Device:
             self._session.wait_for(lambda: not self.state.armed, PATIENCE)
         answer = self._session.call(DEVICE_CONFIGURE, ConfigureRequest(), TO_CONFIGURE)
         if not answer.accepted:
-            again = "; the drivers are off now: arm.device.arm()" if state.armed else ""
-            raise Refused(
-                f"the device refused the configuration: {answer.reason}{again}", check="configuration",
-                reason=answer.why or answer.reason,
-            )  # fmt: skip
+            why, again = why_of(answer), (remedy("arm_again"),) if state.armed else ()
+            raise Refused(because("client.configuration.refused", why, *again), check="configuration", reason=why)
         if state.armed:
             self.arm()
         return answer.crc32
@@ -190,7 +187,8 @@ class Device:
         answer = self._session.call(DEVICE_INJECT, request, TO_ANSWER)
         self._session.changed()
         if not answer.accepted:
-            raise Refused(f"refused: {answer.reason}", check="device", reason=answer.why or answer.reason)
+            why = why_of(answer)
+            raise Refused(because("client.device.refused", why), check="device", reason=why)
 
     def command(self, wanted: DeviceCommand | StopKind, what: str = "") -> DeviceMode:
         """As `send`; the mode that the device answered with.
@@ -214,11 +212,11 @@ class Device:
             answer = self._session.call(DEVICE_COMMAND, DeviceCommandRequest(command=wanted), TO_ANSWER)
         self._session.changed()
         if not answer.accepted:
-            mode = f" (device mode {answer.mode.name})" if f"mode {answer.mode.name}" not in answer.reason else ""
-            check, mode = (answer.check, "") if answer.check else ("device", mode)
-            raise Refused(
-                f"{what} refused: {answer.reason}{mode}", check=check, subject=what, reason=answer.why or answer.reason
-            )
+            why = why_of(answer)
+            said = because("client.command.refused", why, what=what)
+            if not answer.check and not says_mode(why):
+                said = because("client.command.refused_in_mode", why, what=what, mode=answer.mode.name)
+            raise Refused(said, check=answer.check or "device", subject=what, reason=why)
         if isinstance(wanted, ArmCommand):
             lead = max(joint.driver.enable_lead_ms for joint in self._session.description.joints) * 1e-3
             self._session.wait_for(lambda: False, lead)
@@ -236,6 +234,11 @@ class Device:
             raise BadArgument(because("argument.inject.whole_device", kind=kind.value, target=target))
         if known is not None and target not in known:
             raise BadArgument(because("argument.inject.target", nearest(target, known), kind=kind.value, target=target))
+
+
+def says_mode(why: Reason) -> bool:
+    """True if the device's mode is in the reason, or in one behind it."""
+    return "mode" in why.values or any(says_mode(each) for each in why.causes)
 
 
 def fault_of(arm: ArmDescription, state: DeviceState) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from gemelo.api.arguments import Target
 from gemelo.schemas.actions import GoalStatusCode
@@ -22,6 +22,20 @@ if TYPE_CHECKING:
 def as_reason(text: Reason | str) -> Reason:
     """A sentence without a code is a reason too."""
     return text if isinstance(text, Reason) else plain(text)
+
+
+class Explaining(Protocol):
+    """An answer or a state of another part that says why not."""
+
+    @property
+    def reason(self) -> str: ...
+    @property
+    def why(self) -> Reason | None: ...
+
+
+def why_of(answer: Explaining) -> Reason:
+    """Why not; of an older part, which sends no data, its sentence."""
+    return answer.why or plain(answer.reason)
 
 
 def reason_of(error: Exception | None) -> Reason:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from gemelo.api.arguments import Grip
-from gemelo.api.errors import Aborted, BadArgument, Canceled, Interrupted, Lost, Refused, reason_of
+from gemelo.api.errors import Aborted, BadArgument, Canceled, Interrupted, Lost, Refused, reason_of, why_of
 from gemelo.api.motion import check_of, why_ended
 from gemelo.api.scene import Scene
 from gemelo.api.session import Session
@@ -108,7 +108,8 @@ class Gripping:
         request = InjectRequest(kind=InjectKind.OBJECT, value=width if width > position else 0.0)
         answer = self._session.call(DEVICE_INJECT, request, TO_ANSWER)
         if not answer.accepted and width <= position:
-            raise Refused(f"refused: {answer.reason}", check="device", reason=answer.why or answer.reason)
+            why = why_of(answer)
+            raise Refused(because("client.device.refused", why), check="device", reason=why)
 
     def _carried_out(
         self, goal: GripperCommandGoal, on_progress: OnGripping | None, is_cancelled: IsCancelled | None

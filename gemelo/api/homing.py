@@ -12,9 +12,9 @@ from gemelo.api.session import Session
 from gemelo.api.targets import require_joint
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
 from gemelo.schemas.device import DeviceCommand, DeviceEvent, DeviceMode, DeviceState, HomeCommand, StopKind
-from gemelo.schemas.device_faults import fault_text
-from gemelo.schemas.device_link import offline_text
-from gemelo.schemas.reasons import FrontEnd, Reason, because, plain, remedy, say
+from gemelo.schemas.device_faults import fault_reason
+from gemelo.schemas.device_link import why_not_usable, why_offline
+from gemelo.schemas.reasons import FrontEnd, Reason, because, remedy, say
 from gemelo.schemas.robot import HomingDirection
 from gemelo.schemas.topics import DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
 
@@ -82,7 +82,7 @@ class HomingWait:
             return
         self._mode = state.mode
         if state.fault:
-            self.why = plain(fault_text(state.fault, joint_name(self._arm, state.fault_joint)))
+            self.why = fault_reason(state.fault, joint_name(self._arm, state.fault_joint))
         velocity = dict(zip(state.name, state.velocity, strict=False))
         for joint in self.joints:
             if self.phases[joint.name] != HOME:
@@ -143,12 +143,12 @@ def _require_ready(session: Session) -> None:
     """Raises `Refused` with the remedy where homing cannot begin."""
     status = session.newest(DEVICE_STATUS)
     if not status.online:
-        reason = plain(f"the device is {offline_text(status, session.node.now())}")
+        reason = why_offline(status, session.node.now())
         raise Refused(because("homing.refused", reason), check="device", reason=reason)
     state = session.newest(DEVICE_STATE)
     if state.fault or state.mode in (DeviceMode.FAULT, DeviceMode.ESTOP):
-        about = fault_text(state.fault, joint_name(session.description, state.fault_joint))
-        why = because("homing.refused", plain(about)) if about else because("homing.mode", mode=state.mode.name)
+        fault = fault_reason(state.fault, joint_name(session.description, state.fault_joint))
+        why = because("homing.refused", fault) if fault else because("homing.mode", mode=state.mode.name)
         raise Refused(why, check="device", remedy="arm.device.reset()")
     if not state.armed:
         why = because("homing.drivers_off", remedy("arm_then_home"))
@@ -220,7 +220,7 @@ class HomingEnd:
         elapsed = self._node.monotonic() - self._began
         status = self._status.message
         if status is not None and not status.online and self._state.age() > OFFLINE:
-            return because("homing.offline", reason=status.reason)
+            return because("homing.offline", why_not_usable(status, self._node.now()))
         if self._state.age() > BRAKING:
             return because("homing.silent", remedy("look_at_device"))
         if not self._homing.has_begun and elapsed > TO_BEGIN:

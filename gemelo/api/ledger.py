@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from gemelo.api.errors import BadArgument, Refused
+from gemelo.api.errors import BadArgument, Refused, why_of
 from gemelo.api.session import Session
 from gemelo.schemas.ledger import StepLedger, VerifiedBy
 from gemelo.schemas.reasons import because
@@ -94,15 +94,15 @@ class Requirement:
             return
         ledger = self._session.newest(STEP_LEDGER)
         if ledger.arm_confidence < self.level:
+            why, sure = why_of(ledger), ledger.arm_confidence
             raise Refused(
-                f"refused: it is {_percent(ledger.arm_confidence)} sure that no step is lost, "
-                f"{_percent(self.level)} are required: {ledger.reason}",
+                because("client.confidence", why, value=_rounded_down(sure), limit=self.level),
                 check="confidence",
                 subject=ledger.doubtful,
                 value=ledger.arm_confidence,
                 limit=self.level,
                 remedy="arm.verify()" if not ledger.open_loop else "",
-                reason=ledger.why or ledger.reason,
+                reason=why,
             )
 
     @contextmanager
@@ -115,6 +115,6 @@ class Requirement:
             self.level = level
 
 
-def _percent(share: float) -> str:
-    """Rounded down: what is not reached must not read as if it were."""
-    return f"{int(share * 1000.0) / 10.0:g} %"
+def _rounded_down(share: float) -> float:
+    """To a tenth of a per cent: what is not reached must not read as if it were."""
+    return int(share * 1000.0) / 1000.0

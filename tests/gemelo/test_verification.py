@@ -85,7 +85,7 @@ class Told:
 def test_a_confidence_that_is_too_low_refuses_with_joint_value_limit_and_remedy() -> None:
     requirement = Requirement(Told(LEDGER))  # type: ignore[arg-type]
     requirement.require(0.85)
-    with pytest.raises(gemelo.Refused, match=r"89\.1 % sure .* 95 % are required: joint \"b\"") as refused:
+    with pytest.raises(gemelo.Refused, match=r"89\.1 % sure .* 95\.0 % are required: joint \"b\"") as refused:
         requirement.require(0.95)
     found = refused.value
     assert (found.check, found.subject, found.value, found.limit) == ("confidence", "b", 0.891, 0.95)

@@ -1,4 +1,4 @@
-"""Spanish of the sentences about the device and control that have no code yet.
+"""Spanish of the sentences about the device that have no code yet.
 
 A key is the sentence as it is sent; `sentences.py` says how it is found.
 """
@@ -10,10 +10,5 @@ GATEWAY: dict[str, str] = {
     "{robot} has no gripper: write a [gripper] into its robot.toml": "{robot} no tiene pinza: escriba un [gripper] en "
     "su robot.toml.",
     "{name} was asked for after it: ask again": "Después se pidió {name}: pídalo otra vez.",
-    "the device refused the configuration: {reason}": "El equipo rechazó la configuración: {reason}",
     "all joints are home": "todas las articulaciones están en su origen.",
-    "refused: this connection does not hold control: nothing to give back": "Esta página no tiene el mando: no hay "
-    "nada que devolver.",
-    "refused: this connection has lost control of the arm, and {now}: {how} anew": "Esta página perdió el mando del "
-    "brazo ({now}): tómelo otra vez.",
 }
