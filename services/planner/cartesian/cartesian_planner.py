@@ -25,6 +25,7 @@ from gemelo.services.planner.request.refusals import (
     PlanRefused,
     near_pairs,
     not_verified,
+    objects_in,
     refusal_of,
     without_remedies,
 )
@@ -204,8 +205,7 @@ class CartesianPlanner:
 
     def _touches(self, configuration: Array, margin: float) -> StopReason:
         pairs = self._checker.pairs_within(configuration, DEEPER * margin + 1e-9) or [("?", "?")]
-        distance, links = self._checker.distance(configuration), self._arm.model.link_names
-        objects = {name: "object" for pair in pairs for name in pair if name not in links}
+        distance, objects = self._checker.distance(configuration), objects_in(pairs, self._arm.model.link_names)
         touching = near_pairs(pairs, objects, margin, None)
         why = because("plan.tool.touches", *touching, remedy("make_room"), remedy("go_around"))
         return StopReason("collision", " / ".join(pairs[0]), distance, margin, why)

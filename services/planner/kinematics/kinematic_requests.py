@@ -28,7 +28,14 @@ from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.kinematics.goals import INVALID, Goals, Start
 from gemelo.services.planner.kinematics.pose_goals import FARTHEST
 from gemelo.services.planner.request.deadline import NEVER, Deadline
-from gemelo.services.planner.request.refusals import PlanRefused, beyond_limit, in_collision, malformed, unknown_name
+from gemelo.services.planner.request.refusals import (
+    PlanRefused,
+    beyond_limit,
+    in_collision,
+    malformed,
+    objects_in,
+    unknown_name,
+)
 from gemelo.services.planner.request.start_state import require_parallel, resolve_start
 
 # Tuning constants: chosen, where a line does not say measured or standard.
@@ -59,7 +66,7 @@ class KinematicRequests:
             near = self._standing(request.near, present, age)
             configurations = list(islice(self._goals.candidates(request.goal, near, deadline), LOOKED_THROUGH))
             if request.avoid_collisions:
-                configurations = _free(configurations, checker or self._kinematics.collisions)
+                configurations = self._free(configurations, checker or self._kinematics.collisions)
         except PlanRefused as refused:
             return IkResponse(code=refused.code, refusal=refused.refusal)
         solutions = (
@@ -135,6 +142,19 @@ class KinematicRequests:
             contacts[0].distance,
         )
 
+    def _free(self, configurations: list[Start], checker: DistanceChecker) -> list[Start]:
+        """Those that touch nothing; raises `PlanRefused` where all do."""
+        clearance = checker.clearance
+        free = [configuration for configuration in configurations if checker.distance(configuration) > clearance]
+        if free:
+            return free
+        where = "ik.collision.every" if len(configurations) > 1 else "ik.collision.only"
+        would_do = remedy("other_pose"), remedy("touching_too")
+        pairs, near = checker.pairs_within(configurations[0], clearance), checker.distance(configurations[0])
+        objects = objects_in(pairs, self._arm.model.link_names)
+        code = PlanCode.GOAL_IN_COLLISION
+        raise in_collision(code, where, pairs, clearance, (), would_do, objects=objects, distance=near)
+
     def _standing(self, given: JointState | None, present: JointState | None, age: float) -> Start:
         """Where distances are measured from; that the arm moves does not matter."""
         return resolve_start(self._arm, _at_rest(given), _at_rest(present), age)
@@ -153,18 +173,6 @@ class KinematicRequests:
             return tuple(given[name] for name in self._arm.joint_names)
         standing = self._standing(None, present, age)
         return tuple(given.get(name, value) for name, value in zip(self._arm.joint_names, standing, strict=True))
-
-
-def _free(configurations: list[Start], checker: DistanceChecker) -> list[Start]:
-    """Those that touch nothing; raises `PlanRefused` where all do."""
-    free = [configuration for configuration in configurations if checker.distance(configuration) > checker.clearance]
-    if free:
-        return free
-    where = "ik.collision.every" if len(configurations) > 1 else "ik.collision.only"
-    would_do = remedy("other_pose"), remedy("touching_too")
-    pairs, near = checker.pairs_within(configurations[0], checker.clearance), checker.distance(configurations[0])
-    code, clearance = PlanCode.GOAL_IN_COLLISION, checker.clearance
-    raise in_collision(code, where, pairs, clearance, (), would_do, distance=near)
 
 
 def _at_rest(state: JointState | None) -> JointState | None:

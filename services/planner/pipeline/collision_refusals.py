@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.arm.model.jaws import JAWS
 from gemelo.schemas.message import Vector
 from gemelo.schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
 from gemelo.schemas.reasons import Remedy, remedy
@@ -138,7 +139,8 @@ class CollisionRefusals:
     def _remedies(self, start: Start) -> list[Remedy]:
         """What a person can do for an arm that touches something, besides moving it."""
         world = self._checker.world
-        touched = [name for pair in world.pairs_within(start) for name in pair if name in world.objects]
+        objects = world.objects.keys() - set(JAWS)  # which are the gripper's, and stay
+        touched = [name for pair in world.pairs_within(start) for name in pair if name in objects]
         carried = [shown.name for shown in world.scene.objects if shown.attached and shown.name in touched]
         if carried:
             return [remedy("touch_links", object=carried[0]), remedy("let_go", object=carried[0])]

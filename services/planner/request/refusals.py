@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from enum import StrEnum
 
 from gemelo.libraries.arm.errors import nearest_name
@@ -213,6 +213,11 @@ def in_collision(
     check = "self-collision" if is_own else "collision"
     refusal = refusal_of(why, check, " / ".join(pairs[0]), distance, margin, nearest, configuration)
     return PlanRefused(code, refusal)
+
+
+def objects_in(pairs: Iterable[tuple[str, str]], links: Container[str]) -> dict[str, str]:
+    """What is no link, where nothing is known of its kind."""
+    return {name: "object" for pair in pairs for name in pair if name not in links}
 
 
 def near_pairs(
