@@ -7,6 +7,8 @@ import tomllib
 from collections import Counter
 from collections.abc import Mapping
 
+import msgspec
+
 from gemelo.schemas.reasons import Reason, because
 
 Where = tuple[str | int, ...]  # keys, and indices of arrays
@@ -33,6 +35,25 @@ def syntax_mistake(error: tomllib.TOMLDecodeError, text: str) -> tuple[int, Reas
         return text.rstrip().count("\n") + 1, because("file.toml.end", problem=problem)
     problem = str(error)[: at.start()]
     return int(at[1]), because("file.toml.syntax", problem=problem, column=int(at[2]))
+
+
+def type_mistake(error: msgspec.ValidationError, text: str) -> tuple[int, Reason]:
+    """The line of the key that a wrong type or a value out of bounds stands at, 0 where it is not found, and what is
+    wrong."""
+    problem, _, at = str(error).partition(" - at ")
+    key = at.strip("`").removeprefix("$").removeprefix(".")
+    words = re.findall(r"\w+", key)
+    place = tuple(int(word) if word.isdecimal() else word for word in words)
+    line = nearest_line(toml_lines(text), place) if words else 0
+    if found := re.fullmatch(r"Expected `(.+)`, got `(.+)`", problem):
+        return line, because("file.value.type", key=key, expected=found[1], given=found[2])
+    if found := re.fullmatch(r"Expected `(.+?)` (.+)", problem):
+        return line, because("file.value.bound", key=key, expected=found[1], bound=found[2])
+    if found := re.fullmatch(r"Object missing required field `(.+)`", problem):
+        return line, because("file.value.missing", key=key, field=found[1])
+    if found := re.fullmatch(r"Invalid enum value (.+)", problem):
+        return line, because("file.value.enum", key=key, value=found[1])
+    return line, because("file.value.wrong", key=key, problem=problem)
 
 
 class _Scanner:

@@ -26,6 +26,7 @@ from gemelo.libraries.credentials.common_name import common_name
 from gemelo.libraries.credentials.expiry import CERTIFICATE, days_left, expiry
 from gemelo.libraries.credentials.keys import new_key, private_pem
 from gemelo.libraries.credentials.private_files import AccessError, write
+from gemelo.schemas.reasons import because
 
 DAYS = 3650  # of the authority and of what it signs
 FORMER, VOUCHER = "former.pem", "voucher.pem"  # beside the authority's certificate
@@ -39,8 +40,7 @@ class Authority:
         self._former, self._voucher = certificate.with_name(FORMER), certificate.with_name(VOUCHER)
         if certificate.exists() != key.exists():  # another one would end every link of those who trust this one
             has, lacks = (certificate, key) if certificate.exists() else (key, certificate)
-            anew = f"delete {has} to begin with another authority, whose files everybody must then get at once"
-            raise AccessError(f"{lacks} is missing beside {has.name}: bring it back; or {anew}")
+            raise AccessError(because("certificate.authority.half", lacks=str(lacks), has=str(has)))
         if not certificate.exists():
             own = new_key()
             write(key, private_pem(own))
@@ -62,7 +62,7 @@ class Authority:
         Raises `AccessError` while an earlier one is trusted.
         """
         if self.has_former:
-            raise AccessError("an authority before this one is still trusted: retire that one before this is renewed")
+            raise AccessError(because("certificate.authority.former"))
         own = new_key()
         certificate = _self_signed(own)
         left = max(1, math.ceil(days_left(expiry(self._certificate))))
@@ -75,7 +75,7 @@ class Authority:
     def retire(self) -> None:
         """The former authority is trusted no more; raises `AccessError` if there is none."""
         if not self.has_former:
-            raise AccessError("no former authority is trusted: there is nothing to retire")
+            raise AccessError(because("certificate.authority.no_former"))
         self._former.unlink()
         self._voucher.unlink()
 
@@ -108,7 +108,7 @@ class Authority:
         try:
             return x509.load_pem_x509_certificate(self._certificate.read_bytes())
         except ValueError:
-            raise AccessError(f"{self._certificate} holds no certificate in PEM: bring it back") from None
+            raise AccessError(because("certificate.authority.none", file=str(self._certificate))) from None
 
     @property
     def _own_key(self) -> ec.EllipticCurvePrivateKey:
@@ -117,7 +117,7 @@ class Authority:
         except (ValueError, TypeError):
             key = None
         if not isinstance(key, ec.EllipticCurvePrivateKey):
-            raise AccessError(f"{self._key} holds no private key of P-256 in PEM: bring it back")
+            raise AccessError(because("certificate.authority.no_key", file=str(self._key)))
         return key
 
     @property
@@ -203,7 +203,7 @@ def _subject(name: str, unit: str = "") -> x509.Name:
         parts = [(NameOID.ORGANIZATIONAL_UNIT_NAME, unit)] if unit else []
         return x509.Name([x509.NameAttribute(*part) for part in (*parts, (NameOID.COMMON_NAME, name))])
     except ValueError as error:
-        raise AccessError(f'"{name}" cannot be the name in a certificate: {error}') from None
+        raise AccessError(because("certificate.name", name=name, error=str(error))) from None
 
 
 def _pem(certificate: x509.Certificate) -> str:
@@ -223,5 +223,5 @@ def _alternative_name(host: str) -> x509.GeneralName:
     except ValueError:
         pass
     if not host or not all(part.replace("-", "").isalnum() and part.isascii() for part in host.split(".")):
-        raise AccessError(f'"{host}" is neither a host name nor an IP address: give what clients connect to')
+        raise AccessError(because("certificate.host", host=host))
     return x509.DNSName(host)

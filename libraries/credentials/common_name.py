@@ -6,7 +6,8 @@ from binascii import a2b_base64
 from pathlib import Path
 
 from gemelo.libraries.credentials.expiry import CERTIFICATE, VERSION, elements
-from gemelo.libraries.credentials.private_files import AccessError
+from gemelo.libraries.credentials.private_files import AccessError, unreadable
+from gemelo.schemas.reasons import because
 
 COMMON_NAME = b"\x55\x04\x03"  # 2.5.4.3
 
@@ -17,9 +18,9 @@ def common_name(file: Path) -> str:
         found = CERTIFICATE.search(file.read_text(encoding="ascii"))
         return _common_name(a2b_base64(found[1])) if found else ""
     except OSError as error:
-        raise AccessError(f"cannot read {file}: {error.strerror}") from None
+        raise unreadable(file, error) from None
     except (ValueError, IndexError, StopIteration):
-        raise AccessError(f"{file} holds no certificate in PEM: `gemelo deploy keys` makes it") from None
+        raise AccessError(because("certificate.none", file=str(file))) from None
 
 
 def _common_name(der: bytes) -> str:

@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from gemelo.libraries.credentials.private_files import AccessError
+from gemelo.libraries.credentials.private_files import AccessError, unreadable
+from gemelo.schemas.reasons import because
 
 DAY = 86_400.0  # [s]
 WARN_WITHIN = 30.0  # [days] before its end a certificate is spoken of, and `gemelo deploy keys` renews it
@@ -31,11 +32,11 @@ def expiries(file: Path) -> tuple[float, ...]:
     try:
         found = tuple(map(_expiry_of_pem, CERTIFICATE.findall(file.read_text(encoding="ascii"))))
     except OSError as error:
-        raise AccessError(f"cannot read {file}: {error.strerror}") from None
+        raise unreadable(file, error) from None
     except ValueError:
         found = ()
     if not found:
-        raise AccessError(f"{file} holds no certificate in PEM: `gemelo deploy keys` makes it")
+        raise AccessError(because("certificate.none", file=str(file)))
     return found
 
 

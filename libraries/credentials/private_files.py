@@ -7,10 +7,16 @@ import stat
 from pathlib import Path
 
 from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.reasons import because
 
 
 class AccessError(ConfigurationError):
     """A broker or router that cannot be joined for what a file says; the text names the key or file and the remedy."""
+
+
+def unreadable(file: str | Path, error: OSError) -> AccessError:
+    """The error of a file that the system does not read."""
+    return AccessError(because("certificate.unreadable", file=str(file), error=error.strerror or str(error)))
 
 
 def require_private(path: str) -> None:
@@ -18,9 +24,9 @@ def require_private(path: str) -> None:
     try:
         mode = stat.S_IMODE(os.stat(path).st_mode)
     except OSError as error:
-        raise AccessError(f"cannot read {path}: {error.strerror}") from None
+        raise unreadable(path, error) from None
     if mode & 0o077:
-        raise AccessError(f"{path} has mode {mode:03o}, so others can read the secret in it: chmod 600 {path}")
+        raise AccessError(because("certificate.mode", file=str(path), mode=f"{mode:03o}"))
 
 
 def write(path: Path, text: str) -> None:

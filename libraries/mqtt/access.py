@@ -13,6 +13,7 @@ from pathlib import Path
 
 from gemelo.libraries.credentials.private_files import AccessError, require_private
 from gemelo.schemas.deployment import Broker, MqttSection
+from gemelo.schemas.reasons import because
 
 PASSWORD, DEVICE_PASSWORD = "GEMELO_MQTT_PASSWORD", "GEMELO_MQTT_DEVICE_PASSWORD"  # in the environment
 GATEWAY = "gateway"  # its user name, where `gemelo broker secure` names it
@@ -32,8 +33,13 @@ class BrokerAccess:
     has_certificate: bool = False  # of our own
     is_ours: bool = False  # the process `broker`
 
+    @property
+    def place(self) -> str:
+        """Host and port."""
+        return f"{self.host}:{self.port}"
+
     def __str__(self) -> str:
-        return f"the MQTT broker at {self.host}:{self.port}"
+        return f"the MQTT broker at {self.place}"
 
 
 def gateway_access(section: MqttSection, environ: Mapping[str, str] | None = None) -> BrokerAccess:
@@ -62,22 +68,19 @@ def read_secret(path: str) -> str:
         with open(path, encoding="utf-8") as file:
             secret = file.readline().rstrip("\r\n")
     except (OSError, UnicodeDecodeError) as error:
-        raise AccessError(f"cannot read the password in {path}: {error}") from None
+        raise AccessError(because("broker.password.unreadable", file=path, error=str(error))) from None
     if not secret:
-        raise AccessError(f"{path} holds no password in its first line")
+        raise AccessError(because("broker.password.none", file=path))
     return secret
 
 
 def _require_consistent(section: MqttSection) -> None:
     if section.broker is not Broker.EXTERNAL and (section.tls or section.user) and not section.secure_folder:
-        raise AccessError(
-            'mqtt.user and mqtt.tls are for mqtt.broker = "external": the broker that gemelo starts gets its '
-            "users and TLS from mqtt.secure_folder, which `gemelo broker secure` writes"
-        )
+        raise AccessError(because("broker.section.own"))
     if not section.tls and not section.secure_folder and (section.ca or section.certificate or section.key):
-        raise AccessError("mqtt.ca, mqtt.certificate and mqtt.key are for TLS: set mqtt.tls = true too")
+        raise AccessError(because("broker.section.no_tls"))
     if section.key and not section.certificate:
-        raise AccessError("mqtt.key is the key of mqtt.certificate, which is not set")
+        raise AccessError(because("broker.section.key"))
 
 
 def _password(user: str, file: str, variable: str, environ: Mapping[str, str] | None) -> str:
@@ -111,9 +114,9 @@ def tls_context(authority: str = "", certificate: str = "", key: str = "") -> ss
     try:
         context = ssl.create_default_context(cafile=authority or None)
     except ssl.SSLError:
-        raise AccessError(f"mqtt.ca: {authority} holds no certificate in PEM") from None
+        raise AccessError(because("broker.ca.none", file=authority)) from None
     except OSError as error:
-        raise AccessError(f"mqtt.ca: cannot read {authority}: {error.strerror}") from None
+        raise AccessError(because("broker.ca.unreadable", file=authority, error=error.strerror or str(error))) from None
     if certificate:
         _show_ourselves(context, certificate, key)
     return context
@@ -123,9 +126,9 @@ def _show_ourselves(context: ssl.SSLContext, certificate: str, key: str) -> None
     require_private(key or certificate)
 
     def refuse() -> str:  # instead of asking on the terminal of a service
-        raise AccessError(f"mqtt.key: {key or certificate} is encrypted: take its password away and keep its mode 600")
+        raise AccessError(because("broker.key.encrypted", file=key or certificate))
 
     try:
         context.load_cert_chain(certificate, key or None, password=refuse)
     except (ssl.SSLError, OSError) as error:
-        raise AccessError(f"mqtt.certificate: {certificate} and its key cannot be used: {error}") from None
+        raise AccessError(because("broker.certificate.unusable", file=certificate, error=str(error))) from None

@@ -1,4 +1,4 @@
-"""One attempt to join a broker, and its problem as a sentence."""
+"""One attempt to join a broker, and why it fails."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from paho.mqtt import client as paho
 from gemelo.libraries.mqtt.access import BrokerAccess
 from gemelo.libraries.mqtt.client import OLD_BROKER, MqttClient, code_of, is_failure
 from gemelo.libraries.mqtt.failures import failure, refusal, silence
+from gemelo.schemas.reasons import Reason, because
 
 PATIENCE = 3.0  # [s] for an answer to CONNECT
 
 
-def problem(access: BrokerAccess) -> str:
-    """Why the broker does not let us in, as a sentence with its remedy; empty if it does."""
-    answers: queue.SimpleQueue[str] = queue.SimpleQueue()
+def problem(access: BrokerAccess) -> Reason | None:
+    """Why the broker does not let us in; None if it does."""
+    answers: queue.SimpleQueue[Reason | None] = queue.SimpleQueue()
     client = MqttClient(access, f"gemelo-check-{secrets.token_hex(6)}")
 
     def on_connect(_client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
         is_no = is_failure(reason) and code_of(reason) != OLD_BROKER
-        answers.put(refusal(code_of(reason), str(reason), access) if is_no else "")
+        answers.put(refusal(code_of(reason), str(reason), access) if is_no else None)
 
     def on_disconnect(*_: object) -> None:
         answers.put(failure(client.failure, access) if client.failure else silence(access))
@@ -36,7 +37,7 @@ def problem(access: BrokerAccess) -> str:
     try:
         return answers.get(timeout=PATIENCE)
     except queue.Empty:
-        return f"{access} takes the connection and does not answer in {PATIENCE:g} s: is it a broker?"
+        return because("broker.no_answer", broker=access.place, time=PATIENCE)
     finally:
         with contextlib.suppress(OSError, ValueError):
             client.disconnect()

@@ -1,4 +1,4 @@
-"""The sentence with the remedy for every failure to join a broker: network, TLS, password or ACL."""
+"""The reason for every failure to join a broker: network, TLS, password or ACL."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import socket
 import ssl
 
 from gemelo.libraries.mqtt.access import BrokerAccess
+from gemelo.schemas.reasons import Reason, because
 
 # X509_V_ERR_* of OpenSSL's x509_vfy.h.
 NOT_YET_VALID, EXPIRED, OTHER_NAME, OTHER_ADDRESS = 9, 10, 62, 64
@@ -22,50 +23,46 @@ WANTS_CERTIFICATE = ("CERTIFICATE_REQUIRED", "HANDSHAKE_FAILURE", "UNKNOWN_CA", 
 NOT_AUTHORISED = (4, 5, 134, 135)  # CONNACK of MQTT 3.1.1 and 5
 
 
-def failure(error: OSError, access: BrokerAccess) -> str:
-    """The sentence for a connection that could not be made, or broke before the broker had answered."""
+def failure(error: OSError, access: BrokerAccess) -> Reason:
+    """The reason for a connection that could not be made, or broke before the broker had answered."""
     match error:
         case ssl.SSLCertVerificationError():
             return _untrusted(error, access)
         case ssl.SSLError() if not isinstance(error, ssl.SSLEOFError):
             return _tls_failure(error, access)
         case socket.gaierror():
-            return f'no machine is called "{access.host}" here: check the name, or give the broker\'s IP address'
+            return because("broker.no_host", host=access.host)
     if error.errno in (errno.EMFILE, errno.ENFILE):
-        return f"no connection to {access}: no descriptor is left for one (`ulimit -n`); it is tried again"
+        return because("broker.no_descriptor", broker=access.place)
     if access.tls is not None and isinstance(error, (ssl.SSLEOFError, ConnectionResetError, BrokenPipeError)):
-        return f"{access} broke off the TLS handshake: is it the port for TLS (mostly 8883)?"
-    return f"no MQTT broker answers at {access.host}:{access.port} ({error}): {_is_it_there(access)}"
+        return because("broker.tls.broke_off", broker=access.place)
+    where = {"broker": access.place, "error": str(error)}
+    return because("broker.none.own", **where) if access.is_ours else because("broker.none", **where)
 
 
-def refusal(code: int, words: str, access: BrokerAccess) -> str:
-    """The sentence for a broker that has answered, and refuses; `code` and `words` of its CONNACK."""
+def refusal(code: int, words: str, access: BrokerAccess) -> Reason:
+    """The reason for a broker that has answered, and refuses; `code` and `words` of its CONNACK."""
     if code not in NOT_AUTHORISED:
-        return f"{access} refuses us: {words}"
+        return because("broker.refuses", broker=access.place, words=words)
     if not access.user:
-        return f"{access} lets nobody in without a user and a password: set mqtt.user and mqtt.password_file"
-    return (
-        f'{access} refuses user "{access.user}" ({words}): the password is wrong, or it does not know this user or '
-        "denies it its last will; check the broker's users and ACL"
-    )
+        return because("broker.user.none", broker=access.place)
+    return because("broker.user.refused", broker=access.place, user=access.user, words=words)
 
 
-def silence(access: BrokerAccess) -> str:
-    """The sentence for a connection that the broker has closed without an answer."""
+def silence(access: BrokerAccess) -> Reason:
+    """The reason for a connection that the broker has closed without an answer."""
     if access.tls is None:
-        return f"{access} closed the connection without an answer: does that port want TLS (mqtt.tls = true)?"
+        return because("broker.closed.tls", broker=access.place)
     if access.has_certificate:
-        return f"{access} closed the connection without an answer: does it know the authority of mqtt.certificate?"
-    return (
-        f"{access} closed the connection without an answer: does it want a certificate of ours (mqtt.certificate, "
-        "mqtt.key)?"
-    )
+        return because("broker.closed.authority", broker=access.place)
+    return because("broker.closed.certificate", broker=access.place)
 
 
-def denial(topic: str, access: BrokerAccess, verb: str = "write") -> str:
-    """The sentence for an ACL that denies."""
-    who = f'user "{access.user}"' if access.user else "anybody without a user"
-    return f"{access} does not let {who} {verb} {topic}: its ACL must allow it"
+def denial(topic: str, access: BrokerAccess, verb: str = "write") -> Reason:
+    """The reason for an ACL that denies; `verb` is write or read."""
+    if access.user:
+        return because("broker.acl.user", broker=access.place, user=access.user, verb=verb, topic=topic)
+    return because("broker.acl.anybody", broker=access.place, verb=verb, topic=topic)
 
 
 def needs_a_person(error: OSError) -> bool:
@@ -73,37 +70,27 @@ def needs_a_person(error: OSError) -> bool:
     return isinstance(error, (ssl.SSLError, socket.gaierror))
 
 
-def _is_it_there(access: BrokerAccess) -> str:
-    if access.is_ours:
-        return "is the process `broker` running?"
-    return "does it run, and are its address and port right (mqtt.host, mqtt.port)?"
-
-
-def _untrusted(error: ssl.SSLCertVerificationError, access: BrokerAccess) -> str:
-    start = f"the certificate of {access}"
+def _untrusted(error: ssl.SSLCertVerificationError, access: BrokerAccess) -> Reason:
     match error.verify_code:
         case code if code == EXPIRED:
-            return f"{start} has expired: renew it (`gemelo broker secure` does for its own), or set this clock right"
+            return because("broker.tls.expired", broker=access.place)
         case code if code == NOT_YET_VALID:
-            return f"{start} is not valid yet: set this machine's clock right, or the broker's and make another"
+            return because("broker.tls.not_yet_valid", broker=access.place)
         case code if code in (OTHER_NAME, OTHER_ADDRESS):
-            return (
-                f'{start} is for another name than "{access.host}": connect by a name that is in it, or make another '
-                f"(`gemelo broker secure --host {access.host}` does)"
-            )
+            return because("broker.tls.other_name", broker=access.place, host=access.host)
         case code if code in UNKNOWN_AUTHORITY:
-            trusted = (
-                f"the authority in {access.authority}" if access.authority else "an authority that this system knows"
-            )
-            return f"{start} is not signed by {trusted}: set mqtt.ca to the certificate of the authority that signed it"
-    return f"{start} is not believed: {error.verify_message}"
+            if access.authority:
+                return because("broker.tls.other_authority", broker=access.place, authority=access.authority)
+            return because("broker.tls.unknown_authority", broker=access.place)
+    return because("broker.tls.not_believed", broker=access.place, problem=error.verify_message)
 
 
-def _tls_failure(error: ssl.SSLError, access: BrokerAccess) -> str:
+def _tls_failure(error: ssl.SSLError, access: BrokerAccess) -> Reason:
     reason = error.reason or ""
     if reason in NO_TLS:
-        return f"what answers at {access.host}:{access.port} does not speak TLS: is it the port for TLS (mostly 8883)?"
+        return because("broker.tls.none", broker=access.place)
     if any(word in reason for word in WANTS_CERTIFICATE):
-        known = "does not believe mqtt.certificate" if access.has_certificate else "wants a certificate of ours"
-        return f"{access} {known} ({reason}): set mqtt.certificate and mqtt.key to one that its authority has signed"
-    return f"TLS with {access} failed: {reason or error}"
+        if access.has_certificate:
+            return because("broker.tls.ours_not_believed", broker=access.place, problem=reason)
+        return because("broker.tls.ours_wanted", broker=access.place, problem=reason)
+    return because("broker.tls.failed", broker=access.place, problem=reason or str(error))

@@ -17,6 +17,7 @@ from gemelo.libraries.credentials.authority import DAYS, Authority
 from gemelo.libraries.credentials.private_files import AccessError, write
 from gemelo.libraries.mqtt.access import AUTHORITY, GATEWAY, read_secret
 from gemelo.schemas.device_topics import FROM_DEVICE, TO_DEVICE, topic
+from gemelo.schemas.reasons import because
 
 ACL, USERS, CERTIFICATE, KEY = "acl", "users", "server.pem", "server.key"
 SALT, HASH, ITERATIONS = 12, 64, 10_000  # [bytes], [bytes]; of mosquitto's "$7$": PBKDF2 with SHA-512
@@ -80,7 +81,7 @@ def require_made(folder: Path) -> Path:
     """The folder itself; raises `AccessError` if it was never made."""
     missing = [name for name in (AUTHORITY, CERTIFICATE, KEY, USERS, ACL) if not (folder / name).is_file()]
     if missing:
-        raise AccessError(f"mqtt.secure_folder: {folder} has no {missing[0]}: `gemelo broker secure` makes it")
+        raise AccessError(because("broker.folder.incomplete", folder=str(folder), file=missing[0]))
     return folder
 
 
@@ -137,8 +138,5 @@ def _password(folder: Path, user: str) -> str:
 def _require_name(device: str) -> str:
     plain = device.replace("_", "").replace("-", "")
     if device == GATEWAY or not plain.isalnum() or not plain.isascii() or len(device) > LONGEST_NAME:
-        raise AccessError(
-            f'"{device}" cannot be the name of a device: 1 to {LONGEST_NAME} letters, digits, "_" or "-", and not '
-            f'"{GATEWAY}", which is the gateway\'s user'
-        )
+        raise AccessError(because("broker.device.name", name=device, limit=LONGEST_NAME, gateway=GATEWAY))
     return device

@@ -15,8 +15,10 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from gemelo.libraries.toml_lines import syntax_mistake, type_mistake
 from gemelo.schemas.deployment import Deployment, DeploymentRecord
 from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.schemas.text_file import NotUtf8, read_text
 
 DEFAULT_FILE = "deploy/local.toml"
@@ -35,10 +37,10 @@ HOME = "GEMELO_HOME"  # the project's folder, for a process that is neither in i
 CONFIG = "GEMELO_CONFIG"  # names another file than DEFAULT_FILE
 ARMS = "arms"  # folder in `paths.run` with a deployment for each of several arms that `make up ARMS=...` started last
 REMEDIES = {
-    "router": "`gemelo deploy` gives router and nodes certificates (deploy/README.md)",
-    "mqtt": "`gemelo broker secure` gives it TLS (docs/my_broker.md)",
-    "panel": "Its page reaches another machine through ssh (ssh -L 8088:127.0.0.1:8088)",
-    "viewer": "Its pictures reach another machine through ssh (ssh -L 9876:127.0.0.1:9876)",
+    "router": "certificates_for_router",
+    "mqtt": "tls_for_broker",
+    "panel": "page_through_ssh",
+    "viewer": "viewer_through_ssh",
 }  # by section of the deployment
 
 S = TypeVar("S", bound=DeploymentRecord)
@@ -56,7 +58,7 @@ def project_root() -> Path:
                 return folder
     if home := os.environ.get(HOME):
         return Path(home)
-    raise DeploymentError(f"no {DEFAULT_FILE} above this program or the working directory: run it from the project")
+    raise DeploymentError(because("deployment.no_project", file=DEFAULT_FILE))
 
 
 def load_deployment(path: Path | None = None, environ: Mapping[str, str] | None = None) -> Deployment:
@@ -70,8 +72,12 @@ def load_deployment(path: Path | None = None, environ: Mapping[str, str] | None 
     try:
         deployment = msgspec.convert(raw, Deployment, strict=not sources)
     except msgspec.ValidationError as error:
-        said = f" (with {', '.join(sources)} from the environment)" if sources else ""
-        raise DeploymentError(f"{file}{said}: {error}{_choices(str(error))}") from error
+        known = _choices(str(error))
+        parts = (type_mistake(error, "")[1], *((remedy("known_are", names=known),) if known else ()))
+        if sources:
+            why = because("deployment.overridden", *parts, file=str(file), names=tuple(sources))
+            raise DeploymentError(why) from error
+        raise DeploymentError(because("file.wrong", *parts, file=str(file))) from error
     _require_no_nul(raw, file, ())
     return _with_absolute_paths(deployment, root)
 
@@ -88,7 +94,7 @@ def robot_name(deployment: Deployment) -> str:
     file = project_root() / deployment.robot / "robot.toml"
     name = _read(file).get("name")
     if not isinstance(name, str) or not name or "/" in name:
-        raise DeploymentError(f'{file}: key "name" must be a text without "/"')
+        raise DeploymentError(because("deployment.robot_name", file=str(file)))
     return name
 
 
@@ -111,19 +117,17 @@ def overriding(environ: Mapping[str, str]) -> list[str]:
     return _override({}, environ)
 
 
-def exposure(section: str, host: str, is_locked: bool, is_insecure: bool) -> str:
-    """What to say at the start of what listens on `host`: nothing where only this machine reaches it, or it is locked.
+def exposure(section: str, host: str, is_locked: bool, is_insecure: bool) -> Reason | None:
+    """What to say at the start of what listens on `host`: None where only this machine reaches it, or it is locked.
 
     Raises `DeploymentError` for an open port that other machines reach, unless the deployment says `insecure`.
     """
     if is_locked or is_loopback(host):
-        return ""
+        return None
     if not is_insecure:
-        raise DeploymentError(
-            f"[{section}] would listen on {host}, beyond this machine, without TLS: who reaches it could move the arm. "
-            f"{REMEDIES[section]}, or write insecure = true in [{section}] (GEMELO_{section.upper()}_INSECURE=true)"
-        )
-    return f"INSECURE: [{section}] listens on {host} without TLS (insecure = true): who reaches it can move the arm"
+        variable, mend = f"GEMELO_{section.upper()}_INSECURE", remedy(REMEDIES[section])
+        raise DeploymentError(because("deployment.exposed", mend, section=section, host=host, variable=variable))
+    return because("deployment.insecure", section=section, host=host)
 
 
 def is_loopback(host: str) -> bool:
@@ -142,12 +146,20 @@ def when_silent(host: str) -> str:
 
 
 def _read(file: Path) -> dict[str, Any]:
+    text = ""
     try:
-        return tomllib.loads(read_text(file))
+        text = read_text(file)
+        return tomllib.loads(text)
     except FileNotFoundError:
-        raise DeploymentError(f"{file}: there is no such file; name another with --config or GEMELO_CONFIG") from None
-    except (OSError, NotUtf8, tomllib.TOMLDecodeError) as error:
-        raise DeploymentError(f"{file}: {error}") from error
+        raise DeploymentError(because("deployment.none", file=str(file))) from None
+    except tomllib.TOMLDecodeError as error:
+        line, what = syntax_mistake(error, text)
+        raise DeploymentError(because("file.line", what, file=str(file), line=line)) from error
+    except NotUtf8 as error:
+        raise DeploymentError(because("file.wrong", error.reason, file=str(file))) from error
+    except OSError as error:
+        what = because("file.unreadable", error=error.strerror or str(error))
+        raise DeploymentError(because("file.wrong", what, file=str(file))) from error
 
 
 def _defaults() -> dict[str, Any]:
@@ -159,8 +171,8 @@ def _require_known(raw: dict[str, Any], known: dict[str, Any], file: Path, path:
         if key not in known:
             name = ".".join((*path, key))
             near = difflib.get_close_matches(key, known, n=1)
-            hint = f'did you mean "{near[0]}"?' if near else f"known here: {', '.join(known)}"
-            raise DeploymentError(f'{file}: unknown key "{name}": {hint}')
+            hint = remedy("did_you_mean", name=near[0]) if near else remedy("known_are", names=tuple(known))
+            raise DeploymentError(because("file.wrong", because("deployment.key", hint, key=name), file=str(file)))
         if key != "parameters" and isinstance(value, dict) and isinstance(known[key], dict):
             _require_known(value, known[key], file, (*path, key))
 
@@ -168,16 +180,17 @@ def _require_known(raw: dict[str, Any], known: dict[str, Any], file: Path, path:
 def _require_no_nul(value: object, file: Path, path: tuple[str, ...]) -> None:
     """Most texts here become a path or a host, and neither has a NUL in it."""
     if isinstance(value, str) and "\0" in value:
-        raise DeploymentError(f'{file}: key "{".".join(path)}" cannot be {value!r}: no path or host has a NUL in it')
+        what = because("deployment.nul", key=".".join(path), value=value)
+        raise DeploymentError(because("file.wrong", what, file=str(file)))
     for key, inner in value.items() if isinstance(value, dict) else ():
         _require_no_nul(inner, file, (*path, key))
 
 
-def _choices(error: str) -> str:
+def _choices(error: str) -> tuple[str, ...]:
     """The values that the key named in `error` can have, where it has only a few."""
     at = re.search(r"`\$\.(\w+)\.(\w+)`", error)
     default = getattr(getattr(Deployment(), at[1], None), at[2], None) if at else None
-    return f"; known are {', '.join(type(default))}" if isinstance(default, StrEnum) else ""
+    return tuple(map(str, type(default))) if isinstance(default, StrEnum) else ()
 
 
 def _override(raw: dict[str, Any], environ: Mapping[str, str]) -> list[str]:

@@ -18,8 +18,7 @@ from cryptography.hazmat.primitives.serialization import (
 from gemelo.libraries.credentials.keys import new_key, private_pem
 from gemelo.libraries.credentials.private_files import write
 from gemelo.schemas.errors import ConfigurationError
-
-NEW = "`gemelo device update --make-key` makes one"
+from gemelo.schemas.reasons import because, remedy
 
 
 class SignatureError(ConfigurationError):
@@ -29,9 +28,7 @@ class SignatureError(ConfigurationError):
 def make_key(private: Path, public: Path) -> None:
     """Makes a pair, PEM; the private key is for its owner alone. Raises SignatureError, also where one is there."""
     if private.exists():
-        raise SignatureError(
-            f"{private} is there already: devices that know its public key would take nothing signed by another one"
-        )
+        raise SignatureError(because("signature.key.exists", file=str(private)))
     private.parent.mkdir(parents=True, exist_ok=True)
     key = new_key()
     write(private, private_pem(key))
@@ -43,13 +40,12 @@ def sign(private: Path, data: bytes) -> bytes:
     try:
         key = load_pem_private_key(private.read_bytes(), None)
     except OSError as error:
-        raise SignatureError(f"cannot read {private}: {error.strerror}") from None
+        problem = error.strerror or str(error)
+        raise SignatureError(because("signature.key.unreadable", file=str(private), error=problem)) from None
     except (ValueError, TypeError, UnsupportedAlgorithm):
-        raise SignatureError(
-            f"{private} is no private key without a password: `gemelo device update` makes one"
-        ) from None
+        raise SignatureError(because("signature.key.none", file=str(private))) from None
     if not isinstance(key, EllipticCurvePrivateKey):
-        raise SignatureError(f"{private} is no key of the curve P-256; {NEW}")
+        raise SignatureError(because("signature.key.other", remedy("make_update_key"), file=str(private)))
     return key.sign(data, ECDSA(SHA256()))
 
 
@@ -58,7 +54,7 @@ def is_signed(public: str, digest: bytes, signature: bytes) -> bool:
     try:
         key = load_pem_public_key(public.encode())
     except (ValueError, UnsupportedAlgorithm):
-        raise SignatureError("its key for updates is no public key: provision --update-key over its cable") from None
+        raise SignatureError(because("signature.public.none")) from None
     if not isinstance(key, EllipticCurvePublicKey):
         return False
     try:

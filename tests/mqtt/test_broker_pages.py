@@ -12,6 +12,7 @@ from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt.access import BrokerAccess, read_secret, tls_context
 from gemelo.libraries.mqtt.failures import NO_TLS, WANTS_CERTIFICATE, denial, failure, refusal, silence
 from gemelo.libraries.runtime.deployment import load_deployment, project_root
+from gemelo.schemas.reasons import because, say
 from gemelo.services.stepper_gateway.device.session import DeviceSession
 from gemelo.services.stepper_gateway.moment import Moment
 
@@ -55,13 +56,16 @@ def said(tmp_path_factory) -> list[str]:
     wide.touch(mode=0o644)
     with pytest.raises(AccessError) as refused:
         read_secret(str(wide))
-    return [
+    reasons = [
         *(failure(error, access) for error in errors),
         refusal(135, "", access),
         refusal(135, "", BrokerAccess("h", 1)),
         denial("t", access),
         silence(BrokerAccess("h", 1)),
-        session.unreachable_reason(Moment(0, 1.0), 0.5),
+    ]
+    return [
+        *map(str, reasons),
+        str(session.unreachable_reason(Moment(0, 1.0), 0.5)),
         str(refused.value),
     ]
 
@@ -81,3 +85,22 @@ def test_both_pages_give_the_same_commands_and_settings():
     assert plain[0] == plain[1]
     commands = [re.findall(r"`gemelo [^`]*`", page.read_text().replace("\n", " ")) for page in PAGES]
     assert sorted(commands[0]) == sorted(commands[1])
+
+
+def test_every_trouble_has_a_code_with_the_broker_and_the_user():
+    access = BrokerAccess("h", 1, user="gateway", tls=tls_context(), authority="ca.pem")
+    open_door = BrokerAccess("h", 1)
+    assert [failure(unbelieved(code), access) for code in (10, 9, 20, 62)] == [
+        because("broker.tls.expired", broker="h:1"),
+        because("broker.tls.not_yet_valid", broker="h:1"),
+        because("broker.tls.other_authority", broker="h:1", authority="ca.pem"),
+        because("broker.tls.other_name", broker="h:1", host="h"),
+    ]
+    assert failure(tls_error(NO_TLS[0]), access) == because("broker.tls.none", broker="h:1")
+    assert refusal(135, "no", access) == because("broker.user.refused", broker="h:1", user="gateway", words="no")
+    assert refusal(5, "no", open_door) == because("broker.user.none", broker="h:1")
+    assert denial("t", access, "read") == because(
+        "broker.acl.user", broker="h:1", user="gateway", verb="read", topic="t"
+    )
+    assert silence(open_door) == because("broker.closed.tls", broker="h:1")
+    assert say(silence(open_door), "es").startswith("El broker MQTT de h:1 cerró la conexión sin responder")

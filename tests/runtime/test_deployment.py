@@ -83,7 +83,7 @@ def test_the_files_of_a_broker_are_relative_to_the_project_and_those_not_said_st
         ("[router]\nport = 'x'\n", {}, r"site.toml: .*int.*router\.port"),
         ("router = 5\n", {}, r"site.toml: .*object.*router"),
         ("[mqtt]\nbroker = 'emqx'\n", {}, r"site.toml: .*'emqx'.*mqtt\.broker"),
-        ("[router\n", {}, r"site.toml: .*line 1"),
+        ("[router\n", {}, r"site.toml, line 1: this is not TOML"),
         ('[paths]\nrun = "a\\u0000b"\n', {}, r'site.toml: key "paths.run" cannot be .* NUL'),
         ('robot = "a\\u0000b"\n', {}, r'site.toml: key "robot" cannot be .* NUL'),
         ('[parameters.logger]\nlog_dir = "\\u0000"\n', {}, r'key "parameters.logger.log_dir" cannot be .* NUL'),

@@ -10,6 +10,7 @@ import pytest
 
 from gemelo.libraries.runtime.bus.router import router_setup
 from gemelo.libraries.runtime.deployment import DeploymentError, exposure, is_loopback, load_deployment
+from gemelo.schemas.reasons import because, remedy
 from gemelo.tools.stack.start_check import exposed
 from tests.runtime.locks import Lock
 from tests.runtime.support import ROOT, free_port, until
@@ -28,15 +29,19 @@ def deployment_file(folder: Path, section: str, **settings: object) -> Path:
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.1", "::1", "[::1]", "localhost"])
 def test_loopback_needs_nothing(host):
     assert is_loopback(host)
-    assert exposure("router", host, is_locked=False, is_insecure=False) == ""
+    assert exposure("router", host, is_locked=False, is_insecure=False) is None
 
 
 @pytest.mark.parametrize("host", [OPEN, "::", "10.0.0.1", "lab.example", "", "localhost.example"])
 def test_any_other_address_without_tls_is_refused_with_the_remedy(host):
-    with pytest.raises(DeploymentError, match=r"write insecure = true in \[router\]"):
+    with pytest.raises(DeploymentError, match=r"write insecure = true in \[router\]") as caught:
         exposure("router", host, is_locked=False, is_insecure=False)
-    assert "INSECURE" in exposure("router", host, is_locked=False, is_insecure=True)
-    assert exposure("router", host, is_locked=True, is_insecure=False) == ""
+    mend, variable = remedy("certificates_for_router"), "GEMELO_ROUTER_INSECURE"
+    exposed_there = because("deployment.exposed", mend, section="router", host=host, variable=variable)
+    assert caught.value.reason == exposed_there
+    is_said = exposure("router", host, is_locked=False, is_insecure=True)
+    assert is_said == because("deployment.insecure", section="router", host=host)
+    assert exposure("router", host, is_locked=True, is_insecure=False) is None
 
 
 @pytest.mark.parametrize(

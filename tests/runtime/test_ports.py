@@ -27,6 +27,8 @@ def test_a_taken_port_is_named_with_its_holder_and_the_key_to_change() -> None:
     assert f"port {port} on 127.0.0.1 is taken by " in str(taken.value)
     assert f"(pid {os.getpid()}), which runs in {Path.cwd()}: stop that" in str(taken.value)
     assert "GEMELO_VIEWER_WEB_PORT or [viewer] web_port" in str(taken.value)
+    assert taken.value.reason.code == "port.taken.here"
+    assert taken.value.reason.values.items() >= {"host": "127.0.0.1", "port": port, "process": os.getpid()}.items()
 
 
 def test_a_port_of_a_twin_that_was_forgotten_in_another_folder_is_named_with_that_folder(tmp_path: Path) -> None:

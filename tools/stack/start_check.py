@@ -81,7 +81,7 @@ def broker_problems(deployment: Deployment, device: str) -> list[str]:
         return []
     from gemelo.libraries.mqtt.check import problem  # paho takes 50 ms that only a strange broker is worth
 
-    return list(dict.fromkeys(filter(None, map(problem, accesses))))
+    return list(dict.fromkeys(str(found) for found in map(problem, accesses) if found is not None))
 
 
 def main() -> int:

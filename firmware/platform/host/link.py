@@ -168,12 +168,12 @@ class DeviceLink:
             self._client.speak_older()
         else:
             self._retry(RETRY_REFUSED)
-            self._put(Disconnected(refusal(code_of(reason), str(reason), self._broker)))
+            self._put(Disconnected(str(refusal(code_of(reason), str(reason), self._broker))))
 
     def _on_connect_fail(self, client: paho.Client, _data: object) -> None:
         error = self._client.failure or OSError("no connection")
         self._retry(RETRY_REFUSED if needs_a_person(error) else RETRY)
-        self._put(Disconnected(failure(error, self._broker)))
+        self._put(Disconnected(str(failure(error, self._broker))))
 
     def _on_disconnect(self, _client: paho.Client, _data: object, _flags: object, reason: object, _p: object) -> None:
         answer, self._answer = self._answer, None
@@ -182,12 +182,12 @@ class DeviceLink:
         elif answer is None:
             self._retry(RETRY_REFUSED)
             error = self._client.failure
-            self._put(Disconnected(failure(error, self._broker) if error else silence(self._broker)))
+            self._put(Disconnected(str(failure(error, self._broker) if error else silence(self._broker))))
 
     def _on_publish(self, _client: paho.Client, _data: object, message_id: int, reason: object, _props: object) -> None:
         kind = self._sent.pop(message_id, None)
         if is_failure(reason) and kind is not None:
-            self._put(Denied(denial(self._topic + kind, self._broker)))
+            self._put(Denied(str(denial(self._topic + kind, self._broker))))
 
     def _on_message(self, _client: paho.Client, _data: object, message: paho.MQTTMessage) -> None:
         arrival = time.monotonic()

@@ -9,7 +9,8 @@ from pathlib import Path
 import msgspec
 
 from gemelo.libraries.arm.errors import nearest, wrong_file
-from gemelo.libraries.arm.model.robot_file import read_robot_data, read_text, type_mistake
+from gemelo.libraries.arm.model.robot_file import read_robot_data, read_text
+from gemelo.libraries.toml_lines import type_mistake
 from gemelo.schemas.cell import CameraFile, MeasuredCamera
 from gemelo.schemas.reasons import because, remedy
 

@@ -12,8 +12,8 @@ import msgspec
 from gemelo.libraries.arm.cell.camera_file import CAMERA_FILE, measured_of
 from gemelo.libraries.arm.errors import Subject, nearest, wrong_file
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
-from gemelo.libraries.arm.model.robot_file import line_of, read_robot_data, read_text, type_mistake
-from gemelo.libraries.toml_lines import Where
+from gemelo.libraries.arm.model.robot_file import line_of, read_robot_data, read_text
+from gemelo.libraries.toml_lines import Where, type_mistake
 from gemelo.schemas.cell import (
     CameraRecord,
     CellFile,

@@ -25,13 +25,13 @@ from gemelo.libraries.arm.model.robot_file import (
     not_finite,
     parse_toml,
     read_text,
-    type_mistake,
     typed_robot,
     unknown_keys,
 )
 from gemelo.libraries.arm.model.srdf import read_srdf
 from gemelo.libraries.arm.model.urdf import UrdfModel, survey_urdf
 from gemelo.libraries.arm.model.virtual_drive import TO_DRIVE, lacks_motors, with_virtual_drive
+from gemelo.libraries.toml_lines import type_mistake
 from gemelo.schemas.reasons import Remedy, because, remedy
 from gemelo.schemas.robot import RobotFile
 

@@ -12,13 +12,14 @@ import msgspec
 
 from gemelo.libraries.arm.errors import DescriptionError, nearest, wrong_file
 from gemelo.libraries.arm.model.gripper import require_gripper
-from gemelo.libraries.arm.model.robot_file import read_robot_data, read_text, type_mistake, typed_robot
+from gemelo.libraries.arm.model.robot_file import read_robot_data, read_text, typed_robot
 from gemelo.libraries.arm.model.srdf import SrdfModel, read_srdf
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint, UrdfModel, read_urdf
 from gemelo.libraries.arm.model.virtual_drive import TO_DRIVE, lacks_motors, with_virtual_drive
 from gemelo.libraries.arm.motors.relative_moves import loop_of, ramp_of
 from gemelo.libraries.arm.motors.speed import speed_limits
 from gemelo.libraries.arm.motors.steps import StepScale, step_scale
+from gemelo.libraries.toml_lines import type_mistake
 from gemelo.schemas.deployment import DeviceKind
 from gemelo.schemas.grippers.kinds import Gripper
 from gemelo.schemas.reasons import Reason, because, remedy

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,24 +94,6 @@ def not_finite(data: object, path: Where = ()) -> list[tuple[Where, float]]:
             return [(path, data)]
         case _:
             return []
-
-
-def type_mistake(error: msgspec.ValidationError, text: str) -> tuple[int, Reason]:
-    """The line of the key that a wrong type or a value out of bounds stands at, 0 where it is not found, and what is
-    wrong."""
-    problem, _, at = str(error).partition(" - at ")
-    key = at.strip("`").removeprefix("$").removeprefix(".")
-    words = re.findall(r"\w+", key)
-    line = line_of(tuple(int(word) if word.isdecimal() else word for word in words), text) if words else 0
-    if found := re.fullmatch(r"Expected `(.+)`, got `(.+)`", problem):
-        return line, because("file.value.type", key=key, expected=found[1], given=found[2])
-    if found := re.fullmatch(r"Expected `(.+?)` (.+)", problem):
-        return line, because("file.value.bound", key=key, expected=found[1], bound=found[2])
-    if found := re.fullmatch(r"Object missing required field `(.+)`", problem):
-        return line, because("file.value.missing", key=key, field=found[1])
-    if found := re.fullmatch(r"Invalid enum value (.+)", problem):
-        return line, because("file.value.enum", key=key, value=found[1])
-    return line, because("file.value.wrong", key=key, problem=problem)
 
 
 def dotted(path: Where) -> str:

@@ -18,7 +18,7 @@ from gemelo.libraries.mqtt.access import BrokerAccess
 from gemelo.libraries.mqtt.client import NO_ANSWER, OLD_BROKER, MqttClient, code_of, is_failure
 from gemelo.libraries.mqtt.failures import denial, failure, needs_a_person, refusal, silence
 from gemelo.schemas.device_topics import topic
-from gemelo.schemas.reasons import Reason, because, plain
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
 from gemelo.services.stepper_gateway.links.link import FROM_DEVICE, Kind, Received
 
@@ -107,7 +107,7 @@ class MqttLink:
             client.loop_start()
         except OSError as error:
             self._refusals += needs_a_person(error)
-            self._lose(plain(failure(error, self._access)))
+            self._lose(failure(error, self._access))
             return self._after(refusals, False)
         self._lost.wait()
         was_connected = self._client is not None
@@ -144,7 +144,7 @@ class MqttLink:
             self._speaks_5 = False
             self._lose(because("link.old_mqtt", access=str(self._access)))
         else:
-            self._refuse(plain(refusal(code_of(reason), str(reason), self._access)))
+            self._refuse(refusal(code_of(reason), str(reason), self._access))
 
     def _on_subscribe(
         self, client: paho.Client, _data: object, _id: int, reasons: Iterable[object], _props: object
@@ -152,7 +152,7 @@ class MqttLink:
         """Only now nothing that the device answers can be missed."""
         denied = [kind for kind, reason in zip(FROM_DEVICE, reasons, strict=False) if is_failure(reason)]
         if denied:
-            self._refuse(plain(denial(self._prefix + denied[0], self._access, "read")))
+            self._refuse(denial(self._prefix + denied[0], self._access, "read"))
             return
         assert isinstance(client, MqttClient)  # ours, see `_new_client`
         self._client = client
@@ -162,7 +162,7 @@ class MqttLink:
         """The broker has taken a message, or its ACL denies it: then the device must not be believed reachable."""
         kind = self._sent.pop(message_id, None)
         if is_failure(reason) and kind is not None and kind not in DISPENSABLE:
-            self._refuse(plain(denial(self._prefix + kind, self._access)))
+            self._refuse(denial(self._prefix + kind, self._access))
 
     def _on_disconnect(
         self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object
@@ -171,10 +171,10 @@ class MqttLink:
         if self._was_answered or code_of(reason) == NO_ANSWER:
             self._lose(because("link.lost", access=str(self._access), error=str(reason)))
         elif client.failure is not None:
-            self._refuse(plain(failure(client.failure, self._access)))
+            self._refuse(failure(client.failure, self._access))
         else:
             self._speaks_5 = not self._speaks_5  # some old brokers only hang up on a version that they do not know
-            self._refuse(plain(silence(self._access)))
+            self._refuse(silence(self._access))
 
     def _refuse(self, reason: Reason) -> None:
         if not self._lost.is_set():

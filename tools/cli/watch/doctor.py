@@ -31,6 +31,7 @@ from gemelo.schemas.system import NodeInfo
 from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS
 from gemelo.tools.cli.bus.node import TIMEOUT, living
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options
@@ -223,7 +224,7 @@ def broker(section: MqttSection) -> Diagnosis:
     if listening.verdict is Verdict.ERROR and access.is_ours:
         return listening
     said = problem(access)
-    return Diagnosis(Verdict.ERROR, "broker", said, BROKER_PAGE) if said else listening
+    return listening if said is None else Diagnosis(Verdict.ERROR, "broker", sentence(said), BROKER_PAGE)
 
 
 def _twin() -> Iterator[Diagnosis]:

@@ -18,7 +18,7 @@ from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.mqtt.access import BrokerAccess
 from gemelo.libraries.mqtt.client import CONNECT_TIMEOUT, MqttClient, code_of, is_failure
 from gemelo.libraries.mqtt.failures import failure, refusal
-from gemelo.schemas.reasons import Reason, because, plain
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.stepper_gateway.links.connection import keep_connected
 from gemelo.services.stepper_gateway.links.foreign import ra_messages
 from gemelo.services.stepper_gateway.links.foreign.adapter import Adapter, ForeignCall, FrameFor
@@ -80,7 +80,7 @@ class RaLink:
             client.connect(self._access.host, self._access.port, keepalive=KEEP_ALIVE)
             client.loop_start()
         except OSError as error:
-            self._lose(plain(failure(error, self._access)))
+            self._lose(failure(error, self._access))
             return False
         self._lost.wait()
         was_connected, self._client = self._client is not None, None
@@ -92,7 +92,7 @@ class RaLink:
 
     def _on_connect(self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
         if is_failure(reason):
-            return self._lose(plain(refusal(code_of(reason), str(reason), self._access)))
+            return self._lose(refusal(code_of(reason), str(reason), self._access))
         client.subscribe([(ra_messages.STATES, 0), (ra_messages.SENSORS, 0), (ra_messages.JOINTS, 0)])
         assert isinstance(client, MqttClient)  # ours, see `_connection`
         self._client = client
