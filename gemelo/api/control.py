@@ -206,11 +206,12 @@ def named_where_another_moves(control: Control, robot: str) -> Iterator[None]:
             raise
         state = control.state
         clock = time.strftime("%H:%M:%S", time.gmtime(state.since // 1_000_000_000))
-        reason = (
-            f"{state.name} holds control of {robot}, since {clock} UTC, from node {state.node} on {state.host}, "
-            "and moves it: ask for it, or run `gemelo control take --force`"
-        )
-        raise Refused(f"refused: {reason}", check="control", subject=state.name, reason=reason) from refused
+        reason = because(
+            "client.control.moves", remedy("ask_or_force"),
+            holder=state.name, robot=robot, clock=clock, node=state.node, host=state.host,
+        )  # fmt: skip
+        said = because("client.refused", reason)
+        raise Refused(said, check="control", subject=state.name, reason=reason) from refused
 
 
 def shared_secret(robot: str, deployment: Deployment) -> str:

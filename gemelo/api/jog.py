@@ -70,7 +70,7 @@ class JogCommands:
                 self._session.wait_for(lambda: False, min(PERIOD, max(0.0, end - self._session.clock.monotonic())))
         except KeyboardInterrupt:
             self.rest()
-            raise Interrupted("jogging stopped by Ctrl-C") from None
+            raise Interrupted(because("client.jog.interrupted")) from None
         return self.rest()
 
     def end(self) -> JogStatus | None:
@@ -107,7 +107,7 @@ class Streaming:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._refused = ""  # why the gateway did not take the last target
+        self._refused: Reason | None = None  # why the gateway did not take the last target
         self._began = self._said = -math.inf  # [s] monotonic, of this stream's first and last target
 
     def say(self, joints: Joints) -> None:
@@ -125,9 +125,9 @@ class Streaming:
         states = self._session.latest(JOINT_STATES)  # heard from the first target on
         if now - self._began > GAP and states.age() > GAP:
             raise Lost(because("lost.stream", remedy("list_nodes"), time=GAP))
-        reason, self._refused = self._refused, ""
-        if reason:
-            raise Refused(f"refused: {reason}", check="stream")
+        why, self._refused = self._refused, None
+        if why is not None:
+            raise Refused(because("client.refused", why), check="stream", reason=why)
         node.publisher(JOINT_TARGETS).put(JointTargets(stamp=node.now(), name=state.name, position=state.position))
 
     def _on_event(self, event: DeviceEvent) -> None:
@@ -135,7 +135,7 @@ class Streaming:
         if event.client not in ("", self._session.node.address):
             return
         if event.event == "target_refused" and self._session.clock.monotonic() - self._said < PAUSE:
-            self._refused = event.detail
+            self._refused = event.why or plain(event.detail)
 
 
 def _silent() -> Reason:

@@ -369,7 +369,7 @@ def _interrupted(
     with suppress(Lost, Refused):
         if call is not None and session.wait_for(lambda: call.is_over, MARGIN, tell):
             refusal = answer_of(call).refusal
-            said = plain(refusal.message) if refusal is not None else because("client.plan.just_made")
+            said = (refusal.why or plain(refusal.message)) if refusal is not None else because("client.plan.just_made")
     return Interrupted(because("client.plan.interrupted", said))
 
 
