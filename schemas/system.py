@@ -8,6 +8,7 @@ import msgspec
 
 from gemelo.schemas.actions import NIL
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import Reason
 
 
 class LogLevel(IntEnum):
@@ -109,6 +110,7 @@ class Failure(Message, frozen=True, kw_only=True):
 
     kind: str = ""  # "bad request", "refused", "internal error"
     message: str = ""
+    why: Reason | None = None  # `message` as data, where it has a code
 
 
 ParameterValue = bool | int | float | str

@@ -16,11 +16,12 @@ class NodeNameTaken(BusError):
 
 
 class RequestRefused(Exception):
-    """A server would not do what was asked; raised by handlers, and again at the client."""
+    """A server would not do what was requested; raised by handlers, and again at the client."""
 
-    def __init__(self, message: str, kind: str = "refused") -> None:
-        super().__init__(message)
+    def __init__(self, message: Reason | str, kind: str = "refused") -> None:
+        super().__init__(str(message))
         self.kind = kind  # as in `Failure.kind`
+        self.reason = message if isinstance(message, Reason) else plain(message)
 
 
 class GoalRefused(RequestRefused):
@@ -28,9 +29,8 @@ class GoalRefused(RequestRefused):
 
     def __init__(self, code: int, reason: str, why: Reason | None = None) -> None:
         """`why` is the same as data, where the server says it so."""
-        super().__init__(reason)
+        super().__init__(why or reason)
         self.code = code
-        self.reason = why or plain(reason)
 
 
 class NoAnswer(Exception):

@@ -244,7 +244,7 @@ class Shell:
 
     def _on_stop(self, request: DeviceStopRequest, pending: Pending[DeviceCommandResponse]) -> None:
         """What was asked for before a stop must not move the arm after it."""
-        reason = f"{request.kind} was asked for after it: ask again"
+        reason = because("command.overtaken", stop=request.kind.value)
         for server in (self._server, self._gripper, self._commands):
             server.refuse_waiting(reason, pending.asked)
         self._handle(StopInput(self._ticket(pending), request))

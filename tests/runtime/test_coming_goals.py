@@ -19,6 +19,7 @@ from gemelo.schemas.actions import CancelRequest, GoalRequest
 from gemelo.schemas.device import DeviceCommandResponse, DeviceStopRequest
 from gemelo.schemas.message import BadMessage, decode, encode
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import DEVICE_STOP
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
 from tests.runtime.support import Buses, spinning, until
@@ -55,7 +56,7 @@ class Reader:
         return accept()
 
     def on_stop(self, _request: DeviceStopRequest, pending: Pending[DeviceCommandResponse]) -> None:
-        self.action.refuse_waiting("stop was asked for after it: ask again", pending.asked)
+        self.action.refuse_waiting(because("command.overtaken", stop="stop"), pending.asked)
         pending.reply(DeviceCommandResponse(accepted=True))
 
     def step(self, _now: int) -> None:

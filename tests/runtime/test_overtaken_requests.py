@@ -22,6 +22,7 @@ from gemelo.schemas.actions import GoalRequest, GoalResponse
 from gemelo.schemas.device import DeviceCommandResponse, DeviceStopRequest
 from gemelo.schemas.message import decode, encode
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.reasons import because
 from gemelo.schemas.system import Failure, TopicStatistics
 from gemelo.schemas.topics import DEVICE_STOP
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
@@ -36,12 +37,14 @@ numbers = st.integers(1, MOST_JUMP)
 def test_what_a_client_asked_before_its_newest_stop_is_void_and_nothing_else(stops: list[int], number: int) -> None:
     requests = OvertakenRequests("goal")
     for at, stop in enumerate(stops):
-        requests.stop("stop was asked for after it", {"a": stop}, float(at))
+        requests.stop(because("command.overtaken", stop="stop"), {"a": stop}, float(at))
     arrived = float(len(stops))
     refusal = requests.refusal("a", number, arrived)
     assert bool(refusal) == (number < max(stops))
-    if refusal:
-        assert f"request {number} of its client, the stop request {max(stops)}" in refusal
+    if refusal is not None:
+        overtaken = because("command.overtaken", stop="stop")
+        void = because("request.void.overtaken", overtaken, request="goal", number=number, stop=max(stops))
+        assert refusal == void
     assert not requests.refusal("another", number, arrived)
     assert not requests.refusal("a", 0, arrived)
     assert requests.refusal("another", number, arrived - 1.0)
@@ -50,7 +53,7 @@ def test_what_a_client_asked_before_its_newest_stop_is_void_and_nothing_else(sto
 def test_the_newest_stop_of_the_last_clients_is_kept() -> None:
     requests = OvertakenRequests("goal")
     for name in range(10 * MOST_CLIENTS):
-        requests.stop("stop", {"operator": 10, f"client {name}": 10}, 0.0)
+        requests.stop(because("command.overtaken", stop="stop"), {"operator": 10, f"client {name}": 10}, 0.0)
     assert requests.refusal("operator", 9, 1.0)
     assert requests.refusal(f"client {10 * MOST_CLIENTS - 1}", 9, 1.0)
     assert not requests.refusal("client 0", 9, 1.0)
@@ -62,10 +65,10 @@ def test_the_newest_stop_of_the_last_clients_is_kept() -> None:
 def test_a_number_far_above_all_before_refuses_nothing_for_good(number: int, own: int) -> None:
     requests = OvertakenRequests("goal")
     assert not requests.refusal("a", own, 0.0)
-    requests.stop("stop", {"a": own + number}, 1.0)
+    requests.stop(because("command.overtaken", stop="stop"), {"a": own + number}, 1.0)
     assert requests.refusal("a", own + 1, 0.5)  # it had arrived by then
     assert not requests.refusal("a", own + 1, 2.0)
-    requests.stop("stop", {"a": own + 3}, 3.0)
+    requests.stop(because("command.overtaken", stop="stop"), {"a": own + 3}, 3.0)
     assert requests.refusal("a", own + 2, 4.0)
 
 
@@ -108,7 +111,7 @@ def gateway(buses: Buses, started: list[str], rates: RequestRates | None = None)
     action = node.serve_action(FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: None)
 
     def on_stop(_request: DeviceStopRequest, pending: Pending[DeviceCommandResponse]) -> None:
-        action.refuse_waiting("stop was asked for after it: ask again", pending.asked)
+        action.refuse_waiting(because("command.overtaken", stop="stop"), pending.asked)
         pending.reply(DeviceCommandResponse(accepted=True))
 
     node.serve_later(DEVICE_STOP, on_stop)

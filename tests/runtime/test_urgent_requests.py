@@ -23,6 +23,7 @@ from gemelo.schemas.device import DeviceCommandResponse, DeviceStopRequest, Stop
 from gemelo.schemas.message import Message, decode, encode
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
 from gemelo.schemas.planning import PlanCode, PlanRequest, PlanResponse
+from gemelo.schemas.reasons import because
 from gemelo.schemas.system import Failure
 from gemelo.schemas.topics import DEVICE_STOP, PLAN
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
@@ -199,7 +200,7 @@ def test_what_a_stop_has_overtaken_is_refused(buses: Buses) -> None:
     )
 
     def stop(request: DeviceStopRequest) -> DeviceCommandResponse:
-        action.refuse_waiting("stop was asked for after it: ask again", {})
+        action.refuse_waiting(because("command.overtaken", stop="stop"), {})
         return DeviceCommandResponse(accepted=True)
 
     server.serve(DEVICE_STOP, stop)

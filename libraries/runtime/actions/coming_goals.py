@@ -14,6 +14,7 @@ from gemelo.libraries.runtime.errors import RequestRefused
 from gemelo.libraries.runtime.loop.task_queue import Task
 from gemelo.libraries.runtime.requests.server import Pending
 from gemelo.schemas.actions import GoalRequest, GoalResponse
+from gemelo.schemas.reasons import Reason, because
 
 MOST_BYTES = 64 * 1024 * 1024  # of all that wait; chosen: two of the largest goals (bus/wire.py)
 
@@ -48,11 +49,11 @@ class ComingGoals:
         if not self._is_posted:
             self._go_on()
 
-    def refuse(self, reason: str) -> None:
+    def refuse(self, reason: Reason) -> None:
         """Refuses all: a stop has overtaken them."""
         goals, self._goals = self._goals, deque()
         for each in goals:
-            each.pending.refuse("void", f"{self._key}: {reason}")
+            each.pending.refuse("void", because("request.void", reason, request=self._key))
 
     def take_out(self, goal_id: str) -> Pending[GoalResponse] | None:
         """Who waits for the answer to that goal, which is not decided upon any more; None if it is not here."""

@@ -132,7 +132,7 @@ class ActionServer(Generic[G, F, R]):
         end = GoalEnd(stamp=self._clock.unix(), goal_id=goal_id, client=goal.client, status=status, result=raw)
         self._ended.put(end)
 
-    def refuse_waiting(self, reason: str, asked: Mapping[str, int]) -> None:
+    def refuse_waiting(self, reason: Reason, asked: Mapping[str, int]) -> None:
         """Refuses the goals that were sent before a stop that is handled now and were not looked at yet.
 
         `asked` are the clients that want it, as in `Pending.asked`.
@@ -222,7 +222,7 @@ class ActionServer(Generic[G, F, R]):
             pending.reply(_cancel_response((), [self._cancel_absent(request.goal_id)]))
             return
         if not request.goal_id:
-            self.refuse_waiting("all goals were cancelled after it was sent: send it again", pending.asked)
+            self.refuse_waiting(because("cancel.all_after_it"), pending.asked)
         wanted = (request.goal_id,) if request.goal_id else self.active
         canceling, reasons = [], [] if wanted else [because("cancel.none_active")]
         for goal_id in wanted:

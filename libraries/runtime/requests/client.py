@@ -115,7 +115,7 @@ def response_in(request: Request[Q, R], answer: BusReply) -> R:
         failure = from_arrival(Failure, arrival)
     except BadMessage as error:
         raise NoAnswer(f"the answer of {request.server} to {request.key} cannot be read: {error}") from error
-    raise RequestRefused(failure.message, failure.kind)
+    raise RequestRefused(failure.why or failure.message, failure.kind)
 
 
 def _silent(bus: Bus, request: Request[Q, R], timeout: float) -> str:

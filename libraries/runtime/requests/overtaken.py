@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from gemelo.schemas.reasons import Reason, because
+
 MOST_CLIENTS = 4096  # whose newest numbers are kept; chosen: what a flood of new names fills in several seconds
 MOST_JUMP = (
     1_000_000  # chosen: requests to all other nodes between two to one, more than half an hour of a client's pace
@@ -18,17 +20,17 @@ MOST_JUMP = (
 
 
 class NewestOf:
-    """A value for each of the clients that were heard last."""
+    """A number for each of the clients that have sent something last, and why."""
 
     def __init__(self) -> None:
-        self._of: dict[str, tuple[int, str]] = {}
+        self._of: dict[str, tuple[int, Reason | None]] = {}
 
-    def __getitem__(self, client: str) -> tuple[int, str]:
-        return self._of.get(client, (0, ""))
+    def __getitem__(self, client: str) -> tuple[int, Reason | None]:
+        return self._of.get(client, (0, None))
 
-    def put(self, client: str, number: int, reason: str = "") -> None:
+    def put(self, client: str, number: int, reason: Reason | None = None) -> None:
         """The higher number stays, with the newest reason."""
-        before, _ = self._of.pop(client, (0, ""))  # the newest are last
+        before, _ = self._of.pop(client, (0, None))  # the newest are last
         self._of[client] = (max(before, number), reason)
         while len(self._of) > MOST_CLIENTS:
             del self._of[next(iter(self._of))]
@@ -39,23 +41,24 @@ class OvertakenRequests:
 
     def __init__(self, key: str) -> None:
         self._key = key
-        self._arrived_by, self._reason = -math.inf, ""  # [s] monotonic
+        self._arrived_by = -math.inf  # [s] monotonic
+        self._reason: Reason | None = None
         self._stops = NewestOf()  # the number of each client's newest stop, and what it was
         self._seen = NewestOf()  # the highest number of each client's requests
 
-    def stop(self, reason: str, asked: Mapping[str, int], now: float) -> None:
+    def stop(self, reason: Reason, asked: Mapping[str, int], now: float) -> None:
         """A stop is handled at `now` [s] monotonic, for the clients that have `asked` for it with these numbers."""
         self._arrived_by, self._reason = now, reason
         for client, number in asked.items():
             if number - max(self._seen[client][0], self._stops[client][0]) <= MOST_JUMP:
                 self._stops.put(client, number, reason)
 
-    def refusal(self, client: str, number: int, arrived: float) -> str:
-        """Why a request of `client` that has `arrived` at [s] monotonic is void, else empty; 0 is no number."""
+    def refusal(self, client: str, number: int, arrived: float) -> Reason | None:
+        """Why a request of `client` that has `arrived` at [s] monotonic is void, else None; 0 is no number."""
         self._seen.put(client, number)
-        if arrived <= self._arrived_by:
-            return f"{self._key}: {self._reason}"
+        if arrived <= self._arrived_by and self._reason is not None:
+            return because("request.void", self._reason, request=self._key)
         stop, reason = self._stops[client]
-        if 0 < number < stop:
-            return f"{self._key}: {reason} (this was request {number} of its client, the stop request {stop})"
-        return ""
+        if 0 < number < stop and reason is not None:
+            return because("request.void.overtaken", reason, request=self._key, number=number, stop=stop)
+        return None

@@ -21,6 +21,7 @@ from gemelo.libraries.runtime.requests.overtaken import OvertakenRequests
 from gemelo.libraries.runtime.topics import Warn
 from gemelo.schemas.actions import NIL
 from gemelo.schemas.message import BadMessage, Message, decode, encode
+from gemelo.schemas.reasons import PLAIN, Reason
 from gemelo.schemas.system import Exchange, Failure, TopicStatistics
 from gemelo.schemas.topics import Request
 
@@ -42,6 +43,12 @@ def shortened(reason: str) -> str:
     """The reason, without its middle where it is longer than anybody reads."""
     half = MAX_REASON // 2
     return reason if len(reason) <= MAX_REASON else f"{reason[:half]} ... {reason[-half:]}"
+
+
+def failure_of(kind: str, message: Reason | str) -> Failure:
+    """A refusal as it is sent."""
+    why = message if isinstance(message, Reason) and message.code != PLAIN else None
+    return Failure(kind=kind, message=shortened(str(message)), why=why)
 
 
 class AnswerReport:
@@ -89,7 +96,7 @@ class Pending(Protocol[R_contra]):
     def send(self, response: Encoded[Any]) -> None:
         """As `reply`, with what is encoded already."""
 
-    def refuse(self, kind: str, message: str) -> None:
+    def refuse(self, kind: str, message: Reason | str) -> None:
         """As `reply`, with why not."""
 
 
@@ -116,10 +123,10 @@ class PendingQuery(Generic[R]):
             if self._report is not None:
                 self._report.answered((self.client,), response.payload)
 
-    def refuse(self, kind: str, message: str) -> None:
+    def refuse(self, kind: str, message: Reason | str) -> None:
         if not self._is_answered:
             self._is_answered = True
-            failure = Failure(kind=kind, message=shortened(message))
+            failure = failure_of(kind, message)
             self._query.fail(schema_of(Failure), to_payload(failure))
             if self._report is not None:
                 self._report.refused((self.client,), failure)
@@ -160,11 +167,11 @@ class PendingGroup(Generic[R]):
         if report := self._take_report():
             report.answered(self._clients(), response.payload)
 
-    def refuse(self, kind: str, message: str) -> None:
+    def refuse(self, kind: str, message: Reason | str) -> None:
         for query in self._take():
             query.refuse(kind, message)
         if report := self._take_report():
-            report.refused(self._clients(), Failure(kind=kind, message=shortened(message)))
+            report.refused(self._clients(), failure_of(kind, message))
 
     def _take(self) -> list[PendingQuery[R]]:
         queries, self._queries = self._queries, []
@@ -213,7 +220,7 @@ class RequestServer(Generic[Q, R]):
     def close(self) -> None:
         self._declaration.close()
 
-    def refuse_waiting(self, reason: str, asked: Mapping[str, int]) -> None:
+    def refuse_waiting(self, reason: Reason, asked: Mapping[str, int]) -> None:
         """Refuses the requests that were asked for before an urgent one that is handled now and made them void.
 
         Those are what has arrived, and what the clients in `asked` (see `Pending.asked`) have asked for before.
@@ -289,7 +296,7 @@ class RequestServer(Generic[Q, R]):
         try:
             yield
         except RequestRefused as error:
-            pending.refuse(error.kind, str(error))
+            pending.refuse(error.kind, error.reason)
         except Exception as error:
             self._warn(f"{self.request.key}: {traceback.format_exc()}")
             pending.refuse("internal error", f"{self.request.server} failed: {type(error).__name__}: {error}")

@@ -9,6 +9,5 @@ GATEWAY: dict[str, str] = {
     'there is no {kind} "{name}"': "No hay {kind} «{name}».",
     "{robot} has no gripper: write a [gripper] into its robot.toml": "{robot} no tiene pinza: escriba un [gripper] en "
     "su robot.toml.",
-    "{name} was asked for after it: ask again": "Después se pidió {name}: pídalo otra vez.",
     "all joints are home": "todas las articulaciones están en su origen.",
 }
