@@ -80,6 +80,7 @@ class NodeInfo(Message, frozen=True, kw_only=True):
     certificate_ends: float | None = None  # [s] UNIX time, of the one that it shows to the router; None: it shows none
     unwritten: str = ""  # what it cannot write to its disk, and the remedies; it works on without
     files: NodeFiles = NodeFiles()
+    why: Reason | None = None  # `problem` as data
 
 
 class TopicInterface(Message, frozen=True, kw_only=True):

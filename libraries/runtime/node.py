@@ -45,6 +45,7 @@ from gemelo.libraries.runtime.started import load_started
 from gemelo.libraries.runtime.topics import Latest, LatestOnDemand, Publisher, Subscription
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import Reason, plain
 from gemelo.schemas.system import (
     NodeFiles,
     NodeInfo,
@@ -105,7 +106,7 @@ class Node:
         self._worker = Worker(self.clock)
         self.unwritten = UnwrittenFiles(self.log.warning)
         self._readiness: Readiness | None = None
-        self._problem = ""  # why it is not ready
+        self._problem: Reason | None = None  # why it is not ready
         self._endpoints = NodeEndpoints()
         self._rates = rates or RequestRates(clock=self.clock)
         from_file = self.deployment.parameters.get(name, {})
@@ -319,7 +320,8 @@ class Node:
             about,
             clock=self.now(),
             ready=self.is_ready,
-            problem=self._problem,
+            problem=str(self._problem or ""),
+            why=self._problem,
             certificate_ends=self._certificate.ends if self._certificate is not None else None,
             unwritten=self.unwritten.sentence,
             files=NodeFiles() if self.clock.is_virtual else self._files(),
@@ -339,9 +341,13 @@ class Node:
         """The messages received, dropped and bad since the start, by key: of topics and of requests served."""
         return self._endpoints.statistics()
 
-    def set_ready(self, ok: bool, reason: str = "") -> None:
-        """Says whether this node's state is valid; `reason` is logged when it changes."""
-        self._problem = "" if ok else reason
+    def set_ready(self, ok: bool, why: Reason | str = "") -> None:
+        """Says whether this node's state is valid; `why` it is not is logged when it changes."""
+        reason = str(why)
+        if ok or not reason:
+            self._problem = None
+        else:
+            self._problem = why if isinstance(why, Reason) else plain(reason)
         if self._readiness is None:
             self._readiness = Readiness(project_root() / self.deployment.paths.run, self.name, self.unwritten)
         if ok != self._readiness.is_ready:

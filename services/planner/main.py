@@ -7,6 +7,7 @@ from gemelo.libraries.runtime.application import service
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.topics import JOINT_STATES
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.jog_service import JogService
@@ -21,8 +22,8 @@ from gemelo.services.planner.workers.workers import Present, Workers
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 RATE = 10.0  # [Hz] at which it says how plans stand; chosen: smooth for a person's eye
-STARTING = "the process that plans is starting"
-NOT_READY = "no fresh joint_states: is the stepper_gateway running?"
+STARTING = because("ready.planner.starting")
+NOT_READY = because("ready.no_states", remedy("see_gateway"))
 
 
 def run(node: Node, deployment: Deployment) -> None:
@@ -43,8 +44,8 @@ def run(node: Node, deployment: Deployment) -> None:
 
     def step(now: int) -> None:
         plans.step(now)
-        reason = NOT_READY if states.age() >= STALE_AFTER else "" if workers.are_ready else STARTING
-        node.set_ready(not reason, reason)
+        why = NOT_READY if states.age() >= STALE_AFTER else None if workers.are_ready else STARTING
+        node.set_ready(why is None, why or "")
 
     node.at_end(workers.close)
     node.spin(step, rate=RATE)

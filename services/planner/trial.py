@@ -9,7 +9,7 @@ import logging
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain, pairwise
 from pathlib import Path
 
@@ -18,11 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gemelo.libraries.arm.checks.findings import Finding, error, warning
+from gemelo.libraries.arm.errors import Subject
 from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.arm.model.urdf import JointKind
+from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse
+from gemelo.schemas.reasons import Reason, because, plain, remedy
 from gemelo.services.planner.core import Planner
 from gemelo.services.planner.native import assembly
 from gemelo.services.planner.request.deadline import Deadline
@@ -40,7 +43,6 @@ ALLOWED = 2.0  # [s] for one plan; chosen: the usual ones take a hundredth of it
 FEWEST = 5  # plans that are tried however long they take, and that must all fail for the robot to be called unfit
 LEAST_FREE = 0.01  # share of the configurations: with less, plans have nowhere to go
 OFTEN = 0.5  # of how often the most frequent pair is near: rarer ones are not named
-UNCONNECTED = "nothing, where no path can be: the limits may leave two free regions, as on both sides of the base"
 MOST_NAMED = 3  # findings about pairs, and about plans; chosen: what a person reads
 
 
@@ -59,8 +61,8 @@ def trial(arm: ArmDescription, seconds: float = SECONDS) -> list[Finding]:
 def _large_models(planner: Planner) -> Iterator[Finding]:
     """Of links whose spheres reach far beyond their shapes."""
     core, file = planner.checker.native(planner.arm.clearance), planner.arm.urdf_path.name
-    for link, (said, remedy) in core.large_links.items() if core else ():
-        yield warning(file, f'link "{link}"', said, remedy)
+    for link, why in core.large_links.items() if core else ():
+        yield warning(file, Subject("link", link), why)
 
 
 def _named_states(planner: Planner) -> Iterator[Finding]:
@@ -70,10 +72,10 @@ def _named_states(planner: Planner) -> Iterator[Finding]:
         contacts = world.contacts(state, arm.clearance)
         if contacts:
             nearest = contacts[0]
-            apart = f"{nearest.first} and {nearest.second} are {_mm(nearest.distance)} apart"
-            said = f"{apart}, {_mm(arm.clearance)} stay free"
-            remedy = "move the state, correct the shapes, or set a smaller `clearance` in robot.toml"
-            yield warning(arm.srdf_path.name, f'state "{name}"', said, remedy)
+            would_do = remedy("move_state"), remedy("correct_shapes"), remedy("smaller_clearance_in_file")
+            figures = {"distance": nearest.distance, "clearance": arm.clearance}
+            why = because("trial.state.near", *would_do, first=nearest.first, second=nearest.second, **figures)
+            yield warning(arm.srdf_path.name, Subject("state", name), why)
 
 
 def _sampled(planner: Planner, deadline: Deadline) -> tuple[list[Array], dict[LinkPair, list[float]], int]:
@@ -105,17 +107,14 @@ def _nowhere_free(arm: ArmDescription, near: dict[LinkPair, list[float]], count:
     """The pairs that are in the way most often, with how near they come."""
     most = sorted(near.items(), key=lambda item: -len(item[1]))
     most = [item for item in most if len(item[1]) > OFTEN * len(most[0][1])][:MOST_NAMED]
-    remedy = f"`gemelo collision matrix {arm.folder} --write` excuses what is always near; else correct the shapes"
-    return [
-        error(
-            arm.srdf_path.name,
-            f"pair {first} and {second}",
-            f"nearer than the clearance of {_mm(arm.clearance)} in {len(distances)} of {count} random configurations "
-            f"({_mm(min(distances))} to {_mm(max(distances))}), so hardly any plan can succeed",
-            remedy,
-        )
-        for (first, second), distances in most
-    ]
+    would_do = remedy("excuse_pairs", folder=str(arm.folder)), remedy("correct_shapes")
+
+    def why(distances: Sequence[float]) -> Reason:
+        figures = {"clearance": arm.clearance, "nearest": min(distances), "farthest": max(distances)}
+        return because("trial.pair.near", *would_do, times=len(distances), count=count, **figures)
+
+    file = arm.srdf_path.name
+    return [error(file, Subject("pair", f"{first} / {second}"), why(distances)) for (first, second), distances in most]
 
 
 def _plans(planner: Planner, free: list[Array], deadline: Deadline) -> Iterator[Finding]:
@@ -124,7 +123,7 @@ def _plans(planner: Planner, free: list[Array], deadline: Deadline) -> Iterator[
     They are errors where every plan fails: two free configurations need not have a path between them.
     """
     failed: Counter[str] = Counter()
-    said: dict[str, str] = {}
+    reasons: dict[str, Reason] = {}
     tried = 0
     for start, goal in list(pairwise(free))[:PLANS]:
         if tried >= FEWEST and deadline.has_passed():
@@ -133,12 +132,12 @@ def _plans(planner: Planner, free: list[Array], deadline: Deadline) -> Iterator[
         response = _planned(planner, start, goal)
         if response.code is not PlanCode.SUCCESS and response.refusal is not None:
             failed[response.refusal.subject] += 1
-            said.setdefault(response.refusal.subject, f"{response.refusal.message} -> {response.refusal.remedy}")
+            reasons.setdefault(response.refusal.subject, response.refusal.why or plain(response.refusal.message))
     severe = error if sum(failed.values()) == tried >= FEWEST else warning
     for subject, times in failed.most_common(MOST_NAMED):
-        message = f"{times} of {tried} plans between free configurations fail: {said[subject]}"
-        remedy = "" if severe is error else UNCONNECTED
-        yield severe(planner.arm.urdf_path.name, f"plans, {subject or 'any'}", message, remedy)
+        would_do = () if severe is error else (remedy("may_be_unconnected"),)
+        why = because("trial.plans.fail", reasons[subject], *would_do, times=times, tried=tried)
+        yield severe(planner.arm.urdf_path.name, Subject("plans", subject), why)
 
 
 def looking_the_same(arm: ArmDescription, start: Array, goal: Array) -> Iterator[Array]:
@@ -177,10 +176,6 @@ def _planned_to(planner: Planner, start: Array, goal: Array) -> PlanResponse:
     return planner.plan(request, None, clock=time.monotonic)
 
 
-def _mm(distance: float) -> str:
-    return f"{1000.0 * distance:.1f} mm"
-
-
 def main() -> None:
     """Prints the findings."""
     logging.basicConfig(format="%(message)s", level=logging.INFO)  # to the standard error: how large models are made
@@ -189,7 +184,8 @@ def main() -> None:
     try:
         found = trial(arm)
     except ValueError as why:  # of an arm that the planner cannot take
-        found = [error(arm.urdf_path.name, "robot", str(why), "join the links that are fixed to one another")]
+        cause = why.reason if isinstance(why, ReasonedError) else plain(str(why))
+        found = [error(arm.urdf_path.name, Subject("robot"), because("trial.robot", cause, remedy("join_links")))]
     for finding in found:
         print(msgspec.json.encode(finding).decode())
 

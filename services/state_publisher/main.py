@@ -15,6 +15,7 @@ from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.frames import RobotDescription
 from gemelo.schemas.joints import JointState
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.text_file import read_text
 from gemelo.schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
 from gemelo.services.state_publisher.core import StatePublisher
@@ -61,7 +62,7 @@ def run(node: Node, deployment: Deployment) -> None:
     def step(_now: int) -> None:
         publisher.decimator.rate = parameters.value.rate
         is_fresh = states.age() < FRESH
-        node.set_ready(is_fresh, "" if is_fresh else "no fresh joint_states: is the stepper_gateway running?")
+        node.set_ready(is_fresh, "" if is_fresh else because("ready.no_states", remedy("see_gateway")))
 
     node.subscribe(JOINT_STATES, on_joint_state)
     node.spin(step, rate=10.0)

@@ -157,7 +157,7 @@ class Shell:
     def step(self, _now: int) -> None:
         """One turn of the control loop; none while another gateway may have taken this one's place."""
         if self._is_silent():
-            return self._node.set_ready(False, str(WAS_STOPPED))
+            return self._node.set_ready(False, WAS_STOPPED)
         if self._parameters.value is not self._told:
             self._told = self._parameters.value
             self._handle(ParametersInput(self._told))
@@ -165,7 +165,7 @@ class Shell:
         self._handle(StepInput(self._absences.seconds(self._core.watched_clients, moment.monotonic)))
         moment = self._moment()
         reason = self._core.not_ready(moment)
-        self._node.set_ready(reason is None, str(reason or ""))
+        self._node.set_ready(reason is None, reason or "")
         self._inputs.step(moment, self._told.record_inputs)
 
     def finish(self) -> None:

@@ -37,17 +37,21 @@ def test_a_pair_that_is_always_near_is_named_with_how_near_it_is(copy: Path):
     findings = trial(load_arm(copy), LONG)
     pairs = [finding for finding in findings if finding.subject.startswith("pair")]
     assert [finding.severity for finding in pairs] == [Severity.ERROR]
-    assert {"rest_plate", "disc"} <= set(pairs[0].subject.split())
-    assert "300 of 300 random configurations (1.6 mm to 1.6 mm)" in pairs[0].message
-    assert "gemelo collision matrix" in pairs[0].remedy
+    assert set(pairs[0].of.name.split(" / ")) == {"rest_plate", "disc"}
+    why = pairs[0].what
+    assert (why.code, why.values["times"], why.values["count"]) == ("trial.pair.near", 300, 300)
+    assert [why.values[each] for each in ("nearest", "farthest")] == pytest.approx([0.0016, 0.0016], abs=1e-5)
+    assert [each.code for each in why.remedies] == ["excuse_pairs", "correct_shapes"]
 
 
 def test_a_state_that_does_not_keep_the_clearance_is_named(copy: Path):
     add_turning_disc(copy, gap=0.0016)
-    named = [finding.message for finding in trial(load_arm(copy), LONG) if finding.subject == 'state "home"']
-    assert len(named) == 1
-    assert {"disc", "rest_plate", "1.6"} <= set(named[0].split())
-    assert "4.0 mm stay free" in named[0]
+    named = [finding.what for finding in trial(load_arm(copy), LONG) if finding.subject == 'state "home"']
+    assert [why.code for why in named] == ["trial.state.near"]
+    values = named[0].values
+    assert {values["first"], values["second"]} == {"disc", "rest_plate"}
+    assert values["distance"] == pytest.approx(0.0016, abs=1e-5)
+    assert values["clearance"] == 0.004
 
 
 def test_a_written_matrix_leaves_a_working_robot(copy: Path, capsys: pytest.CaptureFixture[str]):
@@ -65,7 +69,7 @@ def test_check_says_all_is_well_only_where_plans_succeed(copy: Path, capsys: pyt
     assert run(["check", str(copy)]) is ExitCode.FAILED
     said = capsys.readouterr().out
     assert "all is well" not in said
-    assert "nearer than the clearance of 2.0 mm" in said
+    assert "nearer than the clearance of 2 mm" in said
 
 
 @given(st.data())

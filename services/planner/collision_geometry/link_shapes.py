@@ -13,6 +13,7 @@ from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.kinematics.convex_meshes import corners_of, hull_of, triangles_of
 from gemelo.libraries.arm.kinematics.self_collisions import load_collision_geometry
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.reasons import because, remedy
 from gemelo.services.planner.collision_geometry.coal_shapes import mesh_of
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from gemelo.services.planner.collision_geometry.solids import (
@@ -58,9 +59,8 @@ def _form_of(geometry: coal.CollisionGeometry, link: str) -> Form:
             return ShapeKind.MESH, (), mesh_of(geometry)
         case coal.ConvexBase():
             return ShapeKind.HULL, (), hull_mesh(corners_of(geometry))
-    raise DescriptionError(
-        f'link "{link}": there are no spheres for a {type(geometry).__name__}; use box, cylinder, sphere or mesh'
-    )
+    would_do = remedy("simple_shapes")
+    raise DescriptionError(because("robot.link.shape", would_do, link=link, kind=type(geometry).__name__))
 
 
 def hull_mesh(points: Array) -> TriangleMesh:

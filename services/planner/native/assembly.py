@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.reasons import Reason, Value, because, remedy
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.collision_geometry.shapes import Attachment, CollisionShape, ShapeKind, TriangleMesh
 from gemelo.services.planner.native.binding import motion
@@ -181,32 +182,26 @@ def _told_cover(
         log.info("%s: %d spheres after %.1f s", place, len(cover.spheres), time.monotonic() - began)
     said = wide_spheres(arm, link, several, cover, bulge)
     if said is not None:
-        log.warning("%s: %s; %s", place, *said)
+        log.warning("%s: %s", place, said)
     return cover
 
 
 def wide_spheres(
     arm: ArmDescription, link: str, shapes: Sequence[CollisionShape], cover: SphereCover, bulge: float
-) -> tuple[str, str] | None:
-    """What it means that a link's spheres reach far beyond its shapes, more than the `bulge` [m] that is usual, and the
-    remedy; None where they do not, and for one simple shape."""
+) -> Reason | None:
+    """What it means that a link's spheres reach far beyond its shapes, more than the `bulge` [m] that is usual; None
+    where they do not, and for one simple shape."""
     is_mesh = any(shape.kind is ShapeKind.MESH for shape in shapes)
     if cover.bulge <= max(2.0 * bulge, longest_side(shapes) / WIDE) or (len(shapes) == 1 and not is_mesh):
         return None
-    fit = f"`gemelo collision fit {arm.folder} --meshes --link {link}"
-    wider = math.ceil(1000.0 * cover.bulge)
+    named, wider = {"folder": str(arm.folder), "link": link}, math.ceil(1000.0 * cover.bulge)
+    figures: dict[str, Value] = {"spheres": len(cover.spheres), "reach": cover.bulge, "usual": bulge}
     if is_mesh:
-        remedy = f"{fit} --write` makes boxes, cylinders and convex hulls of its mesh"
-    elif any(each.name == link and any(visual.mesh for visual in each.visuals) for each in arm.model.links):
-        remedy = f"{fit} --within {wider}mm --write` makes fewer shapes of its mesh"
-    else:
-        remedy = "give it fewer <collision> shapes, which may overlap"
-    what = "a mesh" if is_mesh else f"{len(shapes)} shapes"
-    return (
-        f"its collision model is {what}, whose {len(cover.spheres)} spheres reach {1000.0 * cover.bulge:.0f} mm beyond "
-        f"it, not {1000.0 * bulge:g} mm: what comes so near takes longer to check",
-        remedy,
-    )
+        return because("trial.link.mesh", remedy("fit_mesh", **named), **figures)
+    if any(each.name == link and any(visual.mesh for visual in each.visuals) for each in arm.model.links):
+        would_do = remedy("fit_wider", **named, within=f"{wider}mm")
+        return because("trial.link.shapes", would_do, **figures, shapes=len(shapes))
+    return because("trial.link.shapes", remedy("fewer_shapes"), **figures, shapes=len(shapes))
 
 
 def _require_distinct(shapes: Sequence[CollisionShape]) -> None:

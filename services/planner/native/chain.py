@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import wrong_file
 from gemelo.libraries.arm.kinematics.chain import origin_of
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.schemas.reasons import because
 from gemelo.services.planner.collision_geometry.shapes import matrix_of
 
 Array = NDArray[np.float64]
@@ -72,7 +73,7 @@ def _base_in_root(arm: ArmDescription, root: str) -> Array:
     while link != root:
         joint = next(joint for joint in arm.model.joints if joint.child == link)
         if joint.kind is not JointKind.FIXED:
-            raise DescriptionError(f'{arm.robot_path}: base_frame "{arm.base_frame}" moves with the joints')
+            raise wrong_file(arm.robot_path, because("robot.base_frame.moves", frame=arm.base_frame))
         pose = matrix_of(origin_of(joint)) @ pose
         link = joint.parent
     return pose
@@ -108,7 +109,7 @@ def _drive(arm: ArmDescription, joint: UrdfJoint) -> tuple[int, float, float]:
         offset += multiplier * joint.mimic.offset
         multiplier *= joint.mimic.multiplier
         joint = arm.model.joint(joint.mimic.joint)
-    raise DescriptionError(f'{arm.urdf_path}: joint "{joint.name}" mimics itself')
+    raise wrong_file(arm.urdf_path, because("robot.joint.mimics_itself", joint=joint.name))
 
 
 def _travel(arm: ArmDescription, joint: UrdfJoint, drive: int, multiplier: float, offset: float) -> float:

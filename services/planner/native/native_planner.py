@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.reasons import Reason
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.collision_geometry.shapes import Attachment, CollisionShape
 from gemelo.services.planner.native.assembly import Assembly, wide_spheres
@@ -73,8 +74,8 @@ class NativePlanner:
         return self._assembly.covers
 
     @property
-    def large_links(self) -> Mapping[str, tuple[str, str]]:
-        """The links whose spheres reach far beyond their shapes, each with what that means and the remedy."""
+    def large_links(self) -> Mapping[str, Reason]:
+        """The links whose spheres reach far beyond their shapes, each with what that means."""
         shapes = link_shapes(self.arm)
         said = {
             link: wide_spheres(self.arm, link, shapes[link], cover, self._bulge) for link, cover in self.covers.items()

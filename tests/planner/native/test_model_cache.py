@@ -15,6 +15,7 @@ import pytest
 from gemelo.libraries.arm.kinematics import self_collisions
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.arm.stl import read_stl
+from gemelo.schemas.reasons import remedy
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes, solid_of
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from gemelo.services.planner.core import Planner
@@ -230,11 +231,12 @@ def test_the_remedy_for_too_many_fitted_shapes_is_fewer_of_them_and_for_one_shap
     wide = SphereCover(np.zeros((1500, 4)), bulge)
     many = wide_spheres(meshed, link, sliced(20), wide, 0.005)
     assert many is not None
-    assert "20 shapes" in many[0]
-    assert "100 mm beyond" in many[0]
-    assert f"--link {link} --within 100mm --write` makes fewer shapes" in many[1]
+    assert many.code == "trial.link.shapes"
+    assert many.values == {"spheres": 1500, "reach": bulge, "usual": 0.005, "shapes": 20}
+    assert many.remedies == (remedy("fit_wider", folder=str(meshed.folder), link=link, within="100mm"),)
     raw = wide_spheres(meshed, link, [*sliced(1), cube()], wide, 0.005)
     assert raw is not None
-    assert f"--link {link} --write` makes boxes" in raw[1]
+    assert raw.code == "trial.link.mesh"
+    assert raw.remedies == (remedy("fit_mesh", folder=str(meshed.folder), link=link),)
     assert wide_spheres(meshed, link, sliced(1), wide, 0.005) is None
     assert wide_spheres(meshed, link, sliced(20), SphereCover(wide.spheres, 0.03), 0.005) is None
