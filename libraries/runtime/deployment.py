@@ -18,7 +18,7 @@ import msgspec
 from gemelo.libraries.toml_lines import syntax_mistake, type_mistake
 from gemelo.schemas.deployment import Deployment, DeploymentRecord
 from gemelo.schemas.errors import ConfigurationError
-from gemelo.schemas.reasons import Reason, because, remedy
+from gemelo.schemas.reasons import Reason, Remedy, because, remedy
 from gemelo.schemas.text_file import NotUtf8, read_text
 
 DEFAULT_FILE = "deploy/local.toml"
@@ -143,6 +143,11 @@ def when_silent(host: str) -> str:
     if is_loopback(host):
         return "start the twin with `make up`"
     return f"is that host on, does it answer `ping {host}` from here, and does its service run?"
+
+
+def remedy_when_silent(host: str) -> Remedy:
+    """As `when_silent`, as data."""
+    return remedy("start_twin") if is_loopback(host) else remedy("look_at_host", host=host)
 
 
 def _read(file: Path) -> dict[str, Any]:

@@ -16,10 +16,10 @@ import pytest
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus
 from gemelo.libraries.runtime.clock_offset import ClockOffset
-from gemelo.libraries.runtime.deployment import when_silent
 from gemelo.schemas.device import DeviceState, DeviceStatus
 from gemelo.schemas.system import NodeInfo
 from gemelo.tools.chaos.descriptors import give_descriptors, take_descriptors
+from gemelo.tools.cli.common import language
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from gemelo.tools.cli.watch import doctor
@@ -68,6 +68,21 @@ def test_the_doctor_without_a_twin_says_what_would_do(monkeypatch, capsys):
     assert "twin" not in found
 
 
+def test_the_doctor_speaks_the_language_of_the_command_line_and_its_json_is_the_same(monkeypatch, capsys):
+    monkeypatch.setenv("GEMELO_ROUTER_PORT", "1")
+    monkeypatch.setenv("GEMELO_MQTT_PORT", "1")
+    assert run(["--lang", "es", "doctor"]) is ExitCode.FAILED
+    text = capsys.readouterr().out
+    assert re.search(r"^error +router +nadie escucha en 127\.0\.0\.1:1 \(", text, re.MULTILINE)
+    assert re.search(r"^(bien|aviso) +memoria +\d+\.\d GB libres", text, re.MULTILINE)
+    assert "router: arranque el gemelo con `make up`" in text
+    assert run(["--lang", "es", "doctor", "--json"]) is ExitCode.FAILED
+    found = {each["subject"]: each for each in json.loads(capsys.readouterr().out)}
+    assert found["router"]["found"].startswith("nobody listens at 127.0.0.1:1 (")
+    assert found["router"]["why"]["code"] == "doctor.listens.not"
+    language.choose(language.ENGLISH)
+
+
 def test_the_doctor_says_what_versions_are_installed(monkeypatch, capsys):
     monkeypatch.setenv("GEMELO_ROUTER_PORT", "1")
     run(["doctor"])
@@ -108,7 +123,7 @@ def test_the_doctor_says_how_much_room_is_left_and_what_would_do(
 @pytest.mark.parametrize(
     ("diagnosis", "verdict", "words"),
     [
-        (doctor.device(None, None, "make up"), "error", "make up"),
+        (doctor.device(None, None, "127.0.0.1"), "error", "make up"),
         (doctor.device(DeviceStatus(reason="no state for 0.5 s"), None, ""), "error", "offline: no state for 0.5 s"),
         (doctor.device(DeviceStatus(online=True, device="rm1"), DeviceState(fault=3), ""), "warning", "gemelo reset"),
         (doctor.clocks({"planner": ClockOffset(5.2, 0.01)}), "warning", "timedatectl"),
@@ -225,7 +240,7 @@ def test_the_doctor_says_what_is_wrong_with_the_deployment(monkeypatch, tmp_path
 
 
 def test_a_gateway_that_says_nothing_is_looked_for_on_its_own_host():
-    here, away = (doctor.device(None, None, when_silent(host)) for host in ("127.0.0.1", "10.0.0.12"))
+    here, away = (doctor.device(None, None, host) for host in ("127.0.0.1", "10.0.0.12"))
     assert here.found == away.found == "stepper_gateway says nothing of it"
     assert "make up" in here.remedy
     assert "make up" not in away.remedy

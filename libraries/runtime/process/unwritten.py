@@ -7,23 +7,28 @@ import threading
 import time
 from collections.abc import Callable
 
+from gemelo.schemas.reasons import Remedy, because, remedy
+
 RETRY = 1.0  # [s] chosen: a disk with room again is used soon, one that refuses costs nothing
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NO_DESCRIPTOR = (errno.EMFILE, errno.ENFILE)
 NO_RIGHT = (errno.EACCES, errno.EPERM)
 
 
-def remedy_of(error: OSError) -> str:
+def remedy_for(error: OSError) -> Remedy:
     """What a person can do so that the file can be written."""
     if error.errno in NO_ROOM:
-        return "make room on that disk"
+        return remedy("disk_room")
     if error.errno == errno.EROFS:
-        return "its disk is read-only, as Linux makes one that fails (`dmesg` says why): mount it anew, or replace it"
+        return remedy("disk_read_only")
     if error.errno in NO_DESCRIPTOR:
-        return "the process has no descriptor left: `ulimit -n` raises the limit for its next start"
-    if error.errno in NO_RIGHT:
-        return "`sudo chown` gives that folder to the user that gemelo runs as"
-    return "name another folder in [paths] of the deployment file"
+        return remedy("disk_descriptors")
+    return remedy("disk_right") if error.errno in NO_RIGHT else remedy("disk_folder")
+
+
+def remedy_of(error: OSError) -> str:
+    """The same as an English sentence."""
+    return str(because(remedy_for(error).code))
 
 
 class UnwrittenFiles:

@@ -9,35 +9,36 @@ import socket
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 import msgspec
 
+from gemelo.api.errors import reason_of
 from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt.access import gateway_access
 from gemelo.libraries.runtime.clock_offset import ClockOffset
-from gemelo.libraries.runtime.deployment import project_root, when_silent
+from gemelo.libraries.runtime.deployment import project_root, remedy_when_silent
 from gemelo.libraries.runtime.process.priority import may_step_ahead
-from gemelo.libraries.runtime.process.unwritten import remedy_of
+from gemelo.libraries.runtime.process.unwritten import remedy_for
 from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.deployment import Deployment, MqttSection, RouterSection, Wire
 from gemelo.schemas.device import DeviceState, DeviceStatus
-from gemelo.schemas.device_faults import fault_text
-from gemelo.schemas.device_link import offline_text, state_round_trip_text
+from gemelo.schemas.device_faults import fault_reason
+from gemelo.schemas.device_link import state_round_trip_text, warning_of, why_not_usable
 from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.reasons import Reason, Remedy, because, remedy, say_apart
 from gemelo.schemas.system import NodeInfo
 from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS
 from gemelo.tools.cli.bus.node import TIMEOUT, living
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
-from gemelo.tools.cli.common.language import sentence
+from gemelo.tools.cli.common.language import language, sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options
 from gemelo.tools.cli.version import gemelo_version, version_text
 
-BROKER_PAGE = "docs/my_broker.md has every such sentence with what to do"
 # Tuning constants: chosen.
 LEAST_DISK = 1e9  # [bytes] free: an hour of recordings
 LEAST_DESCRIPTORS = 8  # free ones of a process: a connection to a broker takes three
@@ -59,40 +60,80 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was looked at, what was found, and what would do."""
+    """What was looked at, and what was found, with what would do."""
 
     verdict: Verdict
     subject: str
+    why: Reason
+    title: Reason | None = None  # of the subject, where that has a name in it
+
+    @property
+    def found(self) -> str:
+        """In English, without what would do."""
+        return say_apart(self.why)[0]
+
+    @property
+    def remedy(self) -> str:
+        """What would do, in English; empty where nothing needs to be done."""
+        return say_apart(self.why)[1]
+
+    @property
+    def heading(self) -> Reason:
+        """The subject as data."""
+        return self.title or because("doctor.title", subject=self.subject)
+
+
+class Printed(msgspec.Struct, frozen=True):
+    """A line of --json, the same in every language."""
+
+    verdict: str
+    subject: str
     found: str
-    remedy: str = ""
+    remedy: str
+    why: Reason
 
 
 def run(options: Options) -> ExitCode:
     """Prints every diagnosis; FAILED if one of them is an error."""
     found = list(diagnoses())
     if options.json:
-        print(msgspec.json.encode([asdict(each) for each in found]).decode())
+        rows = [Printed(each.verdict.value, each.subject, each.found, each.remedy, each.why) for each in found]
+        print(msgspec.json.encode(rows).decode())
     else:
-        print(table(("", "what", "found"), [(each.verdict.value, each.subject, each.found) for each in found]))
-        for each in found:
-            if each.remedy:
-                print(f"{each.subject}: {each.remedy}")
+        _print(found)
     return ExitCode.FAILED if any(each.verdict is Verdict.ERROR for each in found) else ExitCode.OK
+
+
+def _print(found: Iterable[Diagnosis]) -> None:
+    """A table, and below it what would do."""
+    rows, remedies = [], []
+    for each in found:
+        heading, (text, mended) = sentence(each.heading), say_apart(each.why, language())
+        rows.append((sentence(because("doctor.title.verdict", verdict=each.verdict.value)), heading, text))
+        if mended:
+            remedies.append(sentence(because("doctor.line", subject=heading, text=mended)))
+    titles = (sentence(because("doctor.title", subject=word)) for word in ("what", "found"))
+    print(table(("", *titles), rows))
+    if remedies:
+        print("\n".join(remedies))
 
 
 def diagnoses() -> Iterator[Diagnosis]:
     """Of this machine, then of the deployment, then of the twin where it runs."""
-    yield Diagnosis(Verdict.OK, "versions", f"{version_text()}, {platform.system()} {platform.machine()}")
+    here = because("doctor.versions", text=version_text(), system=platform.system(), machine=platform.machine())
+    yield Diagnosis(Verdict.OK, "versions", here)
     yield from _machine()
     try:
         deployment = deployment_here()
     except ConfigurationError as error:
-        yield Diagnosis(Verdict.ERROR, "deployment", str(error), "correct the file that $GEMELO_CONFIG names")
+        yield Diagnosis(
+            Verdict.ERROR, "deployment", because("doctor.deployment", error.reason, remedy("correct_config"))
+        )
         return
     yield from _folders(deployment)
     yield _robot(deployment)
     if not _has_gateway(deployment):
-        yield Diagnosis(Verdict.OK, "wire", "the gateway is on another host of the site, and the device's wire with it")
+        yield Diagnosis(Verdict.OK, "wire", because("doctor.wire_elsewhere"))
     elif deployment.wire is Wire.SERIAL:
         yield serial_port(deployment.serial.device)
     else:
@@ -121,11 +162,13 @@ def runs(router: RouterSection) -> Iterator[Diagnosis]:
     for robot, nodes in sorted(running_robots(router).items()):
         info = ask_files(router, robot, nodes)
         if info is None:
-            found = f"{len(nodes)} nodes are alive, and none says what it was started with"
-            yield Diagnosis(Verdict.WARNING, f"runs {robot}", found, "`gemelo node list` says which do not answer")
+            why, verdict = because("doctor.runs.silent", remedy("see_which_nodes"), count=len(nodes)), Verdict.WARNING
+        elif info.files.cell:
+            why = because("doctor.runs.with_cell", robot=info.files.robot, host=info.host, cell=info.files.cell)
+            verdict = Verdict.OK
         else:
-            cell = f"with {info.files.cell}" if info.files.cell else "without a cell"
-            yield Diagnosis(Verdict.OK, f"runs {robot}", f"{info.files.robot} on {info.host}, {cell}")
+            why, verdict = because("doctor.runs.without_cell", robot=info.files.robot, host=info.host), Verdict.OK
+        yield Diagnosis(verdict, f"runs {robot}", why, because("doctor.title.runs", robot=robot))
 
 
 def _has_gateway(deployment: Deployment) -> bool:
@@ -137,29 +180,26 @@ def _machine() -> Iterator[Diagnosis]:
     import psutil  # 20 ms
 
     busy, cores = psutil.cpu_percent(CPU_OVER), os.cpu_count() or 1
-    found = f"{busy:.0f} % of {cores} cores in use"
-    if busy > MOST_CPU:
-        remedy = "end what uses it (`gemelo top` says which node): a virtual device loses time when it has to wait"
-        yield Diagnosis(Verdict.WARNING, "CPU", found, remedy)
-    else:
-        yield Diagnosis(Verdict.OK, "CPU", found)
+    is_busy = busy > MOST_CPU
+    hint = (remedy("end_what_uses_cpu"),) if is_busy else ()
+    why = because("doctor.cpu", *hint, busy=busy, cores=cores)
+    yield Diagnosis(Verdict.WARNING if is_busy else Verdict.OK, "CPU", why)
     yield _priority()
     memory = psutil.virtual_memory().available
-    yield _enough("memory", memory, LEAST_MEMORY, "end what uses it")
+    yield _enough("memory", memory, LEAST_MEMORY, remedy("end_what_uses_it"))
 
 
 def _priority() -> Diagnosis:
     """Of gateway, broker, router and virtual device; without it a twin works, as long as the machine has time left."""
     if may_step_ahead():
-        return Diagnosis(Verdict.OK, "priority", "heartbeats and stops go before everything else of this machine")
-    found = "heartbeats and stops wait their turn: beside much other work a device may hold for want of them"
-    remedy = 'a line "<user> - rtprio 1" in /etc/security/limits.conf and a new login let them go first'
-    return Diagnosis(Verdict.OK, "priority", found, remedy)
+        return Diagnosis(Verdict.OK, "priority", because("doctor.priority"))
+    return Diagnosis(Verdict.OK, "priority", because("doctor.priority.none", remedy("real_time_limit")))
 
 
-def _enough(subject: str, free: float, least: float, remedy: str) -> Diagnosis:
-    found = f"{free / 1e9:.1f} GB free"
-    return Diagnosis(*((Verdict.WARNING, subject, found, remedy) if free < least else (Verdict.OK, subject, found)))
+def _enough(subject: str, free: float, least: float, hint: Remedy) -> Diagnosis:
+    is_little = free < least
+    why = because("doctor.free", *((hint,) if is_little else ()), free=free / 1e9)
+    return Diagnosis(Verdict.WARNING if is_little else Verdict.OK, subject, why)
 
 
 def _folders(deployment: Deployment) -> Iterator[Diagnosis]:
@@ -167,10 +207,11 @@ def _folders(deployment: Deployment) -> Iterator[Diagnosis]:
         path = project_root() / text
         there = next(each for each in (path, *path.parents) if each.exists())
         if (error := _refusal(there)) is not None:
-            found = f"{path} cannot be written ({error.strerror}): what moves and stops the arm goes on without"
-            yield Diagnosis(Verdict.ERROR, f"folder {name}", found, remedy_of(error))
+            why = because("doctor.folder", remedy_for(error), path=str(path), error=str(error.strerror))
+            yield Diagnosis(Verdict.ERROR, f"folder {name}", why, because("doctor.title.folder", folder=name))
         elif name == "recordings":
-            yield _enough("disk", shutil.disk_usage(there).free, LEAST_DISK, f"free space where {path} is")
+            hint = remedy("free_space", path=str(path))
+            yield _enough("disk", shutil.disk_usage(there).free, LEAST_DISK, hint)
 
 
 def _refusal(folder: Path) -> OSError | None:
@@ -188,28 +229,31 @@ def _robot(deployment: Deployment) -> Diagnosis:
 
     errors = [each for each in check(project_root() / deployment.robot) if each.severity is Severity.ERROR]
     if errors:
-        return Diagnosis(Verdict.ERROR, "robot", str(errors[0]), f"`gemelo check {deployment.robot}` says them all")
-    return Diagnosis(Verdict.OK, "robot", f"{deployment.robot} is well")
+        hint = remedy("check_robot", robot=deployment.robot)
+        return Diagnosis(Verdict.ERROR, "robot", because("doctor.robot.wrong", errors[0].reason, hint))
+    return Diagnosis(Verdict.OK, "robot", because("doctor.robot", robot=deployment.robot))
 
 
 def serial_port(device: str) -> Diagnosis:
     """Whether it is there and may be opened."""
     path = Path(device)
     if not path.exists():
-        return Diagnosis(Verdict.ERROR, "serial port", f"{device} is not there", "plug the board in, or name its port")
+        why = because("doctor.serial.absent", remedy("plug_in"), port=device)
+        return Diagnosis(Verdict.ERROR, "serial port", why)
     if not os.access(path, os.R_OK | os.W_OK):
-        remedy = "sudo usermod -aG dialout $USER, then log in anew"
-        return Diagnosis(Verdict.ERROR, "serial port", f"{device} may not be opened", remedy)
-    return Diagnosis(Verdict.OK, "serial port", device)
+        why = because("doctor.serial.denied", remedy("join_dialout"), port=device)
+        return Diagnosis(Verdict.ERROR, "serial port", why)
+    return Diagnosis(Verdict.OK, "serial port", because("doctor.serial", port=device))
 
 
 def _listener(name: str, host: str, port: int) -> Diagnosis:
     try:
         socket.create_connection((host, port), timeout=1.0).close()
     except OSError as error:
-        found = f"nobody listens at {host}:{port} ({error.strerror or error})"
-        return Diagnosis(Verdict.ERROR, name, found, when_silent(host))
-    return Diagnosis(Verdict.OK, name, f"listens at {host}:{port}")
+        text = str(error.strerror or error)
+        why = because("doctor.listens.not", remedy_when_silent(host), host=host, port=port, error=text)
+        return Diagnosis(Verdict.ERROR, name, why)
+    return Diagnosis(Verdict.OK, name, because("doctor.listens", host=host, port=port))
 
 
 def broker(section: MqttSection) -> Diagnosis:
@@ -219,12 +263,16 @@ def broker(section: MqttSection) -> Diagnosis:
     try:
         access = gateway_access(section)
     except AccessError as error:
-        return Diagnosis(Verdict.ERROR, "broker", str(error), BROKER_PAGE)
+        return _broker_refuses(reason_of(error))
     listening = _listener("broker", section.host, section.port)
     if listening.verdict is Verdict.ERROR and access.is_ours:
         return listening
     said = problem(access)
-    return listening if said is None else Diagnosis(Verdict.ERROR, "broker", sentence(said), BROKER_PAGE)
+    return listening if said is None else _broker_refuses(said)
+
+
+def _broker_refuses(why: Reason) -> Diagnosis:
+    return Diagnosis(Verdict.ERROR, "broker", because("doctor.broker", why, remedy("broker_page")))
 
 
 def _twin() -> Iterator[Diagnosis]:
@@ -232,7 +280,7 @@ def _twin() -> Iterator[Diagnosis]:
         with connect() as session:
             yield from twin(session)
     except CommandError as error:
-        yield Diagnosis(Verdict.ERROR, "twin", str(error))
+        yield Diagnosis(Verdict.ERROR, "twin", because("doctor.twin", text=str(error)))
 
 
 def twin(session: CommandSession) -> Iterator[Diagnosis]:
@@ -243,10 +291,13 @@ def twin(session: CommandSession) -> Iterator[Diagnosis]:
     node.subscribe(DEVICE_STATUS, statuses.append)
     node.subscribe(DEVICE_STATE, states.append)
     node.wait(LISTENING)
-    nodes, up = living(session), when_silent(session.deployment.router.host)
-    yield Diagnosis(Verdict.OK if nodes else Verdict.ERROR, "nodes", ", ".join(nodes) or "none", "" if nodes else up)
+    nodes, host = living(session), session.deployment.router.host
+    if nodes:
+        yield Diagnosis(Verdict.OK, "nodes", because("doctor.nodes", names=", ".join(nodes)))
+    else:
+        yield Diagnosis(Verdict.ERROR, "nodes", because("doctor.nodes.none", remedy_when_silent(host)))
     yield from twins(node.twins())
-    yield device(statuses[-1] if statuses else None, states[-1] if states else None, up, node.now())
+    yield device(statuses[-1] if statuses else None, states[-1] if states else None, host, node.now())
     yield from warning(statuses[-1] if statuses else None)
     told = _told(session, nodes)
     yield versions({name: info for name, (info, _) in told.items()})
@@ -258,10 +309,9 @@ def twin(session: CommandSession) -> Iterator[Diagnosis]:
 def twins(borne: Mapping[str, tuple[str, ...]]) -> Iterator[Diagnosis]:
     """Several nodes of one name: the older gives way by itself, unless it stands still."""
     for name, processes in borne.items():
-        remedy = f"the older ends by itself within 2 s; if it does not, end {processes[0]}"
-        yield Diagnosis(
-            Verdict.ERROR, f"two {name}", f"{name} lives {len(processes)} times: {', '.join(processes)}", remedy
-        )
+        hint = remedy("older_gives_way", process=processes[0])
+        why = because("doctor.two", hint, node=name, count=len(processes), processes=", ".join(processes))
+        yield Diagnosis(Verdict.ERROR, f"two {name}", why, because("doctor.title.two", node=name))
 
 
 def _told(session: CommandSession, nodes: Iterable[str]) -> dict[str, tuple[NodeInfo, ClockOffset | None]]:
@@ -281,16 +331,19 @@ def versions(infos: Mapping[str, NodeInfo]) -> Diagnosis:
     own = gemelo_version()
     others = [f"{name} {info.version} on {info.host}" for name, info in infos.items() if info.version not in ("", own)]
     if not others:
-        return Diagnosis(Verdict.OK, "versions of the nodes", f"{len(infos)} nodes run {own}, as this command")
-    remedy = "put one version on every host (`make setup` there), and start its nodes anew"
-    return Diagnosis(Verdict.WARNING, "versions of the nodes", f"{', '.join(others)}; this command is {own}", remedy)
+        why = because("doctor.node_versions", count=len(infos), version=own)
+        return Diagnosis(Verdict.OK, "versions of the nodes", why)
+    why = because("doctor.node_versions.other", remedy("one_version"), others=", ".join(others), version=own)
+    return Diagnosis(Verdict.WARNING, "versions of the nodes", why)
 
 
 def unwritten(infos: Iterable[NodeInfo]) -> Iterator[Diagnosis]:
     """What a node cannot write to its disk, with the remedies; nothing for one that can."""
     for info in infos:
         if info.unwritten:
-            yield Diagnosis(Verdict.WARNING, f"files of {info.node} on {info.host}", info.unwritten)
+            title = because("doctor.title.files", node=info.node, host=info.host)
+            why = because("doctor.unwritten", text=info.unwritten)
+            yield Diagnosis(Verdict.WARNING, f"files of {info.node} on {info.host}", why, title)
 
 
 def descriptors(infos: Iterable[NodeInfo]) -> Iterator[Diagnosis]:
@@ -302,47 +355,48 @@ def descriptors(infos: Iterable[NodeInfo]) -> Iterator[Diagnosis]:
             process = psutil.Process(info.pid)
             used, most = process.num_fds(), process.rlimit(psutil.RLIMIT_NOFILE)[0]
             if most - used < LEAST_DESCRIPTORS:
-                found = f"{used} are in use, its limit is {most}: a connection that breaks does not come back"
-                remedy = "`ulimit -n` raises the limit for its next start; `gemelo top` shows whether it grows"
-                yield Diagnosis(Verdict.WARNING, f"descriptors of {info.node}", found, remedy)
+                why = because("doctor.descriptors", remedy("raise_descriptors"), used=used, limit=most)
+                title = because("doctor.title.descriptors", node=info.node)
+                yield Diagnosis(Verdict.WARNING, f"descriptors of {info.node}", why, title)
 
 
-def device(status: DeviceStatus | None, state: DeviceState | None, up: str, now: int = 0) -> Diagnosis:
-    """Whether it is online, and in no fault, at `now` [ns UNIX]; `up` is the remedy where no gateway speaks of it."""
+def device(status: DeviceStatus | None, state: DeviceState | None, host: str, now: int = 0) -> Diagnosis:
+    """Whether it is online, and in no fault, at `now` [ns UNIX]; `host`: the router's, where its gateway should be."""
     if status is None:
-        return Diagnosis(Verdict.ERROR, "device", "stepper_gateway says nothing of it", up)
+        return Diagnosis(Verdict.ERROR, "device", because("doctor.device.silent", remedy_when_silent(host)))
     if not status.online:
-        remedy = "see that it has power and reaches its broker; `gemelo device status` says more"
-        if status.speaks:  # the sentence has the causes, and what to do
-            remedy = "docs/my_broker.md has the broker's ACL" if status.deaf_since else ""
-        return Diagnosis(Verdict.ERROR, "device", offline_text(status, now), remedy)
-    if state is not None and state.fault:
-        return Diagnosis(
-            Verdict.WARNING, "device", fault_text(state.fault), "`gemelo reset`, when a person has seen why"
-        )
-    trip = "" if state is None else f", {state_round_trip_text(state)}"
-    return Diagnosis(Verdict.OK, "device", f"{status.device} is online{trip}")
+        return Diagnosis(Verdict.ERROR, "device", _offline(status, now))
+    if state is not None and (fault := fault_reason(state.fault)):
+        return Diagnosis(Verdict.WARNING, "device", because("doctor.device.fault", fault, remedy("reset_when_seen")))
+    if state is None:
+        return Diagnosis(Verdict.OK, "device", because("doctor.device", device=status.device))
+    trip = state_round_trip_text(state)
+    return Diagnosis(Verdict.OK, "device", because("doctor.device.round_trip", device=status.device, trip=trip))
+
+
+def _offline(status: DeviceStatus, now: int) -> Reason:
+    """Where its states arrive, the reason has the causes and what to do."""
+    why = why_not_usable(status, now)
+    if not status.speaks:
+        return because("doctor.device.offline", why, remedy("power_and_broker"))
+    return because("doctor.device.not_usable", why, *((remedy("broker_acl"),) if status.deaf_since else ()))
 
 
 def warning(status: DeviceStatus | None) -> Iterator[Diagnosis]:
     """What a person has to mend beside an online device: two planners, another program on the device's topics."""
-    if status is not None and status.warning:
-        yield Diagnosis(Verdict.WARNING, "who speaks", status.warning)
+    if status is not None and (why := warning_of(status)) is not None:
+        yield Diagnosis(Verdict.WARNING, "who speaks", because("doctor.warning", why))
 
 
 def clocks(offsets: Mapping[str, ClockOffset]) -> Diagnosis:
     """How far the clock of each node's host is from this one's; no motion depends on it."""
     if not offsets:
-        return Diagnosis(Verdict.WARNING, "clocks", "no node tells its time, so they cannot be compared")
+        return Diagnosis(Verdict.WARNING, "clocks", because("doctor.clocks.unknown"))
     apart = {name: each for name, each in offsets.items() if abs(each.offset) > MOST_SKEW + each.bound}
     if apart:
         found = ", ".join(f"{name} {each}" for name, each in apart.items())
-        remedy = (
-            "let all hosts take their time from one server (timedatectl set-ntp true): motions do not mind, but logs "
-            "and recordings of several hosts are hard to lay side by side"
-        )
-        return Diagnosis(Verdict.WARNING, "clocks", f"against this host's: {found}", remedy)
+        why = because("doctor.clocks.apart", remedy("one_time_server"), offsets=found)
+        return Diagnosis(Verdict.WARNING, "clocks", why)
     name = max(offsets, key=lambda each: abs(offsets[each].offset))
-    return Diagnosis(
-        Verdict.OK, "clocks", f"{len(offsets)} nodes; farthest from this host's is {name}, {offsets[name]}"
-    )
+    why = because("doctor.clocks", count=len(offsets), node=name, offset=str(offsets[name]))
+    return Diagnosis(Verdict.OK, "clocks", why)
