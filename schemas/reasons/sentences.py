@@ -5,7 +5,7 @@ from __future__ import annotations
 import string
 from collections.abc import Mapping, Sequence
 from enum import Enum
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, Protocol
 
 from gemelo.schemas.reasons.catalogue import ENGLISH, template
@@ -57,7 +57,7 @@ def say_apart(reason: Explained, language: str = ENGLISH, front_end: FrontEnd = 
     return writer.sentence(reason, False), writer.remedies(reason)
 
 
-class _Writer(string.Formatter):
+class _Writer:
     """Puts values into the templates of one language and one front end.
 
     What stands behind a value's colon is its unit, or how it is worded: `word`, one that the catalogue translates,
@@ -99,7 +99,17 @@ class _Writer(string.Formatter):
         if found is None:
             values = ", ".join(f"{name} {value}" for name, value in what.values.items())
             return f"{what.code} ({values})" if values else what.code
-        return self.vformat(found, (), _Values({**what.values, **within}))
+        return self._put_in(found, _Values({**what.values, **within}))
+
+    def _put_in(self, template: str, values: Mapping[str, Any]) -> str:
+        """As `str.format` does it, which takes a template apart anew each time."""
+        texts = []
+        for fixed, name, spec, is_quoted in _parts(template):
+            texts.append(fixed)
+            if name is not None:
+                value = repr(values[name]) if is_quoted else values[name]
+                texts.append(self.format_field(value, self._put_in(spec, values) if "{" in spec else spec))
+        return "".join(texts)
 
     def format_field(self, value: Value, format_spec: str) -> str:
         """One value as it is written."""
@@ -172,6 +182,13 @@ class _Values(dict[str, Any]):
 
     def __missing__(self, name: str) -> str:
         return "?"
+
+
+@lru_cache(maxsize=4096)  # chosen: more than the templates of all languages
+def _parts(template: str) -> tuple[tuple[str, str | None, str, bool], ...]:
+    """Fixed words, each with name and specification of the value behind them; true where that is `{name!r}`."""
+    parsed = string.Formatter().parse(template)
+    return tuple((fixed, name, spec or "", conversion == "r") for fixed, name, spec, conversion in parsed)
 
 
 @cache

@@ -150,3 +150,7 @@ def test_an_example_is_that_of_a_real_cause_and_has_the_values_of_its_template()
 def test_the_index_has_every_template_that_the_files_have():
     for language in languages():
         assert {name for context, name in entries(language) if not context} == set(catalogue(language))
+
+
+def test_a_value_may_be_quoted_as_python_writes_it():
+    assert str(because("program.name.blank", kind="point", name=" P1")).startswith("the point's name ' P1' ")
