@@ -6,6 +6,7 @@ from enum import StrEnum
 
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.message import Message, Vector
+from gemelo.schemas.reasons import Reason
 
 
 class CameraImage(Message, frozen=True, kw_only=True):
@@ -58,3 +59,4 @@ class CameraStatus(Message, frozen=True, kw_only=True):
     condition: CameraCondition = CameraCondition.STARTING
     text: str = ""  # what is wrong and the remedy; empty while it streams
     fps: float = 0.0  # [Hz] images of the last second
+    why: Reason | None = None  # `text` as data

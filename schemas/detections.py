@@ -6,6 +6,7 @@ from enum import StrEnum
 
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.message import Message, Vector
+from gemelo.schemas.reasons import Reason
 
 
 class DetectionKind(StrEnum):
@@ -36,6 +37,7 @@ class Unclear(Message, frozen=True, kw_only=True):
     names: tuple[str, ...] = ()  # of the things in the cell file that it may be
     corners: tuple[Vector, ...] = ()  # (4, 2) [px] of the rectangle around it, in order
     reason: str = ""  # why it is not taken for any of them
+    why: Reason | None = None  # `reason` as data
 
 
 class Detections(Message, frozen=True, kw_only=True):
@@ -46,3 +48,4 @@ class Detections(Message, frozen=True, kw_only=True):
     items: tuple[Detection, ...] = ()
     unclear: tuple[Unclear, ...] = ()
     doubt: str = ""  # why places in the base frame are not to be trusted; empty: nothing speaks against them
+    doubt_why: Reason | None = None  # `doubt` as data

@@ -104,7 +104,7 @@ class Eyes:
             raise Refused(because("detect.no_camera", path=str(cell.path)), check="camera")
         stood = self._require_rest()
         found: dict[str, Seen] = {}
-        unclear = ""
+        unclear: Reason | None = None
         for each in cameras:
             images = self._images(cell, each)
             unclear = unclear or why_unclear(images, name)
@@ -116,7 +116,7 @@ class Eyes:
         if moved > STILL:
             raise _moving()
         if name and name not in found and unclear:
-            raise Refused(because("detect.unclear", thing=name, reason=unclear), check="detection", subject=name)
+            raise Refused(because("detect.unclear", unclear, thing=name), check="detection", subject=name)
         if name and name not in found:
             raise Refused(_not_seen(name, cameras, sorted(found)), check="detection", subject=name)
         if in_scene:
@@ -178,7 +178,7 @@ class Eyes:
             raise Refused(_why_none(camera, status, late, patience), check="camera", subject=camera)
         doubt = heard[-1].doubt
         if doubt:
-            why = because("detect.camera_doubt", camera=camera, reason=doubt)
+            why = because("detect.camera_doubt", heard[-1].doubt_why or plain(doubt), camera=camera)
             raise Refused(why, check="camera", subject=camera)
         return heard
 
@@ -220,12 +220,12 @@ def combined(images: Sequence[Detections], known: Iterable[str]) -> list[Seen]:
     return found
 
 
-def why_unclear(images: Sequence[Detections], name: str) -> str:
-    """Why something that most images of one camera show is not taken for the thing of that name; empty if nothing may
+def why_unclear(images: Sequence[Detections], name: str) -> Reason | None:
+    """Why something that most images of one camera show is not taken for the thing of that name; None if nothing may
     be it."""
-    reasons = [next((each.reason for each in image.unclear if name in each.names), "") for image in images]
-    told = [reason for reason in reasons if reason]
-    return told[-1] if len(told) >= ENOUGH else ""
+    found = [next((each for each in image.unclear if name in each.names), None) for image in images]
+    unclear = [each for each in found if each is not None]
+    return unclear[-1].why or plain(unclear[-1].reason) if len(unclear) >= ENOUGH else None
 
 
 def _seen(once: Sequence[tuple[int, Detection]], camera: str, trouble: Reason | None) -> Seen:
@@ -281,7 +281,7 @@ def streams(status: Sequence[CameraStatus]) -> bool:
 
 def _why_none(camera: str, status: Sequence[CameraStatus], late: Sequence[float], patience: float) -> Reason:
     if status and status[-1].text:
-        return because("detect.camera_state", reason=status[-1].text)
+        return status[-1].why or plain(status[-1].text)
     if late and min(late) > OLDEST:
         return because("detect.late", camera=camera, age=min(late), limit=OLDEST)
     if streams(status):

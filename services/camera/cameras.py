@@ -13,6 +13,7 @@ from gemelo.libraries.runtime.node_clock import NodeClock
 from gemelo.libraries.runtime.scene_meshes import SceneMeshes
 from gemelo.schemas.camera import CameraCondition, CameraImage
 from gemelo.schemas.cell import CameraRecord, FileSource, FolderSource, V4l2Source, VirtualSource
+from gemelo.schemas.reasons import plain
 from gemelo.schemas.topics import (
     GATEWAY,
     GRIPPER_STATE,
@@ -25,7 +26,7 @@ from gemelo.schemas.topics import (
 )
 from gemelo.services.camera.core import CameraCore
 from gemelo.services.camera.reader import ClockedReader, ImageReader
-from gemelo.services.camera.sources.source import CameraFault, CameraSource, EncodedImage
+from gemelo.services.camera.sources.source import CameraSource, EncodedImage, fault_of
 from gemelo.services.camera.sources.stored import FolderOfImages, Video
 from gemelo.services.camera.sources.v4l2 import V4l2Camera
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera, true_detections
@@ -105,7 +106,7 @@ class _Camera:
         try:
             self._image.put(image)
         except TooLarge as error:
-            self._core.on_fault(CameraFault(CameraCondition.REFUSED, f'camera "{self._record.name}": {error}'), now)
+            self._core.on_fault(fault_of(self._record.name, CameraCondition.REFUSED, plain(str(error))), now)
 
     def _log(self) -> None:
         """A change of condition, once."""

@@ -10,7 +10,8 @@ import cv2
 
 from gemelo.libraries.runtime.clock import Clock
 from gemelo.schemas.camera import CameraCondition
-from gemelo.services.camera.sources.source import CameraFault, CameraSource, EncodedImage
+from gemelo.schemas.reasons import plain
+from gemelo.services.camera.sources.source import CameraFault, CameraSource, EncodedImage, fault_of
 
 RETRY = 0.5  # [s] between two attempts to open
 
@@ -63,7 +64,7 @@ class ImageReader:
                 if fault.condition is CameraCondition.ENDED:
                     self._stop.set()
             except (OSError, cv2.error) as error:  # as a folder that is being removed while it is read
-                self._put(CameraFault(CameraCondition.REFUSED, f'camera "{self._thread.name}": {error}'))
+                self._put(fault_of(self._thread.name, CameraCondition.REFUSED, plain(str(error))))
             finally:
                 self._source.close()
             self._stop.wait(RETRY)

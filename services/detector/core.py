@@ -29,6 +29,7 @@ from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import BoxThing, Colour, ColourThing, OnnxThing, TagRecord, TagThing
 from gemelo.schemas.detections import Detection, DetectionKind, Detections, Unclear
 from gemelo.schemas.frames import Transform
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.detector.regions import (
     DetectorView,
     distances_from,
@@ -88,8 +89,14 @@ class Detector:
                     items.append(found)
             items += self._classes(view)
             items += self._standing_out(view, items)
+        doubt = self._doubt(tags)
         return Detections(
-            stamp=stamp, camera=info.name, items=tuple(items), unclear=tuple(unclear), doubt=self._doubt(tags)
+            stamp=stamp,
+            camera=info.name,
+            items=tuple(items),
+            unclear=tuple(unclear),
+            doubt=str(doubt or ""),
+            doubt_why=doubt,
         )
 
     def _tags(self, view: DetectorView) -> Iterator[tuple[Tagged, Detection]]:
@@ -137,7 +144,7 @@ class Detector:
             return None
         return view.plane(table + (height_of_frame(record) if isinstance(record, TagThing) else 0.0))
 
-    def _doubt(self, tags: Sequence[tuple[Tagged, Detection]]) -> str:
+    def _doubt(self, tags: Sequence[tuple[Tagged, Detection]]) -> Reason | None:
         """Why the camera is not believed to stand where it stood: the fixed tag that is farthest from its place."""
         off = {}
         for record, item in tags:
@@ -145,12 +152,9 @@ class Detector:
                 apart = np.subtract(item.base_from_thing.translation, record.position)
                 off[record.id] = float(np.linalg.norm(apart)) - 3.0 * item.sigma
         if not off or max(off.values()) < MOVED:
-            return ""
+            return None
         worst = max(off, key=lambda number: off[number])
-        return (
-            f"the fixed tag {worst} is seen {1e3 * off[worst]:.0f} mm away from its place: the camera or the tag was "
-            "moved; put it back, or measure anew where the camera stands"
-        )
+        return because("detect.tag_moved", tag=worst, distance=1e3 * off[worst])
 
     def _colours(self, view: DetectorView) -> Iterator[Detection | Unclear]:
         for colour, things in self._coloured.items():

@@ -16,6 +16,7 @@ from gemelo.libraries.vision.windows import Mask, Window, halved
 from gemelo.schemas.cell import ColourThing
 from gemelo.schemas.detections import Detection, Unclear
 from gemelo.schemas.frames import Transform
+from gemelo.schemas.reasons import because
 
 # Tuning constants: chosen, where a line does not say measured.
 LARGEST_ERROR = 0.7  # [px] RMS of an outline that is a box; measured: 0.1 to 0.3 for boxes, above 1 for what is none
@@ -53,12 +54,13 @@ def unclear_region(things: Sequence[ColourThing], region: Mask, window: Window) 
     left, right = columns.min() + window.left, columns.max() + 1 + window.left
     upper, lower = rows.min() + window.top, rows.max() + 1 + window.top
     sizes = sorted({tuple(1e3 * edge for edge in thing.box) for thing in things})
-    boxes = " or ".join(" x ".join(f"{edge:g}" for edge in size) for size in sizes)
+    boxes = tuple(" x ".join(f"{edge:g}" for edge in size) for size in sizes)
+    why = because("detect.outline", colour=things[0].colour.value, boxes=boxes)
     return Unclear(
         names=tuple(thing.name for thing in things),
         corners=rows_of(np.array([[left, upper], [right, upper], [right, lower], [left, lower]], dtype=np.float64)),
-        reason=f"something {things[0].colour.value} is seen, and its outline is not that of a box of {boxes} mm on the "
-        "table: is it partly hidden, tilted, or of another size?",
+        reason=str(why),
+        why=why,
     )
 
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 import pytest
 
 from gemelo.schemas.camera import CameraCondition, CameraImage, CameraStatus
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.camera.core import CameraCore
-from gemelo.services.camera.sources.source import CameraFault, EncodedImage
+from gemelo.services.camera.sources.source import EncodedImage, fault_of
 
 SECOND = 1_000_000_000
 STEP = SECOND // 10
 START = 1_700_000_000 * SECOND
+
+
+NO_VIDEO = because("camera.file.no_video", file="a.avi")
 
 
 class Watched:
@@ -38,8 +42,8 @@ class Watched:
         self._count += 0 if same else 1
         return self.core.on_frame(EncodedImage(self.now - 5, 640, 480, b"\xff\xd8%d" % self._count), self.now)
 
-    def fault(self, condition: CameraCondition, text: str = 'camera "webcam": no') -> None:
-        self.core.on_fault(CameraFault(condition, text), self.now)
+    def fault(self, condition: CameraCondition, what: Reason = NO_VIDEO) -> None:
+        self.core.on_fault(fault_of("webcam", condition, what), self.now)
 
     def until(self, condition: CameraCondition, timeout: float, streaming: bool = False, same: bool = False) -> float:
         """[s] until a status of that condition has been said."""
@@ -69,9 +73,11 @@ def test_the_status_is_said_at_every_change_and_once_a_second() -> None:
 @pytest.mark.parametrize("condition", [CameraCondition.MISSING, CameraCondition.TAKEN, CameraCondition.REFUSED])
 def test_what_cannot_be_opened_is_named_at_the_next_step_and_comes_back(condition: CameraCondition) -> None:
     watched = Watched()
-    watched.fault(condition, 'camera "webcam": process 12 (cheese) has /dev/video0: end that program')
+    taken = because("camera.device.taken", holder="process 12 (cheese)", path="/dev/video0")
+    watched.fault(condition, taken)
     assert watched.until(condition, 2.0) <= 0.2
-    assert "cheese" in watched.said[-1].text
+    assert watched.said[-1].why == because("camera.fault", taken, camera="webcam")
+    assert watched.said[-1].text == 'camera "webcam": process 12 (cheese) has /dev/video0: end that program'
     watched.fault(condition)
     watched.wait(1.0)
     watched.frame()
@@ -97,6 +103,9 @@ def test_one_that_sends_nothing_is_frozen_within_two_seconds_and_comes_back() ->
     watched.wait(1.0, streaming=True)
     assert watched.until(CameraCondition.FROZEN, 2.0) <= 2.0
     assert "no new image for 1." in watched.said[-1].text
+    why = watched.said[-1].why
+    assert why is not None
+    assert [cause.code for cause in why.causes] == ["camera.frozen"]
     watched.frame()
     assert watched.until(CameraCondition.STREAMING, 2.0) <= 0.2
 

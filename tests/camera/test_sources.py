@@ -17,6 +17,7 @@ import pytest
 
 from gemelo.schemas.camera import CameraCondition
 from gemelo.schemas.cell import CameraRecord, V4l2Source, VirtualSource
+from gemelo.schemas.reasons import because
 from gemelo.services.camera.reader import ImageReader
 from gemelo.services.camera.sources.source import CameraFault, EncodedImage, encoded
 from gemelo.services.camera.sources.stored import FolderOfImages, Video
@@ -100,6 +101,8 @@ def test_what_the_camera_does_not_take_is_refused_by_name(device: Path) -> None:
     size = fault_of(camera(device, PretendCapture({cv2.CAP_PROP_FRAME_WIDTH: 320.0, cv2.CAP_PROP_FRAME_HEIGHT: 240.0})))
     assert size.condition is CameraCondition.REFUSED
     assert "it gives 320 x 240, not 64 x 48: write size = [320, 240]" in str(size)
+    sizes = {"given_width": 320, "given_height": 240, "width": 64, "height": 48}
+    assert size.reason == because("camera.fault", because("camera.size", **sizes), camera="webcam")
     focus = fault_of(camera(device, PretendCapture({cv2.CAP_PROP_FOCUS: 0.0}), focus=30.0))
     assert "does not take focus = 30 (it says 0)" in str(focus)
     exposure = fault_of(camera(device, PretendCapture({cv2.CAP_PROP_EXPOSURE: 250.0}), exposure=150.0))
@@ -113,6 +116,7 @@ def test_a_device_that_is_not_there_is_missing_and_one_that_goes_silent_is_unplu
     missing = fault_of(camera(device.with_name("video7"), PretendCapture()))
     assert missing.condition is CameraCondition.MISSING
     assert "video7: plug it in; `gemelo camera list`" in str(missing)
+    assert [cause.code for cause in missing.reason.causes] == ["camera.device.none"]
     source = camera(device, PretendCapture())
     source.open()
     assert fault_of(source, "read").condition is CameraCondition.FROZEN

@@ -126,6 +126,8 @@ def test_a_camera_that_was_moved_is_noticed_by_the_fixed_tags(rm1: ArmDescriptio
     found = Table(rm1, changed(cell, cameras=(moved,)), believed=cell).look()
     assert "tag 10" in found.doubt
     assert "moved" in found.doubt
+    assert found.doubt_why is not None
+    assert (found.doubt_why.code, str(found.doubt_why)) == ("detect.tag_moved", found.doubt)
 
 
 def test_a_wrong_tag_size_is_noticed_by_the_fixed_tags(rm1: ArmDescription) -> None:

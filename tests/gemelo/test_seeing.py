@@ -12,6 +12,7 @@ from gemelo.schemas.camera import CameraCondition, CameraStatus
 from gemelo.schemas.cell import ColourThing, TagThing
 from gemelo.schemas.detections import Detection, DetectionKind, Detections, Unclear
 from gemelo.schemas.frames import Transform
+from gemelo.schemas.reasons import because
 
 TURN = (0.0, 0.0, 0.0, 1.0)
 
@@ -42,10 +43,14 @@ def test_what_only_two_of_five_images_show_is_not_seen() -> None:
 
 
 def test_what_most_images_show_and_none_can_measure_is_told_with_the_reason_and_what_few_show_is_not() -> None:
-    hidden = Detections(camera="overhead", unclear=(Unclear(names=("red", "other"), reason="partly hidden?"),))
-    assert why_unclear([hidden, image(1), hidden, hidden, image(2)], "red") == "partly hidden?"
-    assert why_unclear([hidden, image(1), hidden, image(2), image(3)], "red") == ""
-    assert why_unclear([hidden] * 5, "cup") == ""
+    why = because("detect.outline", colour="red", boxes=("20 x 20 x 40",))
+    unclear = Unclear(names=("red", "other"), reason=str(why), why=why)
+    hidden = Detections(camera="overhead", unclear=(unclear,))
+    assert why_unclear([hidden, image(1), hidden, hidden, image(2)], "red") == why
+    assert why_unclear([hidden, image(1), hidden, image(2), image(3)], "red") is None
+    assert why_unclear([hidden] * 5, "cup") is None
+    old = Detections(camera="overhead", unclear=(Unclear(names=("red",), reason="partly hidden?"),))
+    assert str(why_unclear([old] * 5, "red")) == "partly hidden?"
 
 
 def test_what_is_seen_twice_cannot_be_picked() -> None:

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gemelo.schemas.camera import CameraCondition
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import Reason, because
 
 JPEG_QUALITY = 90
 
@@ -25,12 +27,17 @@ class EncodedImage:
     encoding: str = "jpeg"
 
 
-class CameraFault(Exception):
-    """Why there is no image: a condition, and a sentence with the remedy."""
+class CameraFault(ReasonedError):
+    """Why there is no image: a condition, and what would do."""
 
-    def __init__(self, condition: CameraCondition, text: str) -> None:
-        super().__init__(text)
+    def __init__(self, condition: CameraCondition, reason: Reason) -> None:
+        super().__init__(reason)
         self.condition = condition
+
+
+def fault_of(camera: str, condition: CameraCondition, what: Reason) -> CameraFault:
+    """The fault of a camera of the cell."""
+    return CameraFault(condition, because("camera.fault", what, camera=camera))
 
 
 class CameraSource(Protocol):

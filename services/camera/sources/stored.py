@@ -10,7 +10,8 @@ import cv2
 from gemelo.libraries.runtime.clock import SYSTEM, Clock
 from gemelo.schemas.camera import CameraCondition
 from gemelo.schemas.cell import CameraRecord
-from gemelo.services.camera.sources.source import CameraFault, EncodedImage, encoded
+from gemelo.schemas.reasons import because
+from gemelo.services.camera.sources.source import EncodedImage, encoded, fault_of
 
 PICTURES = {".jpg", ".jpeg", ".png"}
 
@@ -37,7 +38,9 @@ class FolderOfImages:
         """Raises `CameraFault` at the end, for a picture that cannot be read, and for one of another size."""
         if not self._waiting:
             if not self._loop:
-                raise _fault(self._record, CameraCondition.ENDED, f"{self._folder} is at its end")
+                raise fault_of(
+                    self._record.name, CameraCondition.ENDED, because("camera.file.end", file=str(self._folder))
+                )
             self._waiting = self._pictures()
         return picture(self._record, self._waiting.pop(0), self._clock)
 
@@ -46,10 +49,12 @@ class FolderOfImages:
 
     def _pictures(self) -> list[Path]:
         if not self._folder.is_dir():
-            raise _fault(self._record, CameraCondition.MISSING, f"there is no folder {self._folder}")
+            what = because("camera.folder.none", folder=str(self._folder))
+            raise fault_of(self._record.name, CameraCondition.MISSING, what)
         found = sorted(each for each in self._folder.iterdir() if each.suffix.lower() in PICTURES)
         if not found:
-            raise _fault(self._record, CameraCondition.MISSING, f"no picture (.jpg, .png) is in {self._folder}")
+            what = because("camera.folder.empty", folder=str(self._folder))
+            raise fault_of(self._record.name, CameraCondition.MISSING, what)
         return found
 
 
@@ -67,12 +72,16 @@ class Video:
     def open(self) -> None:
         """Raises `CameraFault` where it is not there or no video."""
         if not self._path.is_file():
-            raise _fault(self._record, CameraCondition.MISSING, f"there is no file {self._path}")
+            raise fault_of(
+                self._record.name, CameraCondition.MISSING, because("camera.file.none", file=str(self._path))
+            )
         if self._path.suffix.lower() in PICTURES:
             return
         self._capture = cv2.VideoCapture(str(self._path), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
-            raise _fault(self._record, CameraCondition.REFUSED, f"{self._path} is no video that OpenCV can read")
+            raise fault_of(
+                self._record.name, CameraCondition.REFUSED, because("camera.file.no_video", file=str(self._path))
+            )
 
     def read(self) -> EncodedImage:
         """Raises `CameraFault` at the end, and for another size than the cell file's."""
@@ -83,7 +92,7 @@ class Video:
             self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0)
             is_there, image = self._capture.read()
         if not is_there:
-            raise _fault(self._record, CameraCondition.ENDED, f"{self._path} is at its end")
+            raise fault_of(self._record.name, CameraCondition.ENDED, because("camera.file.end", file=str(self._path)))
         return _frame(self._record, self._path, image, encoded(image), self._clock.unix())
 
     def close(self) -> None:
@@ -97,21 +106,18 @@ def picture(record: CameraRecord, path: Path, clock: Clock = SYSTEM) -> EncodedI
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise _fault(record, CameraCondition.MISSING, f"{path}: {error.strerror or error}") from None
+        what = because("camera.file.unreadable", file=str(path), error=error.strerror or str(error))
+        raise fault_of(record.name, CameraCondition.MISSING, what) from None
     image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if image is None:
-        raise _fault(record, CameraCondition.REFUSED, f"{path} is no picture that OpenCV can read")
+        raise fault_of(record.name, CameraCondition.REFUSED, because("camera.file.no_picture", file=str(path)))
     return _frame(record, path, image, content if path.suffix.lower() != ".png" else encoded(image), clock.unix())
 
 
 def _frame(record: CameraRecord, path: Path, image: Any, content: bytes, stamp: int) -> EncodedImage:
     height, width = image.shape[:2]
     if (width, height) != record.size:
-        wish = f"{record.size[0]} x {record.size[1]}"
-        said = f"{path} is {width} x {height}, not {wish}: write size = [{width}, {height}]"
-        raise _fault(record, CameraCondition.REFUSED, said)
+        wanted = {"wanted_width": record.size[0], "wanted_height": record.size[1]}
+        what = because("camera.file.size", file=str(path), width=width, height=height, **wanted)
+        raise fault_of(record.name, CameraCondition.REFUSED, what)
     return EncodedImage(stamp, width, height, content)
-
-
-def _fault(record: CameraRecord, condition: CameraCondition, text: str) -> CameraFault:
-    return CameraFault(condition, f'camera "{record.name}": {text}')

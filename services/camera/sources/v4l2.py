@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from gemelo.schemas.camera import CameraCondition
 from gemelo.schemas.cell import CameraRecord, V4l2Source
-from gemelo.services.camera.sources.source import CameraFault, EncodedImage, encoded
+from gemelo.schemas.reasons import Reason, because, remedy
+from gemelo.services.camera.sources.source import CameraFault, EncodedImage, encoded, fault_of
 
 MANUAL_EXPOSURE = 1.0  # V4L2_EXPOSURE_MANUAL
 MJPG = cv2.VideoWriter.fourcc(*"MJPG")
@@ -68,15 +69,12 @@ class V4l2Camera:
         """Raises `CameraFault`: missing, not permitted, taken, or a setting that it does not take."""
         path = os.path.realpath(self._source.device)
         if not os.path.exists(path):
-            raise self._fault(CameraCondition.MISSING, f"there is no {self._source.device}: plug it in; {LIST}")
+            raise self._fault(CameraCondition.MISSING, because("camera.device.none", LIST, device=self._source.device))
         if other := self._what_else(path):
-            remedy = (
-                'write the device as `gemelo camera list` prints it; pictures and videos are of kind "folder" or "file"'
-            )
-            raise self._fault(CameraCondition.REFUSED, f"{self._source.device} is {other}, no camera: {remedy}")
+            what = because("camera.device.other", device=self._source.device, kind=other)
+            raise self._fault(CameraCondition.REFUSED, what)
         if not os.access(path, os.R_OK | os.W_OK):
-            remedy = "sudo usermod -aG video $USER, then log in again"
-            raise self._fault(CameraCondition.REFUSED, f"no permission for {path}: {remedy}")
+            raise self._fault(CameraCondition.REFUSED, because("camera.device.permission", path=path))
         self._capture = self._open_capture(path)
         if not self._capture.isOpened():
             raise self._why_closed(path)
@@ -91,7 +89,7 @@ class V4l2Camera:
         stamp = capture_stamp(self._capture.get(cv2.CAP_PROP_POS_MSEC), time.monotonic_ns(), time.time_ns())
         content = data.tobytes() if self._is_jpeg else encoded(data)
         if not content.startswith(START_OF_JPEG):
-            raise self._fault(CameraCondition.REFUSED, "what it sends as MJPEG is none: try another size")
+            raise self._fault(CameraCondition.REFUSED, because("camera.mjpeg"))
         width, height = self._record.size
         return EncodedImage(stamp, width, height, content)
 
@@ -111,8 +109,8 @@ class V4l2Camera:
         capture.set(cv2.CAP_PROP_CONVERT_RGB, 0.0 if self._is_jpeg else 1.0)
         given = int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)), int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
         if given != (width, height):
-            wish, remedy = f"{width} x {height}", f"write size = [{given[0]}, {given[1]}]"
-            raise self._fault(CameraCondition.REFUSED, f"it gives {given[0]} x {given[1]}, not {wish}: {remedy}")
+            sizes = {"given_width": int(given[0]), "given_height": int(given[1]), "width": width, "height": height}
+            raise self._fault(CameraCondition.REFUSED, because("camera.size", **sizes))
         self._fix_focus(capture)
         if self._source.exposure is not None:
             capture.set(cv2.CAP_PROP_AUTO_EXPOSURE, MANUAL_EXPOSURE)
@@ -124,8 +122,7 @@ class V4l2Camera:
         if has_autofocus:
             capture.set(cv2.CAP_PROP_AUTOFOCUS, 0.0)
             if capture.get(cv2.CAP_PROP_AUTOFOCUS) > 0.0:
-                remedy = "use a camera whose focus can be fixed: a lens that moves cannot be calibrated"
-                raise self._fault(CameraCondition.REFUSED, f"its autofocus cannot be switched off: {remedy}")
+                raise self._fault(CameraCondition.REFUSED, because("camera.autofocus"))
         if self._source.focus is not None:
             self._fix(capture, cv2.CAP_PROP_FOCUS, "focus", self._source.focus)
 
@@ -133,27 +130,25 @@ class V4l2Camera:
         capture.set(key, wanted)
         given = capture.get(key)
         if abs(given - wanted) > 0.5:
-            said = f"it does not take {name} = {wanted:g} (it says {given:g})"
-            raise self._fault(CameraCondition.REFUSED, f"{said}: write a value that it has, or leave {name} out")
+            what = because("camera.control", name=name, value=wanted, given=given)
+            raise self._fault(CameraCondition.REFUSED, what)
 
     def _why_closed(self, path: str) -> CameraFault:
         holder = holder_of(path)
         if holder:
-            return self._fault(CameraCondition.TAKEN, f"{holder} has {path}: end that program")
-        return self._fault(
-            CameraCondition.REFUSED, f"{path} gives no images: it is no camera, or one behind it; {LIST}"
-        )
+            return self._fault(CameraCondition.TAKEN, because("camera.device.taken", holder=holder, path=path))
+        return self._fault(CameraCondition.REFUSED, because("camera.device.no_images", LIST, path=path))
 
     def _why_silent(self) -> CameraFault:
         if not os.path.exists(os.path.realpath(self._source.device)):
-            return self._fault(CameraCondition.UNPLUGGED, f"{self._source.device} is gone: plug it in again")
-        return self._fault(CameraCondition.FROZEN, "it is there and sends nothing: plug it out and in, in another port")
+            return self._fault(CameraCondition.UNPLUGGED, because("camera.device.gone", device=self._source.device))
+        return self._fault(CameraCondition.FROZEN, because("camera.device.silent"))
 
-    def _fault(self, condition: CameraCondition, text: str) -> CameraFault:
-        return CameraFault(condition, f'camera "{self._record.name}": {text}')
+    def _fault(self, condition: CameraCondition, what: Reason) -> CameraFault:
+        return fault_of(self._record.name, condition, what)
 
 
-LIST = "`gemelo camera list` prints what there is"
+LIST = remedy("list_cameras_there")
 
 
 def kind_of(path: str) -> str:

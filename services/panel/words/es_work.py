@@ -13,9 +13,6 @@ _THINGS: dict[str, str] = {
     "{word} is not seen by {cameras}, which see {others}: is it in the image, lit, and not behind the arm? `gemelo "
     "camera "
     "view`": "{cameras} no ve {word}; ve {others}: ¿está en la imagen, con luz, y no detrás del brazo?",
-    "something {colour} is seen, and its outline is not that of a box of {sizes} mm on the table: is it partly hidden, "
-    "tilted, or of another size?": "se ve algo de color {colour}, y su contorno no es el de una caja de {sizes} mm en "
-    "la mesa: ¿está tapado en parte, inclinado, o tiene otro tamaño?",
     "{word}: {reason}": "{word}: {reason}",
     'camera "{camera}": {reason}': "Cámara «{camera}»: {reason}",
     'no image of camera "{camera}" within {time} s: `gemelo camera list`': "Ninguna imagen de la cámara «{camera}» en "

@@ -19,6 +19,7 @@ from gemelo.schemas.detections import Detections
 from gemelo.schemas.topics import camera_detections, camera_image, camera_info, camera_status
 from gemelo.tools.cli.camera.cells import cell_of
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, require_folder, unknown, usage
+from gemelo.tools.cli.common.language import reason_or
 from gemelo.tools.cli.common.output import print_coloured
 from gemelo.tools.cli.common.session import CommandSession, connect, load_robot
 from gemelo.tools.cli.common.text_table import table
@@ -122,7 +123,8 @@ def listing(cell: Cell, devices: list[Plugged], seen: dict[str, CameraReport]) -
         return "\n\n".join([*parts, NO_CELL.format("deploy/local.toml")])
     headings = ("camera", "source", "size [px]", "asked [Hz]", "gets [Hz]", "lens", "place", "condition")
     rows = [_row(camera, seen.get(camera.name, CameraReport())) for camera in cell.cameras]
-    said = [each.status.text for each in seen.values() if each.status is not None and each.status.text]
+    statuses = [each.status for each in seen.values() if each.status is not None]
+    said = [reason_or(status.why, status.text) for status in statuses if status.text]
     return "\n\n".join([*parts, "\n".join([table(headings, rows), *said])])
 
 
@@ -183,7 +185,8 @@ def _show(seen: CameraReport, name: str, save: str) -> None:
 def _why_no_image(seen: CameraReport, name: str) -> str:
     if seen.status is None:
         return f'camera "{name}" says nothing: is the process `camera` running? its log is out/logs/camera.log'
-    return seen.status.text or f'camera "{name}" is {seen.status.condition}, and gives no image within {PATIENCE:g} s'
+    status_text = reason_or(seen.status.why, seen.status.text)
+    return status_text or f'camera "{name}" is {seen.status.condition}, and gives no image within {PATIENCE:g} s'
 
 
 def _seen_of(robot: Robot, cell: Cell) -> dict[str, CameraReport]:
