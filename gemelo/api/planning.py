@@ -370,7 +370,7 @@ def _interrupted(
         if call is not None and session.wait_for(lambda: call.is_over, MARGIN, tell):
             refusal = answer_of(call).refusal
             said = (refusal.why or plain(refusal.message)) if refusal is not None else because("client.plan.just_made")
-    return Interrupted(because("client.plan.interrupted", said))
+    return Interrupted(because("client.plan.interrupted", replace(said, remedies=())))
 
 
 def _cancel(session: Session, request: PlanRequest) -> None:

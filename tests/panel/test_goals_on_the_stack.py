@@ -58,7 +58,7 @@ def test_what_a_dragged_goal_would_touch_is_named_with_how_deep_and_drawn_red_an
     goal.set_pose(inside)  # as the gizmo does
     said = until(lambda: move.problem.content, lambda content: "post would touch: " in content)
     assert "<b>Something is in the way</b>" in said
-    assert " mm of one inside the other." in said
+    assert " mm of one inside the other" in said
     assert "joints=" not in said
     problem = goal.goal.problem
     assert problem is not None
