@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JogCommand
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.jog.jog import DEAD_MAN, PERIOD, SILENCE, Jog
 from tests.planner.jogging import Jogged, arm_of, kinematics_of, world_of
@@ -80,20 +81,33 @@ def test_an_unknown_joint_is_named_once_and_nothing_moves():
 
 
 @pytest.mark.parametrize(
-    ("command", "said"),
+    ("command", "why"),
     [
-        (JogCommand(name=("brazo_joint",), velocity=(0.1, 0.2)), "1 joints and gives 2"),
-        (JogCommand(name=("brazo_joint", "brazo_joint"), velocity=(0.1, 0.2)), "twice"),
-        (JogCommand(linear=(0.1, 0.2)), "linear has 2 values"),
-        (JogCommand(linear=(0.1, 0.0, 0.0), frame="moon"), 'not in "moon"; use one of base_link, efector_link'),
-        (JogCommand(name=("brazo_joint",), velocity=(0.1,), linear=(0.1, 0.0, 0.0)), "one of them"),
+        (
+            JogCommand(name=("brazo_joint",), velocity=(0.1, 0.2)),
+            because("jog.command.count", joints=1, velocities=2),
+        ),
+        (
+            JogCommand(name=("brazo_joint", "brazo_joint"), velocity=(0.1, 0.2)),
+            because("jog.command.twice", joint="brazo_joint"),
+        ),
+        (JogCommand(linear=(0.1, 0.2)), because("jog.command.values", part="linear", count=2)),
+        (
+            JogCommand(linear=(0.1, 0.0, 0.0), frame="moon"),
+            because("jog.command.frame", remedy("use_one_of", names=("base_link", "efector_link")), frame="moon"),
+        ),
+        (
+            JogCommand(name=("brazo_joint",), velocity=(0.1,), linear=(0.1, 0.0, 0.0)),
+            because("jog.command.both", remedy("one_of_both")),
+        ),
     ],
 )
-def test_a_command_that_cannot_be_followed_is_a_stop_with_its_reason(command: JogCommand, said: str):
+def test_a_command_that_cannot_be_followed_is_a_stop_with_its_reason(command: JogCommand, why: Reason):
     jogged = Jogged("rm1")
     jogged.hold(TURN, 0.5)
     jogged.hold(command, 1.0)
-    assert said in jogged.statuses[-1].limited_by
+    assert jogged.statuses[-1].limits[0].why == why
+    assert jogged.statuses[-1].limited_by == str(why)
     assert not np.any(jogged.velocities[-1])
 
 
@@ -123,7 +137,8 @@ def test_a_goal_refuses_jogging_and_ends_it_and_it_begins_again_only_after_a_sil
     jogged = Jogged("rm1", crowded=False)
     jogged.goal_is_active = True
     jogged.hold(TURN, 0.3)
-    assert "a goal is being carried out" in jogged.statuses[-1].limited_by
+    assert jogged.statuses[-1].why == because("jog.goal_active", remedy("cancel_first"))
+    assert jogged.statuses[-1].limited_by == str(jogged.statuses[-1].why)
     assert not jogged.commanded
     jogged.goal_is_active = False
     jogged.hold(TURN, 0.3)
@@ -135,7 +150,10 @@ def test_a_goal_refuses_jogging_and_ends_it_and_it_begins_again_only_after_a_sil
     jogged.goal_is_active = False
     jogged.hold(TURN, 0.5)
     assert len(jogged.commanded) == count
-    assert "nothing resumes by itself" in jogged.statuses[-1].limited_by
+    why = jogged.statuses[-1].why
+    assert why is not None
+    assert why.code == "jog.interrupted"
+    assert why.remedies == (remedy("let_go_for", time=SILENCE),)
     jogged.hold(None, SILENCE + 1.0)
     jogged.hold(TURN, 0.3)
     assert len(jogged.commanded) > count

@@ -25,6 +25,7 @@ from gemelo.schemas.scene import (
 )
 from gemelo.tools.cli.bus.request_text import millimetres
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.language import reason_or
 from gemelo.tools.cli.common.session import connect_arm
 from gemelo.tools.cli.parser import Choices, Options, Parser, positive_number
 from gemelo.tools.cli.robot.scene_object import listing, object_of, place_text, pose_of, shape_of, sized_text
@@ -96,7 +97,8 @@ def ask(change: SceneEdit) -> ExitCode:
     """Connects, sends the change and prints the new version."""
     with connect_arm() as arm:
         response = arm.scene.edit(change)
-    print(f"scene version {response.version}{f': {response.reason}' if response.reason else ''}")
+    said = reason_or(response.why, response.reason)
+    print(f"scene version {response.version}{f': {said}' if said else ''}")
     return ExitCode.OK
 
 
