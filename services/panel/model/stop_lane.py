@@ -11,6 +11,7 @@ import gemelo
 from gemelo.libraries.runtime.errors import NoAnswer
 from gemelo.libraries.runtime.requests.client import PendingCall
 from gemelo.schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
+from gemelo.schemas.reasons import because, plain
 from gemelo.schemas.topics import DEVICE_STOP
 from gemelo.services.panel.model.problems import Problem, problem_of
 
@@ -66,4 +67,5 @@ class StopLane:
         """Raises where the stop was refused, or nobody answers."""
         answer = call.response()
         if not answer.accepted:
-            raise gemelo.Refused(f"stop refused: {answer.reason}", check="device", reason=answer.reason)
+            why = answer.why or plain(answer.reason)
+            raise gemelo.Refused(because("client.command.refused", why, what="stop"), check="device", reason=why)

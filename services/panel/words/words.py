@@ -12,11 +12,10 @@ from gemelo.services.panel.model.problems import Problem
 from gemelo.services.panel.words.en import ENGLISH
 from gemelo.services.panel.words.es import SPANISH
 from gemelo.services.panel.words.es_device import GOAL_CODES, VALUES
-from gemelo.services.panel.words.es_gateway import GATEWAY
 from gemelo.services.panel.words.es_work import WORK
 from gemelo.services.panel.words.sentences import Language, Sentences
 
-SPANISH_SENTENCES = Sentences(GATEWAY | WORK, VALUES)
+SPANISH_SENTENCES = Sentences(WORK, VALUES)
 LANGUAGES = {  # by the first part of a browser's language; the first one is that of all other browsers
     "en": Language("English", ENGLISH),
     "es": Language("Español", SPANISH, SPANISH_SENTENCES, GOAL_CODES),
