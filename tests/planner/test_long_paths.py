@@ -57,7 +57,11 @@ def test_a_plan_that_no_message_can_carry_becomes_a_refusal_with_size_limit_and_
     answered = sendable(PlanResponse(code=PlanCode.SUCCESS, refusal=Refusal(message="x" * 40_000_000)))
     assert answered.code is PlanCode.PLANNING_FAILED
     assert answered.refusal is not None
-    assert "40000" in answered.refusal.message
-    assert "at most 33554432" in answered.refusal.message
+    why = answered.refusal.why
+    assert why is not None
+    assert (why.code, why.values["limit"]) == ("plan.size", 33554432)
+    assert why.values["size"] == answered.refusal.value
+    assert answered.refusal.value is not None
+    assert answered.refusal.value > 40_000_000
     assert answered.refusal.remedy.startswith("split the path")
     assert len(encoded(answered).payload) < 1000

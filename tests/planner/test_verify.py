@@ -58,8 +58,11 @@ def _sped_up(point):
 
 def test_a_position_beyond_its_limit_is_named(rm1: ArmDescription):
     beyond = straight_line(rm1.joint_names, START, (0.0, 3.0, 0.0), joint_limits(rm1))
-    with pytest.raises(BadTrajectory, match=r'position of "antebrazo_joint" is 3 at'):
+    with pytest.raises(BadTrajectory) as refused:
         require_within_limits(rm1, sample(beyond), joint_limits(rm1))
+    why = refused.value.reason
+    assert (why.code, why.values["joint"], why.values["value"]) == ("plan.verify.limit", "antebrazo_joint", 3.0)
+    assert (why.values["quantity"], why.values["unit"]) == ("position", "rad")
 
 
 def test_compiled_and_in_python_the_samples_are_the_same_to_the_bit_and_jerks_to_rounding(
