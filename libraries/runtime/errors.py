@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.reasons import Reason, plain
 
 TOO_LARGE = "too large"  # the kind of a refusal of what no receiver would take
 
 
-class BusError(Exception):
+class BusError(ReasonedError):
     """The bus cannot be used: no router, a name that is taken, a bus that is closed."""
 
 
@@ -33,9 +34,9 @@ class GoalRefused(RequestRefused):
         self.code = code
 
 
-class NoAnswer(Exception):
+class NoAnswer(ReasonedError):
     """Nobody serves the request, or the answer did not come in time."""
 
 
-class ServerLost(Exception):
+class ServerLost(ReasonedError):
     """The server of a goal fell silent or forgot the goal; what became of the motion is not known."""

@@ -85,7 +85,6 @@ def _part(node: ast.expr) -> str:
 
 
 PARTS = [
-    *("libraries/runtime/requests/client.py", "libraries/runtime/requests/limits.py"),
     "gemelo",
 ]
 WITHIN_OTHERS = {  # parts of sentences, which are tested as a whole below

@@ -19,6 +19,7 @@ from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.message import Message, encode
 from gemelo.schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, Refusal, WaypointGoal
+from gemelo.schemas.reasons import because
 from gemelo.schemas.scene import MeshShape, SceneAdd, SceneObject, SceneRequest, SceneResponse
 from gemelo.schemas.system import Exchange, LogRecord
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, LOG, PLAN, SCENE_EDIT, exchange_topic
@@ -166,10 +167,12 @@ def test_what_waits_in_a_server_is_bounded_in_bytes_for_one_client_and_for_all()
     waiting, half = WaitingRequests("plan"), MAX_WAITING_BYTES_OF_A_CLIENT // 2
     assert not waiting.refusal("local", "a", half)
     assert not waiting.refusal("local", "a", half)
-    refusal = waiting.refusal("local", "a", 1)
-    assert refusal.startswith(f"plan: 1 bytes, and {2 * half} bytes of this client's requests are waiting already")
+    most = MAX_WAITING_BYTES_OF_A_CLIENT
+    too_many = because("waiting.client.bytes", key="plan", size=1, waiting=2 * half, limit=most)
+    assert waiting.refusal("local", "a", 1) == too_many
+    assert str(too_many).startswith(f"plan: 1 bytes, and {2 * half} bytes of this client's requests are waiting")
     assert not waiting.refusal("local", "b", 2 * half)
-    assert f"at most {MAX_WAITING_BYTES}" in waiting.refusal("local", "c", half)
+    assert f"at most {MAX_WAITING_BYTES}" in str(waiting.refusal("local", "c", half))
     waiting.leave("local", "a", half)
     assert not waiting.refusal("local", "c", half)
 

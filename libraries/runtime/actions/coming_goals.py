@@ -43,8 +43,7 @@ class ComingGoals:
         """Answers a goal, at once if it is short and no other waits; raises `RequestRefused` where too much waits."""
         waiting = sum(len(memoryview(each.request.goal)) for each in self._goals)
         if self._goals and waiting + len(memoryview(request.goal)) > MOST_BYTES:
-            reason = f"{self._key}: {waiting} bytes of goals are looked at already, at most {MOST_BYTES}: ask again"
-            raise RequestRefused(reason, "busy")
+            raise RequestRefused(because("waiting.goals", key=self._key, waiting=waiting, limit=MOST_BYTES), "busy")
         self._goals.append(ComingGoal(request, pending, self._answering(request, pending)))
         if not self._is_posted:
             self._go_on()

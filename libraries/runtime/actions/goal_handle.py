@@ -22,6 +22,7 @@ from gemelo.schemas.actions import (
     ResultResponse,
 )
 from gemelo.schemas.message import BadMessage, Message, decode, encode
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.topics import Action, Request
 
 F = TypeVar("F", bound=Message)
@@ -93,7 +94,7 @@ class GoalHandle(Generic[F, R]):
             raise self.lost
         if not is_over and self._loop.stop.is_set:
             raise SystemExit(0)
-        raise NoAnswer(f"goal {self.goal_id} of {self.action.key} has not ended within {timeout:g} s")
+        raise NoAnswer(because("answer.goal.goes_on", goal=self.goal_id, key=self.action.key, time=timeout or 0.0))
 
     def cancel(self) -> None:
         """Asks the server to end the goal, until it answers; how it ended is then the outcome. Does not block."""
@@ -128,7 +129,7 @@ class GoalHandle(Generic[F, R]):
                 if goal.status.is_terminal:
                     self._ask_result()
                 return
-        self._lose(f"{self.action.server} has been restarted and does not know the goal any more")
+        self._lose(because("answer.goal.restarted", server=self.action.server))
 
     def tick(self, now: float) -> None:
         """Detects a silent server; `now` in [s] monotonic. The router's absence does not count."""
@@ -137,12 +138,12 @@ class GoalHandle(Generic[F, R]):
         if not self._bus.is_connected:
             self._away = self._away or now
             if now - self._away > ROUTER_TIMEOUT:
-                self._lose(f"the router has been away for {ROUTER_TIMEOUT:g} s")
+                self._lose(because("answer.goal.no_router", time=ROUTER_TIMEOUT))
         elif self._away is not None:
             self._away = None
             self.heard()
         elif now - self._heard > SERVER_TIMEOUT:
-            self._lose(f"{self.action.server} has been silent for {SERVER_TIMEOUT:g} s")
+            self._lose(because("answer.goal.silent", server=self.action.server, time=SERVER_TIMEOUT))
 
     def _ask(self, request: AnyRequest, question: Message, on_answer: Callable[[BusReply | None], None]) -> None:
         def put(answer: BusReply | None) -> None:
@@ -180,11 +181,11 @@ class GoalHandle(Generic[F, R]):
                 self.outcome = ActionOutcome(response.status, decode(self.action.result, bytes(response.result)))
                 self._tell_end()
         except BadMessage as error:
-            self._lose(f"the result of {self.action.server} cannot be read: {error}")
+            self._lose(because("answer.goal.unreadable", server=self.action.server, error=str(error)))
 
-    def _lose(self, why: str) -> None:
+    def _lose(self, why: Reason) -> None:
         if not self.is_over:
-            self.lost = ServerLost(f"goal {self.goal_id} of {self.action.key}: {why}; what became of it is not known")
+            self.lost = ServerLost(because("answer.goal.lost", why, goal=self.goal_id, key=self.action.key))
             self._tell_end()
 
     def _tell_end(self) -> None:

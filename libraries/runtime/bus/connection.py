@@ -14,6 +14,7 @@ from gemelo.libraries.runtime.errors import BusError
 from gemelo.libraries.runtime.process.readiness import tell_alive
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import RouterSection
+from gemelo.schemas.reasons import because
 
 RETRY_PERIOD = 0.1  # [s]
 HANDSHAKE = 1.0  # [s] for the router to say why it refuses a certificate
@@ -66,15 +67,14 @@ def require_certificate(router: RouterSection) -> None:
     """Returns if the section has what TLS needs; else raises `BusError` with the key of the deployment or the file."""
     if not router.tls:
         if router.certificate or router.key or router.ca:
-            raise BusError("router.ca, router.certificate and router.key are for TLS: set router.tls = true too")
+            raise BusError(because("router.no_tls"))
         return
     for name in ("ca", "certificate", "key"):
         path = getattr(router, name)
         if not path:
-            made = "`gemelo deploy keys` makes the files, for people where the site's file gives the host `roles`"
-            raise BusError(f"router.tls is set, but router.{name} is not: {made}")
+            raise BusError(because("router.tls.file", key=name))
         if not os.access(path, os.R_OK):
-            raise BusError(f"router.{name}: cannot read {path}: `gemelo deploy keys` makes it")
+            raise BusError(because("router.tls.unreadable", key=name, file=path))
     require_private(router.key)
 
 

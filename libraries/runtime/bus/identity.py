@@ -14,6 +14,7 @@ from gemelo.libraries.runtime.bus.branches import LOCAL, NAME, PRINCIPAL, addres
 from gemelo.libraries.runtime.bus.interface import Bus
 from gemelo.libraries.runtime.clock import SYSTEM, Clock
 from gemelo.libraries.runtime.errors import NodeNameTaken
+from gemelo.schemas.reasons import Reason, because
 
 STALE_AFTER = 1.5  # [s] within which the token of a frozen process vanishes (the lease is 1 s)
 ALIVE, IDENTITY = "@alive", "@id"
@@ -60,10 +61,8 @@ def identify(name: str, common_name: str = "", clock: Clock = SYSTEM) -> Identit
 def claim(bus: Bus, identity: Identity, warn: Warn = lambda text: None) -> None:
     """Declares the name; raises `NodeNameTaken` where another living node has it, or only a service may have it."""
     if address_of(identity.principal, identity.name) is None:
-        raise NodeNameTaken(
-            f'node name "{identity.name}": the certificate "{identity.principal}" of {bus.certificate} may not bear it '
-            "(schemas/roles.py): give the node another name, or the certificate of its role"
-        )
+        why = because("node.role", node=identity.name, common_name=identity.principal, certificate=bus.certificate)
+        raise NodeNameTaken(why)
     _wait_until_alone(bus, identity, "", warn)
     token = bus.declare_alive(identity.key)
     try:
@@ -137,10 +136,10 @@ def _wait_until_alone(bus: Bus, identity: Identity, gives_way_before: str, warn:
         bus.clock.sleep(0.1)
 
 
-def _taken(name: str, key: str) -> str:
-    """The sentence for a name whose bearer has the token `key`."""
+def _taken(name: str, key: str) -> Reason:
+    """The reason for a name whose bearer has the token `key`."""
     pid, host = instance_of(key)
-    return f'another node named "{name}" is alive (process {pid} on {host}): stop it, or give this one another name'
+    return because("node.taken", node=name, process=pid, host=host)
 
 
 def instance_of(key: str) -> tuple[str, str]:

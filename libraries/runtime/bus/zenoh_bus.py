@@ -53,6 +53,7 @@ from gemelo.schemas.actions import GoalEnd
 from gemelo.schemas.deployment import RouterSection
 from gemelo.schemas.device import DeviceEvent, GatewayInputs
 from gemelo.schemas.planning import AnswerInputs, PlanInputs
+from gemelo.schemas.reasons import because
 from gemelo.schemas.system import Exchange, LogRecord, NodeStatistics
 from gemelo.schemas.topics import Delivery
 
@@ -144,7 +145,7 @@ class ZenohBus:
             return
         self._disconnected_since = self._disconnected_since or now
         if now - self._disconnected_since > RECONNECTION_TIMEOUT:
-            raise BusError(f"the router is there, but did not take this session back within {RECONNECTION_TIMEOUT:g} s")
+            raise BusError(because("router.not_taken_back", time=RECONNECTION_TIMEOUT))
 
     def publish(
         self, key: str, schema: str, delivery: Delivery, writer: str = "", instance: str = ""

@@ -11,6 +11,7 @@ from gemelo.libraries.runtime.errors import TOO_LARGE, NoAnswer, RequestRefused
 from gemelo.libraries.runtime.loop.task_queue import Task
 from gemelo.libraries.runtime.requests.limits import DEBT, OF_A_CLIENT
 from gemelo.schemas.message import BadMessage, Message
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.system import Failure
 from gemelo.schemas.topics import Request
 
@@ -114,46 +115,38 @@ def response_in(request: Request[Q, R], answer: BusReply) -> R:
             return from_arrival(request.response, arrival)
         failure = from_arrival(Failure, arrival)
     except BadMessage as error:
-        raise NoAnswer(f"the answer of {request.server} to {request.key} cannot be read: {error}") from error
+        why = because("answer.unreadable", server=request.server, key=request.key, error=str(error))
+        raise NoAnswer(why) from error
     raise RequestRefused(failure.why or failure.message, failure.kind)
 
 
-def _silent(bus: Bus, request: Request[Q, R], timeout: float) -> str:
-    """The text for a missing reply; a missing router is checked first, because it also hides the servers."""
+def _silent(bus: Bus, request: Request[Q, R], timeout: float) -> Reason:
+    """Why a reply is missing; a missing router is checked first, because it also hides the servers."""
     if not bus.is_connected:
         return _away(request)
-    return f"{request.server} did not answer {request.key} within {timeout:g} s: is it busy, or gone?"
+    return because("answer.late", server=request.server, key=request.key, time=timeout)
 
 
-def _unread(bus: Bus, request: Request[Q, R], timeout: float, tries: int) -> str:
-    """The text for a request that ended without a reply: its server or a link has ended before, or it was dropped."""
+def _unread(bus: Bus, request: Request[Q, R], timeout: float, tries: int) -> Reason:
+    """Why a request ended without a reply: its server or a link has ended before, or it was dropped."""
     if not bus.is_connected:
         return _away(request)
-    most, pause = f"{OF_A_CLIENT.per_second:g} requests a second", f"{DEBT / OF_A_CLIENT.per_second:g} s"
-    if request.urgent:
-        asked = f"{request.server} did not answer {request.key} within {timeout:g} s, sent {tries} times"
-        if not bus.wait_served(request.key, 0.0):
-            return f"{asked}: nobody serves it now (`gemelo node list`), and whether it was carried out is not known"
-        return (
-            f"{asked}: it is alive, and carries out what arrives, but answers {most} of that kind of one client; ask "
-            f"again after {pause}"
-        )
-    return (
-        f"{request.server} did not answer {request.key}: it has just ended (`gemelo node list`), or dropped it unread: "
-        f"it takes {most} of one client, and nothing of one that asks for more; ask again after {pause}"
-    )
+    rate, pause = OF_A_CLIENT.per_second, DEBT / OF_A_CLIENT.per_second
+    server, key = request.server, request.key
+    if not request.urgent:
+        return because("answer.dropped", server=server, key=key, rate=rate, pause=pause)
+    if not bus.wait_served(key, 0.0):
+        return because("answer.urgent.gone", server=server, key=key, time=timeout, tries=tries)
+    return because("answer.urgent.dropped", server=server, key=key, time=timeout, tries=tries, rate=rate, pause=pause)
 
 
-def _away(request: Request[Q, R]) -> str:
-    return f"{request.key}: the router is away; start it with `make up`"
+def _away(request: Request[Q, R]) -> Reason:
+    return because("answer.no_router", key=request.key)
 
 
-def _nobody(bus: Bus, request: Request[Q, R]) -> str:
+def _nobody(bus: Bus, request: Request[Q, R]) -> Reason:
     if not bus.is_connected:
         return _away(request)
     if bus.certificate:
-        return (
-            f"nobody serves {request.key} to {bus.certificate}: is {request.server} running, and may this role ask it? "
-            "schemas/roles.py says who may"
-        )
-    return f"nobody serves {request.key}: is {request.server} running? `gemelo node list` shows who is"
+        return because("answer.nobody.role", key=request.key, certificate=bus.certificate, server=request.server)
+    return because("answer.nobody", key=request.key, server=request.server)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from gemelo.libraries.runtime.bus.pace import Rate, TokenBucket
 from gemelo.libraries.runtime.clock import SYSTEM, Clock
+from gemelo.schemas.reasons import Reason, because
 
 # Chosen. A panel and its programs ask some ten times a second; a script that only asks goes by its pace (bus/pace.py),
 # which stays below. A request that is dropped costs its server some 20 us, one that is answered 300.
@@ -140,34 +141,31 @@ class WaitingRequests:
     _bytes_of: Counter[tuple[str, str]] = field(default_factory=Counter, init=False)  # by principal and client
     _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
 
-    def refusal(self, principal: str, client: str, size: int = 0) -> str:
-        """Counts one more request of `client`, of `size` [bytes]; the reason if its limit is reached, else empty."""
+    def refusal(self, principal: str, client: str, size: int = 0) -> Reason | None:
+        """Counts one more request of `client`, of `size` [bytes]; the reason if its limit is reached, else None."""
         with self._lock:
             if self._of[principal, client] >= MAX_WAITING_OF_A_CLIENT:
-                return f"{self.key}: {MAX_WAITING_OF_A_CLIENT} requests are waiting already, all of this client"
+                return because("waiting.client", key=self.key, count=MAX_WAITING_OF_A_CLIENT)
             if self._of_principal[principal] >= MAX_WAITING_OF_A_PRINCIPAL:
-                most = f"{MAX_WAITING_OF_A_PRINCIPAL} requests are waiting already"
-                return f'{self.key}: {most}, all of clients with the certificate "{principal}"'
+                most = MAX_WAITING_OF_A_PRINCIPAL
+                return because("waiting.certificate", key=self.key, count=most, certificate=principal)
             if self._of_principal.total() >= MAX_WAITING:
-                return f"{self.key}: {MAX_WAITING} requests are waiting already"
-            if refusal := self._size_refusal(principal, client, size):
+                return because("waiting.all", key=self.key, count=MAX_WAITING)
+            if (refusal := self._size_refusal(principal, client, size)) is not None:
                 return refusal
             self._of[principal, client] += 1
             self._of_principal[principal] += 1
             self._bytes_of[principal, client] += size
-            return ""
+            return None
 
-    def _size_refusal(self, principal: str, client: str, size: int) -> str:
+    def _size_refusal(self, principal: str, client: str, size: int) -> Reason | None:
         waiting, all_waiting = self._bytes_of[principal, client], self._bytes_of.total()
         if waiting + size > MAX_WAITING_BYTES_OF_A_CLIENT:
-            whose, most = f"{waiting} bytes of this client's requests", MAX_WAITING_BYTES_OF_A_CLIENT
-        elif all_waiting + size > MAX_WAITING_BYTES:
-            whose, most = f"{all_waiting} bytes of requests", MAX_WAITING_BYTES
-        else:
-            return ""
-        return (
-            f"{self.key}: {size} bytes, and {whose} are waiting already: at most {most}; ask again after their answers"
-        )
+            most = MAX_WAITING_BYTES_OF_A_CLIENT
+            return because("waiting.client.bytes", key=self.key, size=size, waiting=waiting, limit=most)
+        if all_waiting + size > MAX_WAITING_BYTES:
+            return because("waiting.all.bytes", key=self.key, size=size, waiting=all_waiting, limit=MAX_WAITING_BYTES)
+        return None
 
     def leave(self, principal: str, client: str, size: int = 0) -> None:
         with self._lock:

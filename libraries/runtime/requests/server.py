@@ -21,7 +21,7 @@ from gemelo.libraries.runtime.requests.overtaken import OvertakenRequests
 from gemelo.libraries.runtime.topics import Warn
 from gemelo.schemas.actions import NIL
 from gemelo.schemas.message import BadMessage, Message, decode, encode
-from gemelo.schemas.reasons import PLAIN, Reason
+from gemelo.schemas.reasons import PLAIN, Reason, because
 from gemelo.schemas.system import Exchange, Failure, TopicStatistics
 from gemelo.schemas.topics import Request
 
@@ -253,7 +253,7 @@ class RequestServer(Generic[Q, R]):
             whose = f"of one client, or of newcomers ({query.principal})"
             self._warn(f"{self.request.key}: {most} {whose}: {said}")
 
-    def _refuse(self, query: Query, reason: str) -> None:
+    def _refuse(self, query: Query, reason: Reason) -> None:
         self._refused += 1
         if self._rates.permit_refusal():
             PendingQuery[R](query).refuse("busy", reason)
@@ -340,7 +340,7 @@ class UrgentServer(RequestServer[Q, R]):
         elif not is_answered:
             self._drop(query)
 
-    def _join(self, question: Q, query: Query, is_answered: bool) -> str:
+    def _join(self, question: Q, query: Query, is_answered: bool) -> Reason | None:
         """Queues `question`; returns the reason where its caller cannot be answered with the others."""
         with self._lock:
             group = self._groups.get(question)
@@ -353,12 +353,12 @@ class UrgentServer(RequestServer[Q, R]):
             self._queue(question, group, is_answered)
             self._received += 1
             if not is_answered:
-                return ""
+                return None
             if self._unanswered >= MAX_UNANSWERED:
-                return f"{self.request.key}: taken; {MAX_UNANSWERED} callers wait for its answer already"
+                return because("waiting.answer", key=self.request.key, count=MAX_UNANSWERED)
             self._unanswered += 1
             group.join(query)
-            return ""
+            return None
 
     def _queue(self, question: Q, group: PendingGroup[R], is_at_once: bool) -> None:
         """Has the group handled, once; call with the lock."""

@@ -63,37 +63,8 @@ _ASKED: dict[str, str] = {
     "perdió ningún paso, y se pide {wanted}: verifique el brazo.",
 }
 
-# Who does not answer
+# What stands before a reason
 _SILENT: dict[str, str] = {
-    "{server} did not answer {key} within {time} s: is it busy, or gone?": "{server} no respondió en {time} s: está "
-    "ocupado, o ya no está.",
-    "{server} did not answer {key}: it has just ended (`gemelo node list`), or dropped it unread: it takes {most} of "
-    "one client, and nothing of one that asks for more; ask again after {pause}": "{server} no respondió: acaba de "
-    "terminar, o se le pide demasiado a la vez. Pruebe en {pause}.",
-    "{server} did not answer {key} within {timeout} s, sent {tries} times: nobody serves it now (`gemelo node list`), "
-    "and whether it was carried out is not known": "{server} no respondió en {timeout} s, y ya no está. No se sabe si "
-    "lo hizo.",
-    "{asked}: it is alive, and carries out what arrives, but answers {most} of that kind of one client; ask again "
-    "after {pause}": "{asked}: sigue en marcha y hace lo que le llega, pero solo responde {most} de ese tipo a cada "
-    "cliente; pregunte de nuevo pasados {pause}.",
-    "{asked}: nobody serves it now (`gemelo node list`), and whether it was carried out is not known": "{asked}: ya no "
-    "está, y no se sabe si lo hizo.",
-    '{key}: {most}, all of clients with the certificate "{principal}"': "{key}: {most}, todas de clientes con el "
-    "certificado «{principal}».",
-    "{server} did not answer {key} within {timeout} s, sent {tries} times: it is alive, and carries out what arrives, "
-    "but answers {most} of that kind of one client; ask again after {pause}": "{server} hace lo que le llega, pero se "
-    "le pide demasiado a la vez y no respondió. Pruebe en {pause}.",
-    "{key}: the router is away; start it with `make up`": "Falta el router: arranque todo con `make up`.",
-    "nobody serves {key}: is {server} running? `gemelo node list` shows who is": "Nadie responde: ¿está en marcha "
-    "{server}?",
-    "nobody serves {key} to {certificate}: is {server} running, and may this role ask it? schemas/roles.py says who "
-    "may": ("Nadie responde: ¿está en marcha {server}, y puede pedírselo esta página?"),
-    "the answer of {server} to {key} cannot be read: {error}": "La respuesta de {server} no se puede leer ({error}).",
-    "{key}: {size} bytes, and {whose} are waiting already: at most {most}; ask again after their answers": "Esperan "
-    "demasiados datos a la vez, más de {most} bytes: pruebe de nuevo en un momento.",
-    "{key}: {count} requests are waiting already": "Se piden demasiadas cosas a la vez: espere un momento.",
-    "{key}: {count} requests are waiting already, all of this client": "Se piden demasiadas cosas a la vez: espere un "
-    "momento.",
     "refused by {server}: {reason}": "{reason}",
     "refused: {reason}": "{reason}",
     "stop refused: {reason}": "No se pudo parar: {reason}",
