@@ -175,7 +175,7 @@ def test_rm1_says_that_it_cannot_tilt_its_tool_and_by_how_much(degrees: float):
     assert f"rm1 cannot tilt its tool, and its yaw follows from the position: the goal is {degrees:g} deg" in (
         refusal.message
     )
-    assert refusal.remedy == "ask for the position alone, or for the position + yaw"
+    assert refusal.remedy == "ask for the position alone, or ask for the position + yaw"
 
 
 def test_rm1_says_how_far_a_direction_is_from_those_that_its_tool_can_have():
