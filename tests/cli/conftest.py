@@ -31,6 +31,7 @@ from gemelo.schemas.motion import (
     FollowJointTrajectoryResult,
 )
 from gemelo.schemas.planning import PlanRequest, PlanResponse
+from gemelo.schemas.reasons import plain
 from gemelo.schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_STATE,
@@ -58,7 +59,7 @@ class PretendGateway:
         self.goals: list[FollowJointTrajectoryGoal] = []
         self.commands: list[DeviceCommandRequest | DeviceStopRequest] = []
         self.mode = DeviceMode.IDLE
-        self.command_refusal = "the arm moves"  # in Run
+        self.command_refusal = plain("the arm moves")  # in Run
         self._node, self._arm = node, arm
         self._goal: tuple[str, float] | None = None
         self._server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self._on_goal, self._on_cancel)
@@ -103,7 +104,9 @@ class PretendGateway:
     def _on_command(self, request: DeviceCommandRequest | DeviceStopRequest) -> DeviceCommandResponse:
         self.commands.append(request)
         if self.mode is DeviceMode.RUN:
-            return DeviceCommandResponse(accepted=False, reason=self.command_refusal, mode=self.mode)
+            return DeviceCommandResponse(
+                accepted=False, reason=str(self.command_refusal), mode=self.mode, why=self.command_refusal
+            )
         return DeviceCommandResponse(accepted=True, mode=self.mode)
 
 

@@ -20,6 +20,7 @@ from gemelo.schemas.device import (
 )
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JointGoal, NamedGoal, PlanRequest, PoseGoal
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import JOINT_STATES, JOINT_TARGETS
 from gemelo.tools.cli.bus import action, node, topic, topic_rates
 from gemelo.tools.cli.bus.field_path import FieldPath
@@ -186,8 +187,9 @@ def test_a_device_command_is_done_or_refused_in_the_devices_words(connected, sta
 
 
 def test_a_refusal_that_names_the_mode_is_not_followed_by_it(connected, stack):
-    stack.mode, stack.command_refusal = DeviceMode.RUN, "the device refuses RESUME in mode RUN"
-    with pytest.raises(CommandError, match=r"in mode RUN$"):
+    stack.mode = DeviceMode.RUN
+    stack.command_refusal = because("command.refused.unexplained", command="RESUME", mode="RUN", answer="WRONG_STATE")
+    with pytest.raises(CommandError, match=r"^resume refused: the device refuses RESUME in mode RUN: [^()]*$"):
         device.command(connected, "resume")
 
 

@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 OF_ALL = {"--robot", "--json", "--simulate", "--help"}
 ADVICE = re.compile(r"`gemelo ([^`]+)`")
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
+PLACEHOLDERS = ("x", "es", "en", "...", "NAME", "COMMAND", "NOMBRE", "ORDEN")
 CLASS = re.compile(r"\b[A-Z][a-z]+(?:[A-Z][a-z0-9]+)+\b")
 FAMILIES = {command.words[0] for command in COMMANDS}
 
@@ -59,7 +60,7 @@ def test_every_command_that_a_sentence_advises_is_there_with_its_options():
     found = list(advised())
     assert len(found) > 150
     for file, text in found:
-        words = [word for word in text.split() if word not in ("x", "es", r"\1", "...", "NAME", "COMMAND")]
+        words = [word for word in text.split() if word not in PLACEHOLDERS]
         while words and words[0].startswith("--"):  # as `gemelo --robot x state`
             words = words[1:]
         if not words:
