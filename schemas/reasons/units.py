@@ -34,8 +34,13 @@ def _typed(name: str, factor: float = 1.0) -> Written:
 
 
 def _short(name: str, convert: Callable[[float], float]) -> Written:
-    """To four digits in all: a clearance and a turn are given in this unit, at a command too."""
-    return lambda value, wanted: f"{convert(value):.{wanted or 4}g}{name}"
+    """To four digits in all, or more where it is large: a clearance is given in this unit, at a command too."""
+
+    def written(value: float, wanted: int | None) -> str:
+        shown = convert(value)
+        return f"{shown:.0f}{name}" if abs(shown) >= 10_000.0 else f"{shown:.{wanted or 4}g}{name}"
+
+    return written
 
 
 _SAME: dict[str, Written] = {

@@ -33,6 +33,7 @@ TOLD_ELSEWHERE = ("goal ", BLACK_BOX)  # beginnings of lines of the log
 SMALL = 5  # fields of a message that is told whole
 NOTHING = ("", (), None)
 UNTOLD = frozenset({"stamp", "request_id"})  # fields of a message that tell a person nothing
+REASONS = frozenset({"why", "warning_why"})  # fields whose sentences stand in others
 MANY = 8  # elements of a list that are written out
 QUIET = frozenset({"state_validity", "ik", "fk", "device/echo"})  # questions that change nothing
 GOALS = tuple(keys.goal_request(action).key for action in (FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND))
@@ -122,7 +123,7 @@ def _end(end: Any) -> str:
 def brief(value: object) -> str:
     """What a message says, on one line: of a large one only what is not as it is by default."""
     if isinstance(value, msgspec.Struct):
-        fields = {each.name: each.default for each in msgspec.structs.fields(value)}
+        fields = {each.name: each.default for each in msgspec.structs.fields(value) if each.name not in REASONS}
         is_small = len(fields) <= SMALL
         said = {name: getattr(value, name) for name in fields}
         said = {name: item for name, item in said.items() if item not in NOTHING and (is_small or item != fields[name])}

@@ -183,3 +183,17 @@ def _floats(payload: bytes | bytearray) -> list[int]:
         if payload[place - 1] == 0xCB and 1.0 <= value < 100.0 and value % 1.0 == 0.5:
             places.append(place)
     return places
+
+
+SENTENCES = {"reason", "error_string", "pending", "message", "problem", "detail"}
+WITHOUT_REASON = {
+    "CommandAck": "the name of the device's code",
+    "TopicInterface": "the name of a class",
+}
+
+
+def test_whoever_says_why_in_a_sentence_says_it_as_data_too() -> None:
+    found = {kind.__name__ for kind in messages() if SENTENCES & set(kind.__struct_fields__)}
+    lacking = {kind.__name__ for kind in messages() if "why" not in kind.__struct_fields__} & found
+    assert lacking == set(WITHOUT_REASON)
+    assert len(found) > 20

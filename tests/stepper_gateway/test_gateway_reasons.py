@@ -234,3 +234,59 @@ def test_a_port_that_is_not_there_is_named_with_those_that_are() -> None:
     why = complaint("/dev/ttyNONE", error.value)
     assert (why.code, why.values) == ("link.port.absent", {"port": "/dev/ttyNONE"})
     assert [each.code for each in why.remedies] in (["other_ports"], ["no_ports"], ["ports_unseen"])
+
+
+def test_a_command_that_is_not_answered_says_how_often_it_was_sent_and_a_stop_how_the_arm_was() -> None:
+    arm = VirtualArm().ready()
+    arm.lost = {"cmd/ack"}
+    arm.ask(ResetCommand(), 7)
+    assert arm.run(3.0, lambda: 7 in arm.answers)
+    unanswered = arm.answers.pop(7).why
+    assert unanswered is not None
+    count = unanswered.values["count"]
+    assert isinstance(count, int)
+    assert count > 1
+    assert unanswered == because("command.unanswered", command="RESET", count=count)
+    arm.ask(StopKind.STOP, 8)
+    assert arm.run(3.0, lambda: 8 in arm.answers)
+    last = arm.answers.pop(8).why
+    assert last is not None
+    assert (last.code, last.values["mode"]) == ("command.last_state.stands", "IDLE")
+    assert [cause.code for cause in last.causes] == ["command.unanswered"]
+
+
+def test_nothing_begins_while_a_command_is_under_way() -> None:
+    arm = VirtualArm().ready()
+    arm.lost = {"cmd/ack"}
+    arm.ask(StopKind.DISARM)
+    assert arm.goal(move(HOME, FAR), "refused").why == because("command.under_way", command="DISARM")
+
+
+def test_a_device_that_loses_the_heartbeat_ends_the_goal_by_its_own_word() -> None:
+    arm = moving()
+    arm.lost = {"hb"}
+    assert ended(arm) == because("ending.held.heartbeat")
+
+
+def test_a_velocity_that_is_off_is_given_in_the_unit_of_the_joint() -> None:
+    arm = VirtualArm().ready()
+    strict = (JointTolerance(name=JOINTS[0], position=-1.0, velocity=1e-9),)
+    assert arm.goal(FollowJointTrajectoryGoal(trajectory=move(HOME, FAR), path_tolerance=strict)).accepted
+    reason = ended(arm)
+    assert (reason.code, reason.values["joint"], reason.values["unit"]) == ("ending.off_velocity", JOINTS[0], "rad")
+
+
+def test_a_stream_that_was_interrupted_waits_for_a_silence() -> None:
+    arm = VirtualArm().ready()
+    for _ in range(10):
+        arm.target(**{JOINTS[0]: 0.2})
+        arm.run(0.05)
+    arm.ask(StopKind.STOP)
+    for _ in range(60):  # it goes on, and is refused again and again
+        arm.run(0.05)
+        arm.target(**{JOINTS[0]: 0.2})
+    refusals = [event.why for event in arm.messages(DEVICE_EVENTS) if event.event == "target_refused"]
+    interrupted = because("target.interrupted", time=arm.core.device.parameters.stream_silence)
+    counted = [why for why in refusals if why.code == "target.and_more"]  # sent once a second at most
+    assert counted
+    assert all(why.causes == (interrupted,) and why.values["count"] > 10 for why in counted)

@@ -9,6 +9,7 @@ from gemelo.libraries.runtime.actions import keys
 from gemelo.libraries.runtime.errors import NoAnswer
 from gemelo.schemas.actions import CancelRequest, GoalFeedback, GoalStatus, GoalStatuses, ResultRequest
 from gemelo.schemas.message import Message, decode
+from gemelo.schemas.reasons import because, plain
 from gemelo.schemas.topics import Action
 from gemelo.tools.cli.bus.action import action_of, action_option, indented
 from gemelo.tools.cli.bus.field_path import FieldPath
@@ -113,7 +114,7 @@ def cancel(session: CommandSession, action: Action[Any, Any, Any], begin: str) -
     goal = _whole(session, action, begin) if begin else ""
     answer = session.node.call(keys.cancel_request(action), CancelRequest(goal_id=goal), timeout=TIMEOUT)
     if not answer.canceling:
-        raise CommandError(f"nothing is cancelled: {answer.reason or f'{action.key} has no goal under way'}")
+        raise CommandError(because("cancel.nothing", answer.why or plain(answer.reason)))
     return answer.canceling
 
 

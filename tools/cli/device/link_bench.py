@@ -96,8 +96,9 @@ def measure(session: CommandSession, rate: float, count: int, swing: Callable[[f
 
 
 def _trip(answer: EchoResponse, is_first: bool) -> float | None:
-    if is_first and not answer.answered and not answer.reason.startswith("no answer"):
-        raise CommandError(answer.reason)
+    is_lost = answer.why is not None and answer.why.code == "echo.unanswered"
+    if is_first and not answer.answered and not is_lost:
+        raise CommandError(answer.why or answer.reason)
     return answer.round_trip if answer.answered else None
 
 
