@@ -41,7 +41,9 @@ def with_leading_options(arguments: list[str]) -> list[str]:
             choose(arguments.pop(0))
         elif option in LEADING and not value:
             if len(arguments) < 2:
-                raise usage(LEADING[option][0])
+                from gemelo.schemas.reasons import because  # 30 ms, where something is refused
+
+                raise usage(because(LEADING[option][0]))
             LEADING[option][1](arguments[1])
             del arguments[:2]
         else:
@@ -112,12 +114,9 @@ def choose_language(name: str) -> None:
     language.choose(name)
 
 
-LEADING = {  # options before the command, each with a value: what is said without it, and what it does
-    "--robot": (
-        "--robot NAME: the name of an arm in urdf/, of a recording that is played, or its folder",
-        choose_robot,
-    ),
-    "--lang": ("--lang LANGUAGE: the language of the sentences, as es or en", choose_language),
+LEADING = {  # options before the command, each with a value: the code of its refusal without it, and what it does
+    "--robot": ("cli.robot.no_value", choose_robot),
+    "--lang": ("cli.lang.no_value", choose_language),
 }
 
 

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 import gemelo
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import usage
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def choose(option: str) -> None:
     """`--simulate`, or `--simulate=START`; raises `CommandError` for an empty start."""
     _, equals, start = option.partition("=")
     if equals and not start:
-        raise usage(f'{OPTION}=START: a named state, or "unreferenced"')
+        raise usage(because("cli.simulate.start", option=OPTION))
     _Chosen.twin = SimulatedTwin(start)
 
 

@@ -6,9 +6,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gemelo.api.errors import reason_of
 from gemelo.libraries.runtime.errors import GoalRefused
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import because
 from gemelo.schemas.text_file import NotUtf8, decode_text
 from gemelo.schemas.topics import ACTIONS, Action
 from gemelo.tools.cli.bus.messages import dump, fields_of, message_of
@@ -109,7 +111,7 @@ def goal_text(source: str) -> str:
     try:
         return decode_text(sys.stdin.buffer.read() if source == "-" else Path(source).read_bytes())
     except (OSError, NotUtf8) as error:
-        raise usage(f"cannot read the goal: {error}") from error
+        raise usage(because("cli.action.goal", error=str(error))) from error
 
 
 def send_goal(
@@ -139,7 +141,7 @@ def send_goal(
         try:
             handle = client.send(goal, on_feedback=on_feedback if with_feedback else None)
         except GoalRefused as error:
-            raise CommandError(f"refused by {action.server}: {error}") from error
+            raise CommandError(because("refused.by", reason_of(error), server=action.server)) from error
         say({"accepted": handle.goal_id}, f"accepted: goal {handle.goal_id}")
         outcome = handle.wait(LONGEST_HOLD, on_tick=cancel_once)
     result = indented(outcome.result) if outcome.result else ""

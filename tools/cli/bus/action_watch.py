@@ -52,7 +52,7 @@ def run_echo(options: Options) -> ExitCode:
     part, _, path = wanted.partition(".")
     shown = ActionView(action, part, path, csv_lines() if options.csv else json_line if options.json else None)
     if options.csv and not part:
-        raise usage(f"--csv has the columns of one part: write {' or '.join(f'{key}.{each}' for each in PARTS)}")
+        raise usage(because("cli.action.csv", parts=tuple(f"{key}.{each}" for each in PARTS)))
     with connect() as session:
         return echo(session, action, options.count, shown)
 

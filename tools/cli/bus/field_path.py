@@ -11,6 +11,7 @@ from typing import get_args
 import msgspec
 
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, nearest, usage
 
 _UNIT = re.compile(r"\[[^\]]+\](?: or \[[^\]]+\])*")
@@ -26,7 +27,7 @@ class FieldPath:
         for part in path.split(".") if path else ():
             found = _PART.fullmatch(part)
             if found is None:
-                raise usage(f'"{path}" is no field: write it as position[0] or transforms[0].child')
+                raise usage(because("cli.field.not_one", path=path))
             self._keys += [found[1], *(int(index) for index in re.findall(r"-?\d+", found[2]))]
         if self._keys and self._keys[0] not in kind.__struct_fields__:
             self._refuse(str(self._keys[0]), kind.__struct_fields__)
@@ -38,7 +39,9 @@ class FieldPath:
             if isinstance(key, int):
                 if not isinstance(value, list | tuple) or not -len(value) <= key < len(value):
                     size = f"{len(value)} elements" if isinstance(value, list | tuple) else "no elements"
-                    raise CommandError(f"{self._kind.__name__} {self._path}: [{key}] of {size}")
+                    raise CommandError(
+                        because("cli.field.index", message=self._kind.__name__, path=self._path, index=key, size=size)
+                    )
                 value = value[key]
             else:
                 fields = _fields(value)

@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import nearest, usage
 
 INDENT = "  "
@@ -28,7 +29,9 @@ def message_of(kind: type[Message], text: str) -> Any:
     try:
         raw = msgspec.json.decode(text)
         if not isinstance(raw, dict):
-            raise usage(f'a {kind.__name__} is written as JSON, like {{"{kind.__struct_fields__[0]}": ...}}')
+            raise usage(
+                because("cli.message.json", message=kind.__name__, example=f'{{"{kind.__struct_fields__[0]}": ...}}')
+            )
         for field in raw:
             if field not in kind.__struct_fields__:
                 guess = nearest(field, kind.__struct_fields__)
@@ -36,7 +39,7 @@ def message_of(kind: type[Message], text: str) -> Any:
                 raise usage(f'{kind.__name__} has no field "{field}": {hint}')
         return msgspec.convert(raw, kind)
     except (msgspec.DecodeError, ValueError) as error:
-        raise usage(f"not a {kind.__name__}: {error}") from error
+        raise usage(because("cli.message.not_one", message=kind.__name__, error=str(error))) from error
 
 
 def dump(value: object) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gemelo.libraries.runtime.saved_parameters import toml
+from gemelo.schemas.reasons import because
 from gemelo.schemas.system import Parameter, ParameterValue
 from gemelo.schemas.text_file import NotUtf8, decode_text
 from gemelo.tools.cli.bus.node import living
@@ -78,10 +79,10 @@ def read(file: str) -> dict[str, dict[str, object]]:
         text = decode_text(sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes())
         tables = tomllib.loads(text)
     except (OSError, NotUtf8, tomllib.TOMLDecodeError) as error:
-        raise usage(f"{file}: cannot be read as parameters: {error}") from error
+        raise usage(because("cli.parameters.unreadable", file=str(file), error=str(error))) from error
     for node, table in tables.items():
         if not isinstance(table, dict):
-            raise usage(f'{file}: "{node}" stands outside of a [node]')
+            raise usage(because("cli.parameters.outside", file=str(file), name=str(node)))
     return tables
 
 
@@ -107,9 +108,9 @@ def _change(session: CommandSession, node: str, name: str, value: object) -> New
     """Checked for its type and its range, before anything is set."""
     parameter = parameter_of(session, node, name)
     if not isinstance(value, bool | int | float | str):
-        raise CommandError(f'{node} "{name}" is {value!r}: a parameter is one number, word or truth')
+        raise CommandError(because("cli.parameters.value", node=node, name=name, value=repr(value)))
     if isinstance(value, str) != (parameter.type == "str"):
-        raise usage(f'{value!r} is not a {parameter.type} for parameter "{name}" of {node}')
+        raise usage(because("cli.parameters.type", value=repr(value), type=str(parameter.type), name=name, node=node))
     wanted = value_of(parameter, written(value))
     require_in_range(node, parameter, wanted)
     return NewValue(node, parameter, wanted)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from gemelo.schemas.reasons import because
 from gemelo.schemas.system import Empty, Parameter, ParameterValue, SetParameter
 from gemelo.tools.cli.bus.messages import dump
 from gemelo.tools.cli.bus.node import TIMEOUT, living, node_option, require_alive
@@ -133,7 +134,7 @@ def change_parameter(
     question = SetParameter(name=parameter.name, value=value, save=save)
     after = session.node.call(parameter_request(node), question, timeout=TIMEOUT)
     if save and not after.saved_in:  # an older node knows of no `save`
-        raise CommandError(f"{node} {after.name} is {written(after.value)} now, and not saved: {node} cannot save")
+        raise CommandError(because("cli.param.not_saved", node=node, name=after.name, value=written(after.value)))
     kept = f", saved in {after.saved_in}" if save else ""
     return f"{node} {after.name}: {written(parameter.value)} -> {written(after.value)}{kept}"
 
@@ -144,7 +145,7 @@ def require_in_range(node: str, parameter: Parameter, value: ParameterValue) -> 
     if isinstance(value, bool | str):
         return
     if (low is not None and value < low) or (high is not None and value > high):
-        raise usage(f'{value:g} is not in {range_of(parameter)}, the range of parameter "{parameter.name}" of {node}')
+        raise usage(because("cli.param.range", value=value, range=range_of(parameter), name=parameter.name, node=node))
 
 
 def value_of(parameter: Parameter, text: str) -> ParameterValue:
@@ -153,4 +154,4 @@ def value_of(parameter: Parameter, text: str) -> ParameterValue:
     try:
         return msgspec.convert(text, kinds[parameter.type], strict=False)
     except (msgspec.ValidationError, KeyError) as error:
-        raise usage(f'"{text}" is not a {parameter.type} for parameter "{parameter.name}"') from error
+        raise usage(because("cli.param.type", text=text, type=str(parameter.type), name=parameter.name)) from error

@@ -23,7 +23,7 @@ from gemelo.schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from gemelo.schemas.reasons import remedy
+from gemelo.schemas.reasons import Reason, remedy
 from gemelo.tools.cli.common.errors import CommandError
 from gemelo.tools.cli.common.units import DEGREE, SHOWN
 

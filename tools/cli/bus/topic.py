@@ -9,6 +9,7 @@ import msgspec
 
 from gemelo.libraries.recordings.living_topic import LivingTopic
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import TOPICS, Topic
 from gemelo.tools.cli.bus.field_path import FieldPath
 from gemelo.tools.cli.bus.living_topics import all_topics, connected, known_topic, router_listens
@@ -180,9 +181,7 @@ def publish(
 ) -> ExitCode:
     """Publishes once, `count` times, or at `rate` [Hz] until Ctrl-C."""
     if topic.writer != "any":
-        raise CommandError(
-            f"refused: only {topic.writer} writes {topic.key}; another writer would deceive every reader"
-        )
+        raise CommandError(because("cli.topic.one_writer", writer=topic.writer, topic=topic.key))
     publisher = session.node.publisher(topic)
     remaining = count if count is not None else (1 if rate is None else None)
     sent = 0

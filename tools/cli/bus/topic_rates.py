@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 
 from gemelo.schemas.message import Message, encode
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import Topic
 from gemelo.tools.cli.bus.living_topics import connected
 from gemelo.tools.cli.bus.topic import listen, topic_option
@@ -101,7 +102,7 @@ def run_delay(options: Options) -> ExitCode:
     """Prints how old the messages of a topic are when they come."""
     with connected(options.topic) as (session, topic):
         if "stamp" not in topic.message.__struct_fields__:
-            raise usage(f"{topic.message.__name__} has no stamp, so that nobody knows how old it is")
+            raise usage(because("cli.topic.no_stamp", message=topic.message.__name__))
         return delay(session, topic, options.window, options.count, form_of(options, str))
 
 

@@ -44,11 +44,14 @@ def require_folder(path: Path, owner: str) -> None:
     """Raises `CommandError` where `path` is no folder, with the one beside it that is most alike."""
     if path.is_dir():
         return
+    from gemelo.schemas.reasons import because, remedy  # 30 ms, where something is refused
+
     if path.exists():
-        raise usage(f"{owner}: {path} is no folder")
+        raise usage(because("cli.folder.not_one", owner=owner, path=str(path)))
     beside = [each.name for each in path.parent.iterdir() if each.is_dir()] if path.parent.is_dir() else []
     guess = nearest(path.name, beside)
-    raise usage(f"{owner}: there is no folder {path}" + (f": did you mean {path.parent / guess}?" if guess else ""))
+    hint = (remedy("did_you_mean_path", path=str(path.parent / guess)),) if guess else ()
+    raise usage(because("cli.folder.none", *hint, owner=owner, path=str(path)))
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
@@ -85,7 +88,9 @@ def require_name(kind: str, name: str, parts: Sequence[Input] | Sequence[Digital
     """Returns `name` if robot.toml has such a part; raises `CommandError` with the nearest name."""
     known = [part.name for part in parts]
     if not known:
-        raise usage(f"robot.toml has no [[{kind}]], so there is none to name")
+        from gemelo.schemas.reasons import because  # 30 ms, where something is refused
+
+        raise usage(because("cli.part.none", kind=kind))
     if name not in known:
         raise unknown(kind, name, known)
     return name

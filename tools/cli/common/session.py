@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
 import gemelo
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
 
 if TYPE_CHECKING:
@@ -123,16 +124,13 @@ def require_router(deployment: Deployment) -> None:
         raise CommandError(error.message, ExitCode.NO_STACK) from error
 
 
-def other_robots(deployment: Deployment, arm: ArmDescription) -> str:
-    """A sentence that names the robots on the router if `arm`'s own gateway is not there; else empty."""
+def other_robots(deployment: Deployment, arm: ArmDescription) -> Reason | None:
+    """The robots on the router if `arm`'s own gateway is not there; else None."""
     robots = gemelo.robots(deployment) if chosen_twin() is None else ()
     if not robots or arm.name in robots:
-        return ""
-    router = f"{deployment.router.host}:{deployment.router.port}"
-    return (
-        f"the router at {router} has no {arm.name}, but {', '.join(robots)}: "
-        f"`gemelo --robot {robots[0]} ...` speaks with it"
-    )
+        return None
+    host, port = deployment.router.host, deployment.router.port
+    return because("cli.other_robots", host=host, port=port, robot=arm.name, names=", ".join(robots), other=robots[0])
 
 
 def own_name() -> str:

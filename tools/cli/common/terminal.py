@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 from gemelo.schemas.plain_text import COLOUR
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
 from gemelo.tools.cli.common.output import control, print_coloured, unescaped
 
@@ -113,10 +114,10 @@ def confirm(question: str, is_answered: bool) -> None:
     if is_answered:
         return
     if not sys.stdin.isatty():
-        raise usage(f"{question} There is nobody to ask: say --yes")
+        raise usage(because("cli.nobody_to_ask", question=question))
     print(f"{question} [y/N] ", end="", flush=True)
     if sys.stdin.readline().strip().lower() not in ("y", "yes"):
-        raise CommandError("nothing was done", ExitCode.CANCELLED)
+        raise CommandError(because("cli.nothing_done"), ExitCode.CANCELLED)
 
 
 class Interrupt:

@@ -16,6 +16,7 @@ import gemelo
 from gemelo.api import control_file
 from gemelo.libraries.runtime.process.ending import EndedBySignal, ended_by_signals
 from gemelo.schemas.control import ControlState
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.parser import Options, Parser, json_option
@@ -44,7 +45,7 @@ def run_give(options: Options) -> ExitCode:
     held = control_file.read(path)
     with connect_arm(robot) as arm:
         if held is None:
-            raise CommandError(f"no process of yours on this host holds control ({path}): {words_of(arm)}")
+            raise CommandError(because("cli.control.none_shared", path=str(path), state=words_of(arm)))
         arm.control.give_with(held.secret)
         control_file.remove(path, held.secret)
         print(words_of(arm))
@@ -84,7 +85,7 @@ def take(arm: Arm, name: str, force: bool, program: Sequence[str]) -> ExitCode:
                 with suppress(gemelo.Error):
                     arm.control.give()
     if not is_mine and not arm.control.state.given:
-        raise CommandError(f"control is lost: {words_of(arm)}")
+        raise CommandError(because("cli.control.lost", state=words_of(arm)))
     print(words_of(arm))
     return ExitCode.OK
 
@@ -111,7 +112,7 @@ def _run(arm: Arm, program: Sequence[str]) -> ExitCode:
     try:
         process = subprocess.Popen(program)
     except OSError as error:
-        raise CommandError(f"{program[0]}: {error.strerror}: write a command after --") from error
+        raise CommandError(because("cli.control.program", program=program[0], error=str(error.strerror))) from error
     while (code := process.poll()) is None:
         try:
             process.wait()
@@ -120,7 +121,7 @@ def _run(arm: Arm, program: Sequence[str]) -> ExitCode:
         except KeyboardInterrupt:  # the terminal has told the command too
             continue
     if not arm.control.is_mine:
-        raise CommandError(f"control was lost before {Path(program[0]).name} had ended: {words_of(arm)}")
+        raise CommandError(because("cli.control.lost_before", program=Path(program[0]).name, state=words_of(arm)))
     if code:
-        raise CommandError(f"{Path(program[0]).name} has ended with exit code {code}")
+        raise CommandError(because("cli.control.ended", program=Path(program[0]).name, code=code))
     return ExitCode.OK

@@ -38,7 +38,7 @@ def run(options: Options) -> ExitCode:
     robot = load_robot()
     gripper = robot.description.gripper
     if gripper is None:
-        raise CommandError(f"{robot.description.name} has no gripper: write a [gripper] into its robot.toml")
+        raise CommandError(because("client.no_gripper", robot=robot.description.name))
     if options.to == STATE:
         with connect_arm(robot) as arm:
             return _show(arm, options.json)

@@ -76,7 +76,7 @@ def run(options: Options) -> ExitCode:
         with connect_arm() as arm:
             return jog_by_hand(arm)
     if by_hand or options.seconds is None:
-        raise usage("give --joint or --twist and --for so many seconds, or none of them to move with the keys")
+        raise usage(because("cli.jog.which"))
     robot = load_robot()
     command = command_of(robot.description, options.joint, options.twist, options.turn, options.frame == "tool")
     print(f"understood: {command_text(command, robot.description)} for {options.seconds:g} s", flush=True)
@@ -97,7 +97,7 @@ def command_of(
     `twist` (3,) is in [m/s], `turn` (3,) in [rad/s]. Raises `CommandError` if both forms are given.
     """
     if joints and (twist or turn):
-        raise usage("--joint and a twist exclude one another")
+        raise usage(because("cli.jog.both"))
     if joints:
         speeds = parse_joints(joints, arm.joints, SPEED_OF)
         return JogCommand(name=tuple(speeds), velocity=tuple(speeds.values()))

@@ -10,6 +10,7 @@ import msgspec
 
 import gemelo
 from gemelo.schemas.planning import PlanResponse
+from gemelo.schemas.reasons import because, plain
 from gemelo.schemas.text_file import decode_text
 from gemelo.tools.cli.common.errors import CommandError, usage
 
@@ -41,7 +42,7 @@ def read_plan(source: str, arm: ArmDescription) -> Plan:
     except (msgspec.MsgspecError, ValueError) as error:
         raise usage(f"{name} holds no plan: {error}; {HOW_TO_WRITE}") from error
     if saved.robot != arm.name:
-        raise usage(f"{name} is a plan for {saved.robot}, and this robot is {arm.name}")
+        raise usage(because("cli.plan.other_robot", name=name, planned=saved.robot, robot=arm.name))
     _require_trajectory(saved.response, name, arm)
     return gemelo.Plan(saved.robot, {}, saved.response)
 
@@ -52,21 +53,23 @@ def _read(source: str, name: str) -> bytes:
             return sys.stdin.buffer.read(LARGEST_FILE)
         path = Path(source)
         if path.is_file() and path.stat().st_size > LARGEST_FILE:
-            raise usage(f"{name} has {path.stat().st_size} bytes: no plan is larger than {LARGEST_FILE}")
+            raise usage(because("cli.plan.large", name=name, size=path.stat().st_size, limit=LARGEST_FILE))
         return path.read_bytes()
     except OSError as error:
-        raise usage(f"{name} cannot be read: {error.strerror}") from error
+        raise usage(because("cli.plan.unreadable", name=name, error=str(error.strerror))) from error
 
 
 def _require_trajectory(plan: PlanResponse, name: str, arm: ArmDescription) -> None:
     """Raises `CommandError` for a refused plan, an empty one, and one whose points are not of `arm`'s joints."""
     if plan.refusal is not None:
-        raise CommandError(f"{name} holds a refusal, no plan: {plan.refusal.message}")
+        raise CommandError(because("cli.plan.refusal", plan.refusal.why or plain(plan.refusal.message), name=name))
     joints = plan.trajectory.joint_names
     if not plan.trajectory.points:
         raise usage(f"{name} holds a plan without a trajectory; {HOW_TO_WRITE}")
     if sorted(joints) != sorted(arm.joint_names):
-        raise usage(f"{name} moves {', '.join(joints) or 'no joint'}, and {arm.name} has {', '.join(arm.joint_names)}")
+        planned, own = ", ".join(joints) or "-", ", ".join(arm.joint_names)
+        raise usage(because("cli.plan.joints", name=name, planned=planned, robot=arm.name, joints=own))
     for index, point in enumerate(plan.trajectory.points):
         if len(point.positions) != len(joints):
-            raise usage(f"{name}: point {index} has {len(point.positions)} positions for {len(joints)} joints")
+            size = len(point.positions)
+            raise usage(because("cli.plan.point", name=name, point=index, count=size, joints=len(joints)))

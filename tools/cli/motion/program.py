@@ -27,6 +27,7 @@ from gemelo.programs import (
     path_text,
     programs_folder,
 )
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import ExitCode, unknown, usage
 from gemelo.tools.cli.common.session import connect_arm, load_robot, reported
 from gemelo.tools.cli.common.text_table import table
@@ -118,11 +119,11 @@ def run_export(options: Options) -> ExitCode:
         print(script, end="")
         return ExitCode.OK
     if "\0" in options.file:
-        raise usage(f"{options.file!r} is no file: no path has a NUL in it")
+        raise usage(because("cli.file.nul", file=repr(options.file)))
     try:
         Path(options.file).write_text(script, encoding="utf-8")
     except OSError as error:
-        raise usage(f"{options.file} cannot be written: {error.strerror}") from error
+        raise usage(because("cli.file.unwritable", file=str(options.file), error=str(error.strerror))) from error
     print(f"wrote {options.file}: python {options.file} runs it")
     return ExitCode.OK
 

@@ -8,7 +8,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import gemelo
+from gemelo.api.errors import reason_of
 from gemelo.schemas.device import StopKind
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import DEVICE_STOP
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
 
@@ -49,7 +51,7 @@ def standing(arm: Arm) -> str:
     try:
         node = arm.node
     except gemelo.Lost as error:
-        raise CommandError(f"{error}: start `gemelo stop --ready` again", ExitCode.NO_STACK) from error
+        raise CommandError(because("cli.stop.again", reason_of(error)), ExitCode.NO_STACK) from error
     if not node.is_connected:
         return "NOT READY: the router is away; this waits for it"
     if not node.is_served(DEVICE_STOP):

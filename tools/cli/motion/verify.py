@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
+from gemelo.schemas.reasons import Reason
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, joint_of
 from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot

@@ -108,7 +108,7 @@ def run_fit(options: Options) -> ExitCode:
     if options.meshes:
         return shapes(options.folder, options.within, options.most, options.link, options.write)
     if options.write or options.link:
-        raise usage("--write and --link go with --meshes: spheres are the core's own and stand in no file")
+        raise usage(because("cli.fit.meshes"))
     return spheres(options.folder, options.bulge)
 
 
@@ -236,5 +236,5 @@ def _write(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise CommandError(f"{path} cannot be written: {error.strerror}") from error
+        raise CommandError(because("cli.file.unwritable", file=str(path), error=str(error.strerror))) from error
     print(f"{path} is changed; `gemelo check {path.parent}` looks at it as a whole")

@@ -9,6 +9,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import TOPICS, Topic
 from gemelo.tools.cli.bus.field_path import FieldPath, leaves
 from gemelo.tools.cli.bus.living_topics import connected, known_topic, topic_on
@@ -65,7 +66,7 @@ def choices(robot: Robot | None) -> Choices:
 def _split(field: str) -> tuple[str, str]:
     key, _, path = field.partition(".")
     if not path:
-        raise usage(f'"{field}" names no field: say {key}.FIELD; `gemelo topic info {key}` lists them')
+        raise usage(because("cli.plot.no_field", field=field, topic=key))
     return key, path
 
 
@@ -87,7 +88,7 @@ class Field:
                 joint = "." if path and not path.startswith("[") else ""
                 yield f"{self.topic.key}.{self._path}{joint}{path}", float(value)
         if not found:
-            raise CommandError(f"{self.topic.key}.{self._path} has no number: `gemelo topic echo` shows what it holds")
+            raise CommandError(because("cli.plot.no_number", field=f"{self.topic.key}.{self._path}"))
 
 
 class CurvePoints(NamedTuple):
@@ -108,9 +109,7 @@ class Plot:
     def add(self, name: str, unit: str, time: float, value: float) -> None:
         """Takes a number that came at `time` [s]; raises `CommandError` for one curve too many."""
         if name not in self._curves and len(self._curves) == len(COLOURS):
-            raise CommandError(
-                f"{name} is more than the {len(COLOURS)} curves that can be told apart: name fewer fields"
-            )
+            raise CommandError(because("cli.plot.many", field=name, limit=len(COLOURS)))
         points = self._curves.setdefault(name, CurvePoints(unit, deque(maxlen=LARGEST))).points
         points.append((time, value))
         while points[0][0] < time - self._window:

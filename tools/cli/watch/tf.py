@@ -15,6 +15,7 @@ import msgspec
 from gemelo.libraries.arm.frames.frame_buffer import FrameBuffer, FrameError
 from gemelo.libraries.arm.frames.transforms import to_rpy
 from gemelo.schemas.frames import FrameTransform, FrameTransforms
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import FRAMES, STATIC_FRAMES
 from gemelo.tools.cli.bus.field_path import FieldPath
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown
@@ -79,7 +80,9 @@ def run_tree(options: Options) -> ExitCode:
         try:
             options.svg.write_text(tree_picture(links), encoding="utf-8")
         except OSError as error:
-            raise CommandError(f"{options.svg} cannot be written: {error.strerror}") from error
+            raise CommandError(
+                because("cli.file.unwritable", file=str(options.svg), error=str(error.strerror))
+            ) from error
     return ExitCode.OK
 
 
