@@ -13,6 +13,7 @@ from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import (
     CircularMotion,
     FreeMotion,
+    JogStatus,
     JointGoal,
     LinearMotion,
     NamedGoal,
@@ -159,3 +160,20 @@ def test_the_planner_says_why_with_a_code_its_values_and_what_would_do(
                 assert {key: found.get(key) for key in values} == values
                 assert [each.code for each in reason.remedies] == remedies
                 assert say(reason, "es") != say(reason) == str(reason)
+
+
+def test_a_jog_says_which_limit_slows_it_and_which_goal_keeps_it_from_beginning():
+    statuses: list[JogStatus] = []
+    with gemelo.simulate("rm1") as arm:
+        arm.jog(joints={"brazo_joint": 1.5}, duration=3.0, on_progress=statuses.append)
+        limit = arm.description.joint("brazo_joint").upper
+        slowed = {each.why.code: each.why.values for status in statuses for each in status.limits if each.why}
+        assert slowed["jog.limit.turning"] == {"joint": "brazo_joint", "limit": limit}
+        motion = arm.start(arm.plan(named="home", speed=0.1))
+        with pytest.raises(gemelo.Refused) as refused:
+            arm.jog(joints={"brazo_joint": 0.1}, duration=2.0)
+        motion.cancel()
+    reason = refused.value.reason
+    assert isinstance(reason, Reason)
+    assert reason.code == "jog.goal_active"
+    assert reason.remedies == (remedy("cancel_first"),)
