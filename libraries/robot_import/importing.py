@@ -14,7 +14,7 @@ import msgspec
 
 from gemelo.libraries.arm.checks.check import check
 from gemelo.libraries.arm.checks.findings import Finding, Severity, error
-from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import DescriptionError, Subject, wrong_file
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.arm.model.virtual_drive import NO_MOTORS
 from gemelo.libraries.robot_import.drive import speed_lines
@@ -23,6 +23,7 @@ from gemelo.libraries.robot_import.robot_folder import Description, step, write_
 from gemelo.libraries.robot_import.source import RobotSource, find_source
 from gemelo.libraries.robot_import.survey import Survey, surveyed
 from gemelo.libraries.robot_import.trial import trial_findings
+from gemelo.schemas.reasons import because
 
 ANSWERS_FILE = "import.toml"
 XACRO = "xacro."  # before the names of its arguments, in a file of answers
@@ -53,7 +54,7 @@ def import_robot(options: ImportOptions) -> Path:
     _show(survey.findings)
     description = survey.description
     if description is None:
-        raise DescriptionError("with these answers it has the errors above; nothing is written")
+        raise DescriptionError(because("import.ended.answers"))
     folder = options.output / description.name
     _require_free(folder, options)
     with TemporaryDirectory(prefix="gemelo_import_") as temporary:
@@ -93,7 +94,8 @@ def built(building: Path, description: Description) -> list[Finding]:
     try:
         findings = write_robot(building, description)
     except DescriptionError as why:
-        return [error(source.label, "robot", str(why).replace(f"{building}/", ""))]
+        found = error(source.label, Subject("robot"), why.reason)
+        return [_in_folder(found, building, Path(source.label).parent)]
     if any(each.severity is Severity.ERROR for each in findings):
         return findings
     with step("gemelo check, with plans between random configurations"):
@@ -124,7 +126,7 @@ def _ask_before_expanding(questions: Questions, xacro: Path) -> None:
     """Raises `DescriptionError` where the person does not want a xacro file to be expanded."""
     question = f"{xacro.name} is a xacro file, which is a program: expand it, in a sandbox?"
     if not questions.ask_somebody("expand_xacro", question, "yes", yes_or_no):
-        raise DescriptionError(f"{xacro}: it was not expanded, and nothing was imported")
+        raise wrong_file(xacro, because("import.xacro.not_wanted"))
 
 
 def _publish(building: Path, folder: Path) -> None:
@@ -145,15 +147,15 @@ def _require_importable(findings: Sequence[Finding]) -> None:
     errors = [each for each in findings if each.severity is Severity.ERROR]
     if errors:
         _show(findings)
-        count = "the error above has" if len(errors) == 1 else f"the {len(errors)} errors above have"
-        raise DescriptionError(f"{count} no one answer: correct the source, then import it again")
+        why = because("import.ended.error") if len(errors) == 1 else because("import.ended.errors", count=len(errors))
+        raise DescriptionError(why)
 
 
 def _require_all_asked(questions: Questions, options: ImportOptions) -> None:
     """Raises `DescriptionError` where the file of answers has a key that nothing asks for: it is misspelt."""
     unused = questions.unused()
     if unused:
-        raise DescriptionError(f"{options.answers}: nothing asks for {', '.join(unused)}: correct or remove it")
+        raise wrong_file(str(options.answers), because("import.answers.unused", *unused))
 
 
 def _require_well(findings: Sequence[Finding]) -> None:
@@ -161,7 +163,7 @@ def _require_well(findings: Sequence[Finding]) -> None:
     for each in findings:
         print(each)
     if any(each.severity is Severity.ERROR for each in findings):
-        raise DescriptionError("the finished robot has the errors above; nothing is written")
+        raise DescriptionError(because("import.ended.finished"))
 
 
 def _in_folder(finding: Finding, building: Path, folder: Path) -> Finding:
@@ -180,8 +182,8 @@ def _require_free(folder: Path, options: ImportOptions) -> None:
     if not folder.exists():
         return
     if not options.force:
-        raise DescriptionError(f"{folder} is there already: give --force to replace it, or --name for another")
+        raise DescriptionError(because("import.folder.exists", folder=str(folder)))
     if folder.resolve() in (options.source.resolve(), *options.source.resolve().parents):
-        raise DescriptionError(f"{options.source} lies in {folder}, which is to be replaced: give --name for another")
+        raise DescriptionError(because("import.folder.source", source=str(options.source), folder=str(folder)))
     if not folder.is_dir() or (any(folder.iterdir()) and not (folder / "robot.urdf").is_file()):
-        raise DescriptionError(f"{folder} is no robot's folder, --force does not replace it: give --name for another")
+        raise DescriptionError(because("import.folder.other", folder=str(folder)))

@@ -9,7 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.errors import DescriptionError, nearest, wrong_file
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.text_file import NotUtf8, read_text
 
 T = TypeVar("T")
@@ -31,12 +33,12 @@ class Questions:
             self._by_default.add(key)
             return self._parsed(key, default, parse)
         if not sys.stdin.isatty():
-            raise DescriptionError(f"there is nobody to ask for {key}: say --yes for the defaults, or give --answers")
+            raise DescriptionError(because("import.question.nobody", key=key))
         while True:
             print(f"  {question} [{default}] ", end="", flush=True)
             said = sys.stdin.readline()
             if not said:
-                raise DescriptionError(f"nobody answers {key}: say --yes for the defaults")
+                raise DescriptionError(because("import.question.no_answer", key=key))
             try:
                 return self._parsed(key, said.strip() or default, parse)
             except DescriptionError as error:
@@ -68,16 +70,17 @@ class Questions:
         """True if a person said it: in the file of answers, or on the terminal, where even a default was looked at."""
         return key in self.answers and key not in self._by_default
 
-    def unused(self) -> list[str]:
+    def unused(self) -> list[Reason]:
         """What was given and never asked, with a hint: a misspelt key has no effect."""
         left = [key for key in self._given if key not in self.answers]
-        return [f'"{key}"{suggestion(key, self.answers)}' for key in left]
+        return [because("import.answers.key", nearest(key, self.answers), key=key) for key in left]
 
     def _parsed(self, key: str, text: str, parse: Callable[[str], T]) -> T:
         try:
             value = parse(text)
         except ValueError as error:
-            raise DescriptionError(f'{key} = "{text}": {error}') from error
+            why = error.reason if isinstance(error, ReasonedError) else plain(str(error))
+            raise DescriptionError(because("import.answer", why, key=key, text=text)) from error
         self.answers[key] = text
         return value
 
@@ -86,11 +89,15 @@ def read_answers(file: Path) -> dict[str, str]:
     """Of a file that an import wrote; raises `DescriptionError`."""
     try:
         data = tomllib.loads(read_text(file))
-    except (OSError, NotUtf8, tomllib.TOMLDecodeError) as error:
-        raise DescriptionError(f"{file}: cannot be read as answers: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise wrong_file(file, because("import.answers.not_toml", problem=str(error))) from error
+    except NotUtf8 as error:
+        raise wrong_file(file, error.reason) from error
+    except OSError as error:
+        raise wrong_file(file, because("file.unreadable", error=error.strerror or str(error))) from error
     for key, value in data.items():
         if isinstance(value, (dict, list)):
-            raise DescriptionError(f'{file}: "{key}" is no single answer: write "{key}" = "..."')
+            raise wrong_file(file, because("import.answers.several", key=key))
     return {key: value if isinstance(value, str) else str(value).lower() for key, value in data.items()}
 
 
@@ -100,11 +107,15 @@ def answers_text(answers: dict[str, str]) -> str:
     return "# What `gemelo import` asked, for `--answers`.\n" + "\n".join(lines) + "\n"
 
 
+class BadAnswer(ReasonedError, ValueError):
+    """Why an answer is none to its question."""
+
+
 def yes_or_no(text: str) -> bool:
     """Raises ValueError."""
     words = {"yes": True, "y": True, "si": True, "s": True, "true": True, "no": False, "n": False, "false": False}
     if text.lower() not in words:
-        raise ValueError("say yes or no")
+        raise BadAnswer(because("import.answer.yes_or_no"))
     return words[text.lower()]
 
 
@@ -113,7 +124,7 @@ def whole(text: str) -> int:
     try:
         return int(text)
     except ValueError:
-        raise ValueError("it is no whole number") from None
+        raise BadAnswer(because("import.answer.whole")) from None
 
 
 def number(text: str) -> float:
@@ -121,9 +132,9 @@ def number(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise ValueError("it is no number") from None
+        raise BadAnswer(because("import.answer.number")) from None
     if not abs(value) < float("inf"):
-        raise ValueError("it is not finite")
+        raise BadAnswer(because("import.answer.finite"))
     return value
 
 
@@ -131,7 +142,7 @@ def above_zero(text: str) -> float:
     """A number above 0, in the unit of its question; raises ValueError."""
     value = number(text)
     if not value > 0.0:
-        raise ValueError("it must be above 0")
+        raise BadAnswer(because("import.answer.above_zero"))
     return value
 
 
@@ -140,7 +151,7 @@ def one_of(*words: str) -> Callable[[str], str]:
 
     def read(text: str) -> str:
         if text not in words:
-            raise ValueError(f"it is none of {', '.join(words)}")
+            raise BadAnswer(because("import.answer.none_of", known=words))
         return text
 
     return read

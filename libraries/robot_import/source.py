@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from gemelo.libraries.arm.errors import DescriptionError, nearest_name
+from gemelo.libraries.arm.errors import nearest_name, wrong_file
 from gemelo.libraries.robot_import.xacro_files import SUFFIX, expanded, outermost
+from gemelo.schemas.reasons import because
 
 BESIDE = 2  # innermost folders, whose meshes are the file's own without a package
 DEPTH = 4  # folders below a package in which its configuration may be
@@ -105,7 +106,7 @@ def find_source(
     `ask` is called before a xacro file is expanded, and raises it where that is not wanted.
     """
     if not given.exists():
-        raise DescriptionError(f"{given}: there is no such file or folder")
+        raise wrong_file(given, because("import.source.none"))
     urdf, root = (_urdf_in(given), given) if given.is_dir() else (given, _root_of(given))
     text = _decoded(urdf)
     if urdf.suffix.lower() == SUFFIX or "<xacro:" in text:
@@ -113,7 +114,7 @@ def find_source(
         expansion = expanded(urdf, root, arguments or {}, lambda package: _found_package(package, urdf))
         return RobotSource(urdf, root, expansion, is_expanded=True)
     if arguments:
-        raise DescriptionError(f"{urdf}: it is no xacro file, and has no argument {', '.join(arguments)}")
+        raise wrong_file(urdf, because("import.xacro.none", names=tuple(arguments)))
     return RobotSource(urdf, root, text)
 
 
@@ -132,10 +133,10 @@ def _urdf_in(folder: Path) -> Path:
     xacros = (path for path in _files(folder) if path.suffix.lower() == SUFFIX and _is_robot(path))
     found = urdfs or outermost(xacros)
     if not found:
-        raise DescriptionError(f"{folder}: there is no .urdf and no .xacro of a robot in it")
+        raise wrong_file(folder, because("import.source.no_robot"))
     if len(found) > 1:
-        names = ", ".join(str(path.relative_to(folder)) for path in found[:6])
-        raise DescriptionError(f"{folder}: there are {len(found)} robots in it ({names}): name one of these files")
+        names = tuple(str(path.relative_to(folder)) for path in found[:6])
+        raise wrong_file(folder, because("import.source.several", count=len(found), names=names))
     return found[0]
 
 
@@ -155,13 +156,13 @@ def _decoded(urdf: Path) -> str:
     try:
         raw = urdf.read_bytes()
     except OSError as error:
-        raise DescriptionError(f"{urdf}: cannot be read: {error}") from error
+        raise wrong_file(urdf, because("file.unreadable", error=error.strerror or str(error))) from error
     named = ENCODING.search(raw[:LONGEST_DECLARATION])
     encoding = "utf-16" if raw.startswith(UTF_16) else named[1].decode() if named else "utf-8-sig"
     try:
         text = raw.decode("utf-8-sig" if encoding.lower() == "utf-8" else encoding)
     except (UnicodeDecodeError, LookupError) as error:
-        raise DescriptionError(f"{urdf}: its letters are not {encoding}: save it as UTF-8 ({error})") from error
+        raise wrong_file(urdf, because("import.source.letters", encoding=encoding, error=str(error))) from error
     blanks = re.match(r"(\s+)<\?xml[^>]*\?>", text)
     return text if blanks is None else blanks[1] + text[blanks.end() :]
 
@@ -172,10 +173,7 @@ def _found_package(package: str, path: Path) -> Path:
     for folder in _package_folders(package, above):
         if folder.is_dir():
             return folder
-    looked_in = ", ".join(str(folder) for folder in above)
-    raise DescriptionError(
-        f'{path}: $(find {package}): there is no package "{package}" in {looked_in}: copy its folder into one of them'
-    )
+    raise wrong_file(path, because("import.xacro.package", package=package, folders=tuple(map(str, above))))
 
 
 def _above(path: Path) -> tuple[Path, ...]:

@@ -7,14 +7,11 @@ from collections.abc import Callable, Iterable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
-from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.errors import nearest, wrong_file
 from gemelo.libraries.robot_import.xacro_sandbox.keeper import Confined, Failed, expand
+from gemelo.schemas.reasons import Reason, because
 
 SUFFIX = ".xacro"
-NO_XACRO = (
-    "it is xacro, and the Python package `xacro` is not installed: run `make setup`, which brings it, "
-    "or expand the file where ROS is (`xacro robot.urdf.xacro > robot.urdf`) and import that"
-)
 UNDEFINED = re.compile(r"Undefined substitution argument (\S+)")
 
 
@@ -24,27 +21,27 @@ def expanded(path: Path, root: Path, arguments: Mapping[str, str], find: Callabl
     argument that it does not have, and without the package `xacro`.
     """
     if find_spec("xacro") is None:
-        raise DescriptionError(f"{path}: {NO_XACRO}")
+        raise wrong_file(path, because("import.xacro.not_installed"))
     try:
         expansion = expand(path, arguments, Confined(path, root, find))
     except Failed as failed:
-        raise DescriptionError(f"{path}: {_said(failed)}") from failed
+        raise wrong_file(path, _why(failed)) from failed
     for note in expansion.notes:
         print(f"  {path.name} says: {note}")
     for name in arguments:
         if name not in expansion.known:
-            raise DescriptionError(f'{path}: it has no xacro argument "{name}"{suggestion(name, expansion.known)}')
+            known = nearest(name, expansion.known)
+            raise wrong_file(path, because("import.xacro.argument", known, name=name))
     return expansion.text
 
 
-def _said(failed: Failed) -> str:
+def _why(failed: Failed) -> Reason:
     undefined = UNDEFINED.search(failed.text)
     if undefined:
-        name, commands = undefined[1], "`gemelo import` or `gemelo check`"
-        return f"its xacro argument {name} has no default: give {commands} --xacro {name}:=VALUE"
+        return because("import.xacro.no_default", name=undefined[1])
     if failed.kind == "RecursionError":
-        return "its macros or values are nested too deep for xacro: one of them holds itself"
-    return f"xacro cannot expand it: {failed.text or failed.kind}"
+        return because("import.xacro.nested")
+    return because("import.xacro.failed", problem=failed.text or failed.kind)
 
 
 def outermost(files: Iterable[Path]) -> list[Path]:
