@@ -40,7 +40,7 @@ class Authority:
         self._former, self._voucher = certificate.with_name(FORMER), certificate.with_name(VOUCHER)
         if certificate.exists() != key.exists():  # another one would end every link of those who trust this one
             has, lacks = (certificate, key) if certificate.exists() else (key, certificate)
-            raise AccessError(because("certificate.authority.half", lacks=str(lacks), has=str(has)))
+            raise AccessError(because("certificate.authority.half", lacks=str(lacks), has=str(has), name=has.name))
         if not certificate.exists():
             own = new_key()
             write(key, private_pem(own))
