@@ -257,8 +257,8 @@ class ActionServer(Generic[G, F, R]):
     def _cancel_lost(self, goal_id: str, client: str) -> None:
         """Nobody watches an attached goal any more."""
         reason = self._cancel(goal_id)
-        became = "it is cancelled" if reason is None else f"it cannot be cancelled: {reason}"
-        self._warn(f"goal {goal_id}: its client {client} is gone: {became}")
+        became = "so it is cancelled" if reason is None else f"and it cannot be cancelled: {reason}"
+        self._warn(f"goal {goal_id}: its client {client} is gone, {became}")
 
     def _set(self, goal: GoalRecord, status: GoalStatusCode) -> None:
         if not goal.status.is_terminal and goal.status is not status:
