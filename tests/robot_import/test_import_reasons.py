@@ -1,4 +1,4 @@
-"""Why an import cannot begin or go on, as data: codes with values, and their sentence in each language."""
+"""Tests of the reasons for which an import cannot begin or go on: codes with values, and each language's sentence."""
 
 from __future__ import annotations
 
