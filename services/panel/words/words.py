@@ -20,11 +20,6 @@ LANGUAGES = {  # by the first part of a browser's language; the first one is tha
     "en": Language("English", ENGLISH),
     "es": Language("Español", SPANISH, SPANISH_SENTENCES, GOAL_CODES),
 }
-BUTTONS = {  # of the command line: what a person at the page presses instead
-    "gemelo home": "home", "gemelo reference": "reference", "gemelo reset": "reset", "gemelo device arm": "arm",
-    "gemelo stop": "stop", "gemelo resume": "resume", "gemelo control take --force": "force_control",
-    "gemelo control take": "take_control",
-}  # fmt: skip
 
 
 class Words:
@@ -67,18 +62,11 @@ class Words:
 
     def said(self, text: str) -> str:
         """What another part says, line by line; a line that this language does not have is left as it is."""
-        return "\n".join(self._of.sentences.of(line) or self._with_buttons(line) for line in text.split("\n"))
+        return "\n".join(self._of.sentences.of(line) or line for line in text.split("\n"))
 
     def value(self, name: str, value: str) -> str:
         """A single word of another part, as `name` calls it: a mode, a phase of homing, ..."""
         return self._of.sentences.value(name, value)
-
-    def _with_buttons(self, text: str) -> str:
-        """The page's buttons in the place of commands to type."""
-        for command, key in BUTTONS.items():
-            label = f"“{self(key)}”"
-            text = text.replace(f"run `{command}`", f"press {label}").replace(f"`{command}`", label)
-        return text
 
     def _told(self, problem: Problem) -> str:
         """By the sentence; where that is not known, by the code, with the sentence as it came."""
