@@ -50,8 +50,10 @@ def require_folder(path: Path, owner: str) -> None:
         raise usage(because("cli.folder.not_one", owner=owner, path=str(path)))
     beside = [each.name for each in path.parent.iterdir() if each.is_dir()] if path.parent.is_dir() else []
     guess = nearest(path.name, beside)
-    hint = (remedy("did_you_mean_path", path=str(path.parent / guess)),) if guess else ()
-    raise usage(because("cli.folder.none", *hint, owner=owner, path=str(path)))
+    if guess is None:
+        raise usage(because("cli.folder.none", owner=owner, path=str(path)))
+    hint = remedy("did_you_mean_path", path=str(path.parent / guess))
+    raise usage(because("cli.folder.other", hint, owner=owner, path=str(path)))
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
