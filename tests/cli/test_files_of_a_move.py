@@ -28,7 +28,8 @@ from gemelo.tools.cli.main import run
 assert run(["move", "--named", "left"]) == 0
 print(json.dumps([each.__file__ for each in list(sys.modules.values()) if getattr(each, "__file__", None)]))
 """
-MOST, MOST_OF_THE_COMMAND_LINE = 116, 12  # chosen: of 114 and 12 when this was written, where 100 is wanted
+# Chosen: of 114 and 12 when this was written, where 100 is wanted; the thirteenth came with the language of sentences.
+MOST, MOST_OF_THE_COMMAND_LINE = 116, 13
 
 
 def has_code(file: Path) -> bool:
