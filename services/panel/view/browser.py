@@ -30,6 +30,7 @@ DRAGGED = 6  # [pixels] of the page from the press to the release, from which on
 RATE_CHANGED = 0.3  # share of the frame rate by which it must change before the browser tells it by itself
 STILL_MEANT = 5000.0  # [ms] chosen: an older Stop that a browser tells when it is connected again stops nothing
 ACTING = 150.0  # [ms] chosen: three of viser's intervals after what a person has done
+TOLD_AGAIN = 300.0  # [ms] chosen: a Stop is told again while it is meant, as viser may have put another message first
 STOP_SIGN = "■"  # how the Stop button's text begins, in every language
 
 SCRIPT = """
@@ -131,7 +132,8 @@ SCRIPT = """
   ['pointerup', 'pointercancel', 'blur', 'pointermove'].forEach((kind) =>
     window.addEventListener(kind, (e) => { isDown = isDown && kind === 'pointermove' && e.buttons > 0; }, true));
   const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;
-  let frames = 0, began = performance.now(), rate = 0, told = '', toldClicks = 0, toldRate = 0;
+  let frames = 0, began = performance.now(), rate = 0, told = '', toldClicks = 0, toldRate = 0,
+    toldAt = 0;
   const tell = () => {
     frames += 1;
     const now = performance.now();
@@ -144,8 +146,10 @@ SCRIPT = """
       const isUrgent = field.value === 'CHANNEL' || clicks !== toldClicks || stops !== toldStops || tooLarge;
       const isActing = isDown || now - acted < ACTING;
       if (isActing) told = sent;  // told later, the mark would be that of a lag that is none
-      if (isUrgent || (!isActing && (sent !== told || hasNewRate))) {
+      const isMeant = stops > 0 && now - stoppedAt < STILL_MEANT && now - toldAt > TOLD_AGAIN;
+      if (isUrgent || (!isActing && (sent !== told || hasNewRate || isMeant))) {
         told = sent;
+        toldAt = now;
         toldClicks = clicks;
         toldStops = stops;
         toldRate = rate;
@@ -214,6 +218,8 @@ def script_html() -> str:
         "DRAGGED": str(DRAGGED),
         "RATE_CHANGED": str(RATE_CHANGED),
         "ACTING": str(ACTING),
+        "STILL_MEANT": str(STILL_MEANT),
+        "TOLD_AGAIN": str(TOLD_AGAIN),
     }
     for name, value in values.items():
         script = script.replace(name, value)
