@@ -21,7 +21,7 @@ INSTALLED_WITHIN = 600.0  # [s] of one environment
 
 def extra_mb() -> Figure:
     """What an environment of a gateway's host takes [MB], its bytecode too; with each extra as the references."""
-    uv = _uv(project_root())
+    uv = uv_of(project_root())
     with tempfile.TemporaryDirectory() as temporary:
         base = installed_mb(uv, Path(temporary) / "base", STACK)
         sizes = {extra: installed_mb(uv, Path(temporary) / extra, (*STACK, extra)) for extra in EXTRAS}
@@ -31,16 +31,21 @@ def extra_mb() -> Figure:
 
 def installed_mb(uv: str, folder: Path, extras: Sequence[str]) -> float:
     """[MB] of all files of an environment with the base and `extras`, in the lock's versions, imported once."""
-    _run(uv, "venv", "--quiet", "--python", sys.executable, str(folder))
+    run_tool(uv, "venv", "--quiet", "--python", sys.executable, str(folder))
     chosen = [word for extra in extras for word in ("--extra", extra)]
-    _run(
+    run_tool(
         uv, "pip", "install", "--quiet", "--compile-bytecode", "--python", str(folder / "bin/python"),
         "--requirement", "pyproject.toml", *chosen, "--constraints", "requirements.lock",
     )  # fmt: skip
+    return size_mb(folder)
+
+
+def size_mb(folder: Path) -> float:
+    """[MB] of all files below it."""
     return sum(file.lstat().st_size for file in folder.rglob("*") if not file.is_dir()) / 1e6
 
 
-def _run(*command: str) -> None:
+def run_tool(*command: str) -> None:
     """Raises `NotMeasured` with the last line of what it said, as without a package index."""
     try:
         done = subprocess.run(
@@ -54,7 +59,8 @@ def _run(*command: str) -> None:
         raise NotMeasured(f"{' '.join(command[:3])}: {lines[-1].strip()}")
 
 
-def _uv(root: Path) -> str:
+def uv_of(root: Path) -> str:
+    """The program; raises `NotMeasured` where there is none."""
     found = shutil.which("uv") or str(root / ".gemelo/tools/uv/bin/uv")
     if not Path(found).exists():
         raise NotMeasured("there is no uv: make setup brings one where PATH has none")

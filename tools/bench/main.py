@@ -54,6 +54,8 @@ FIGURES = {
     "plan_mesh_ms": FigureRow("planner.mesh_planning:plan_mesh_ms", "ms"),
     "import_s": FigureRow("fit_quality:import_s", "s"),
     "extra_mb": FigureRow("extra_sizes:extra_mb", "MB"),
+    "client_env_mb": FigureRow("client:client_env_mb", "MB"),
+    "client_import_ms": FigureRow("client:client_import_ms", "ms"),
     "fit_excess_mm": FigureRow("fit_quality:fit_excess_mm", "mm"),
     "first_plan_s": FigureRow("planner.mesh_planning:first_plan_s", "s"),
     "deadline_overrun_ms": FigureRow("planner.deadlines:deadline_overrun_ms", "ms"),
