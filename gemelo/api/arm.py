@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from gemelo.schemas.gripper import GripperState
     from gemelo.schemas.ledger import StoppingDistance
     from gemelo.schemas.planning import IkRequest, JogCommand, JogStatus, PlanRequest
+    from gemelo.schemas.reasons import Reason
 
 
 class Arm:
@@ -746,9 +747,10 @@ class Arm:
         """Takes the thing `name` of cell.toml from where a camera sees it to the place `to`.
 
         From above, straight down, with the thing attached while it is carried; a gripper that closes on nothing is
-        tried twice. `on_progress` is called with a sentence for each part. Once `is_cancelled()` the arm decelerates,
-        and `Canceled` is raised. Raises `Refused` before anything has moved: not seen, seen twice, not known well
-        enough, out of reach, too wide or too flat for the jaws; and `Aborted` with the thing where it is then.
+        tried twice. `on_progress` is called with a `Reason` for each part, whose `str()` is a sentence. Once
+        `is_cancelled()` the arm decelerates, and `Canceled` is raised. Raises `Refused` before anything has moved: not
+        seen, seen twice, not known well enough, out of reach, too wide or too flat for the jaws; and `Aborted` with the
+        thing where it is then.
 
         >>> try:
         ...     arm.pick("cup", to="bin")
@@ -828,8 +830,8 @@ class Arm:
         return api.planning.find_poses(self._session, joints, tuple(links) or self.description.model.link_names)
 
 
-def _silent(text: str) -> None:
-    """Nobody wants to hear it."""
+def _silent(part: Reason) -> None:
+    """For a caller that wants no progress."""
 
 
 def _never() -> bool:

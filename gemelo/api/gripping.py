@@ -19,7 +19,7 @@ from gemelo.schemas.device import InjectKind, InjectRequest
 from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
 from gemelo.schemas.grippers.gripper import PulseDrive
 from gemelo.schemas.grippers.kinds import Gripper
-from gemelo.schemas.reasons import because, remedy
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.schemas.scene import SceneGrip, SceneRelease
 from gemelo.schemas.topics import DEVICE_INJECT, DEVICE_STATUS, GRIPPER_COMMAND, GRIPPER_STATE
 
@@ -50,13 +50,20 @@ class Gripped(NamedTuple):
     held: str  # name of the scene's object that it carries from now on; empty for none
     released: str  # name of the one that it carries no more
 
+    @property
+    def summary(self) -> Reason:
+        """One line for a person, as data."""
+        how = ("stopped" if self.stalled else "there") + ("" if self.measured else "_commanded")
+        opening = 1e3 * self.position  # [mm]
+        if self.held:
+            return because("gripper.ended.holds", opening=opening, how=how, object=self.held)
+        if self.released:
+            return because("gripper.ended.released", opening=opening, how=how, object=self.released)
+        return because("gripper.ended", opening=opening, how=how)
+
     def __str__(self) -> str:
         """One line for a person."""
-        how = "stopped by what is between the jaws" if self.stalled else "there"
-        words = [f"{self.position * 1000.0:.1f} mm, {how}" + ("" if self.measured else " (commanded, not measured)")]
-        words += [f"holds {self.held}"] if self.held else []
-        words += [f"has let go of {self.released}"] if self.released else []
-        return ", ".join(words)
+        return str(self.summary)
 
 
 class Gripping:

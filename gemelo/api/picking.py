@@ -23,7 +23,7 @@ from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, fro
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.cell import Place, PosePlace, Thing
 from gemelo.schemas.grippers.kinds import Gripper
-from gemelo.schemas.reasons import because, remedy
+from gemelo.schemas.reasons import Reason, Value, because, plain, remedy
 
 APPROACH = 0.04  # [m] the straight way down to a thing, and up with it
 SLOW = 0.05  # [m/s] down and up
@@ -33,9 +33,14 @@ ATTEMPTS = 2
 STAYED = 0.01  # [m] a thing that is seen nearer than that to where it stood was not taken
 DOWN = (0.0, 0.0, -1.0)
 NO_GOOD_IMAGE = ("camera", "moving")  # checks of a `Refused` for the images, not for what they show
+SEEN_TURN = 0.01  # [rad] of the jaws' turn from which on it is said
+DONE = {  # by whether the jaws have turned it, and whether it took several attempts
+    (False, False): "pick.done", (True, False): "pick.done.turned", (False, True): "pick.done.again",
+    (True, True): "pick.done.turned_again",
+}  # fmt: skip
 SOLUTIONS = 8  # configurations of a tool pose that are considered
 
-OnPicking = Callable[[str], object]
+OnPicking = Callable[[Reason], object]  # one line for a person, as data; `str()` of it is English
 IsCancelled = Callable[[], bool]
 
 
@@ -56,14 +61,21 @@ class Picked(NamedTuple):
     took: float  # [s]
     after: Pose | None  # in the base frame, as it was seen afterwards; None where it was not, as behind the arm
     unseen: str = ""  # why it was not seen afterwards
+    why: Reason | None = None  # the same as data
+
+    @property
+    def summary(self) -> Reason:
+        """One line for a person, as data."""
+        values: dict[str, Value] = {"thing": self.name, "place": self.place, "time": self.took}
+        has_turned, is_again = abs(self.turned) > SEEN_TURN, self.attempts != 1
+        values |= {"angle": math.degrees(self.turned)} if has_turned else {}
+        values |= {"count": self.attempts} if is_again else {}
+        done = because(DONE[has_turned, is_again], error=1e3 * self.sigma, **values)
+        return because("pick.done.unseen", done, self.why or plain(self.unseen)) if self.unseen else done
 
     def __str__(self) -> str:
         """One line for a person."""
-        turned = f", turned {math.degrees(self.turned):.0f} deg by the jaws" if abs(self.turned) > 0.01 else ""
-        again = "" if self.attempts == 1 else f", at attempt {self.attempts}"
-        unseen = f"; not seen afterwards: {self.unseen}" if self.unseen else ""
-        error = 1e3 * self.sigma  # [mm]
-        return f"{self.name} is at {self.place}: seen +-{error:.1f} mm{turned}{again}, {self.took:.1f} s{unseen}"
+        return str(self.summary)
 
 
 @dataclass(frozen=True)
@@ -118,28 +130,30 @@ def pick(
     thing, place, gripper = named(arm, eyes, name, to)
     for attempt in range(1, ATTEMPTS + 1):
         seen = eyes.one(name, camera)
-        tell(str(seen))
+        tell(seen.summary)
         lift = lift_above(thing, gripper, seen)
         grasp = grasp_point(thing, seen)
         way = _way_to(arm, thing, seen, (grasp[0], grasp[1], grasp[2] + lift), gripper)
         spot = _spot(eyes, place, camera)
-        tell(f"{to}: {1e3 * spot[0]:.1f} {1e3 * spot[1]:.1f} {1e3 * spot[2]:.1f} mm")
+        tell(because("pick.place", place=to, at=tuple(1e3 * value for value in spot)))
         release = _configuration_above(arm, (spot[0], spot[1], spot[2] + lift), _yaw_at(arm, place, seen, way))
         add_to_scene(arm.scene, thing, seen)
         try:
             if _take(hand, thing, seen, way):
                 _put(hand, name, release)
                 after, unseen = _seen_afterwards(hand, eyes, seen, camera, spot)
-                took = arm.node.monotonic() - began
-                return Picked(name, to, seen.pose, seen.sigma, way.turned, attempt, took, after, unseen)
+                took, said = arm.node.monotonic() - began, "" if unseen is None else str(unseen)
+                return Picked(name, to, seen.pose, seen.sigma, way.turned, attempt, took, after, said, unseen)
         finally:
             if name in arm.scene.objects and not arm.scene.objects[name].attached:
                 arm.scene.remove(name)
-        tell("the jaws have closed on nothing")
+        tell(because("pick.nothing"))
     raise Aborted(because("pick.not_gripped", remedy("look_for_it"), thing=name, count=ATTEMPTS))
 
 
-def _seen_afterwards(hand: Hand, eyes: Eyes, before: Seen, camera: str, spot: Point) -> tuple[Pose | None, str]:
+def _seen_afterwards(
+    hand: Hand, eyes: Eyes, before: Seen, camera: str, spot: Point
+) -> tuple[Pose | None, Reason | None]:
     """Where the thing is seen now, or why it is not; raises `Aborted` where it still stands where it was.
 
     Jaws that measure nothing are said to hold what the scene has between them: what is believed, not what is there.
@@ -147,13 +161,13 @@ def _seen_afterwards(hand: Hand, eyes: Eyes, before: Seen, camera: str, spot: Po
     try:
         now = look_twice(eyes, before.name, camera)
     except (Refused, Lost) as error:
-        return None, str(error)
-    hand.tell(str(now))
+        return None, error.message
+    hand.tell(now.summary)
     here, stood = now.pose.position, before.pose.position
     if math.dist(here, stood) < STAYED < math.dist(spot[:2], stood[:2]):
         x, y, z = (1e3 * value for value in here)
         raise Aborted(because("pick.still_there", remedy("check_camera"), thing=before.name, x=x, y=y, z=z))
-    return now.pose, ""
+    return now.pose, None
 
 
 def look_twice(eyes: Eyes, name: str, camera: str) -> Seen:
@@ -254,13 +268,13 @@ def _spot(eyes: Eyes, place: Place, camera: str) -> Point:
 def _take(hand: Hand, thing: Thing, seen: Seen, way: Approach) -> bool:
     """True if the jaws have closed on something; the tool is above again in either case."""
     hand.grip("open")
-    hand.tell("above it")
+    hand.tell(because("pick.above"))
     hand.move(way.above)
     with _touching(hand.arm, thing.name):
         hand.go_straight(-APPROACH)
         _turn_with_the_jaws(hand.arm, thing, seen, way)
         gripped = hand.grip("close")
-        hand.tell(f"gripper: {gripped}")
+        hand.tell(because("pick.gripper", gripped.summary))
         hand.go_straight(APPROACH)
     if gripped.held != thing.name:
         hand.grip("open")
@@ -282,11 +296,11 @@ def _turn_with_the_jaws(arm: MovingArm, thing: Thing, seen: Seen, way: Approach)
 def _put(hand: Hand, name: str, release: Mapping[str, float]) -> None:
     """Carries it, lets it go, and rises; what fails with the thing between the jaws says so."""
     try:
-        hand.tell("carrying it")
+        hand.tell(because("pick.carrying"))
         hand.move(release)
         with _touching(hand.arm, name):
             hand.go_straight(-APPROACH)
-            hand.tell(f"gripper: {hand.grip('open')}")
+            hand.tell(because("pick.gripper", hand.grip("open").summary))
             hand.go_straight(APPROACH)
     except (Refused, Canceled) as error:
         held = hand.arm.scene.objects.get(name)

@@ -56,11 +56,18 @@ class Seen(NamedTuple):
     trouble: str  # why it cannot be picked as it is seen; empty if it can
     why: Reason | None = None  # the same as data
 
+    @property
+    def summary(self) -> Reason:
+        """One line for a person, as data."""
+        at = tuple(1e3 * value for value in self.pose.position)  # [mm]
+        seen = because(
+            "detect.seen", thing=self.name, kind=self.kind, at=at, error=1e3 * self.sigma, camera=self.camera
+        )
+        return because("detect.seen.unfit", seen, self.why or plain(self.trouble)) if self.trouble else seen
+
     def __str__(self) -> str:
         """One line for a person."""
-        x, y, z = (1e3 * value for value in self.pose.position)
-        where = f"{self.name} ({self.kind}): {x:.1f} {y:.1f} {z:.1f} mm, +-{1e3 * self.sigma:.2f} mm by {self.camera}"
-        return where + (f": {self.trouble}" if self.trouble else "")
+        return str(self.summary)
 
 
 class Eyes:

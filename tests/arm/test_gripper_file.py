@@ -45,7 +45,7 @@ def test_rm1_has_a_servo_and_parol6_a_valve():
         ("open = 0.05", "open = 0.0001\nclosed_too = 1", "closed_too", "unknown key `gripper.closed_too`"),
         ("closed = 0.0", "closed = 0.05", "open = ", "[gripper] open 0.05 m is not wider than closed, 0.05 m"),
         ("open_us = 2000", "open_us = 1050", "open_us", "[gripper] open_us 1050 us and closed_us 1000 us are nearer"),
-        ("open_us = 2000", "open_us = 2600", "open_us", "Expected `int` <= 2500"),
+        ("open_us = 2000", "open_us = 2600", "open_us", "expected `int` <= 2500"),
         (
             "speed = 0.1\n",
             "speed = 900.0\n",

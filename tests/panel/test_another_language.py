@@ -15,12 +15,12 @@ from tests.additions import ROOT, added, row_added, run_in
 PORTUGUESE = '''"""The page in Portuguese."""
 
 from gemelo.services.panel.words.en import ENGLISH
-from gemelo.services.panel.words.sentences import Language, Sentences
+from gemelo.services.panel.words.language import Language
 
-PORTUGUESE = Language(
+LANGUAGE = Language(
     "Português",
     {**ENGLISH, "plan": "Planejar", "execute": "Executar", "mode_idle": "Em repouso"},
-    Sentences({"a newer goal took over": "uma meta mais nova assumiu"}, {"mode": {"IDLE": "em repouso"}}),
+    {"mode": {"IDLE": "em repouso"}},
 )
 '''
 GOAL = """
@@ -40,7 +40,7 @@ words = Words(language_of("pt-BR"))
 at = because("goal.limit.position", joint="q1", value=1.0, limit=0.5, unit="rad", side="upper")
 rejected = words.problem(Problem("refused by stepper_gateway", reason=at))[1]
 written = [words("plan"), rejected]
-written += [words.said("a newer goal took over"), words.said("not known")]
+written += [words.value("mode", "IDLE"), words.value("mode", "RUN")]
 with memory_page("rm1", Path(sys.argv[1])) as page:
     page.draw(3)
     page.browser.choose("Language / Idioma", "Português")
@@ -60,9 +60,10 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """This one, with Portuguese."""
     words = "services/panel/words/words.py"
     spanish = next(line for line in (ROOT / words).read_text().splitlines() if line.startswith('    "es": '))
-    table = row_added(words, after=spanish, row='    "pt": PORTUGUESE,')[words]
-    first = "from gemelo.services.panel.words.es_work import"
-    table = table.replace(first, f"from gemelo.services.panel.words.pt import PORTUGUESE\n{first}")
+    table = row_added(words, after=spanish, row='    "pt": pt.LANGUAGE,')[words]
+    first = "from gemelo.services.panel.words import en, es"
+    assert first in table
+    table = table.replace(first, f"{first}, pt")
     catalogue = "schemas/reasons/catalogue.py"  # a file of its own, which looks for languages beside it
     languages = "schemas/reasons/languages/"
     files = {"services/panel/words/pt.py": PORTUGUESE, words: table, catalogue: (ROOT / catalogue).read_text()}
@@ -83,5 +84,5 @@ def test_a_new_language_is_chosen_by_a_browser_and_by_a_person_and_says_what_it_
     assert done.returncode == 0, done.stderr
     *written, is_on_the_page = json.loads(done.stdout.splitlines()[-1])
     rejected = "q1: 57.3° passa do limite de 28.6°."
-    assert written == ["Planejar", rejected, "uma meta mais nova assumiu", "not known"]
+    assert written == ["Planejar", rejected, "em repouso", "RUN"]
     assert is_on_the_page

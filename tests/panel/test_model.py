@@ -30,7 +30,7 @@ from gemelo.services.panel.model.units import in_degrees
 from gemelo.services.panel.view.browser import CHANNEL, Browser, read_browser, script_html
 from gemelo.services.panel.view.obstacles import nearest_hit
 from gemelo.services.panel.words.en import ENGLISH
-from gemelo.services.panel.words.sentences import Language
+from gemelo.services.panel.words.language import Language
 from gemelo.services.panel.words.words import LANGUAGES, Words, language_of
 from tests.arm.bare_arm import ROBOT
 from tests.runtime.support import until

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 import gemelo
+from gemelo.schemas.reasons import because
 from gemelo.services.panel.model.picks import Picks
 
 CELL = SimpleNamespace(things=[SimpleNamespace(name="cup")], places=[SimpleNamespace(name="bin")])
@@ -23,12 +24,12 @@ class Arm:
         return (gemelo.Seen("cup", gemelo.Pose((0.26, 0.16, 0.04)), 0.0001, "tag", "overhead", 0, ""),)
 
     def pick(self, thing, *, to, on_progress, is_cancelled):
-        on_progress(f"{thing} to {to}")
+        on_progress(because("pick.place", place=to, at=(1.0, 2.0, 3.0)))
         self.began.set()
         while not self.goes_on.wait(0.01):
             if is_cancelled():
                 raise gemelo.Canceled("the pick was cancelled", gemelo.GoalStatusCode.CANCELED)
-        on_progress("carrying it")
+        on_progress(because("pick.carrying"))
         return gemelo.Picked(thing, to, gemelo.Pose((0.26, 0.16, 0.04)), 0.0001, 0.0, 1, 12.5, None)
 
 
@@ -41,10 +42,14 @@ def page():
     )
 
 
+def lines(page):
+    return list(map(str, page.picks.lines))
+
+
 def test_what_is_seen_is_shown(page):
     assert (page.picks.things, page.picks.places) == (("cup",), ("bin",))
     page.picks.look()
-    assert page.picks.lines == ("cup (tag): 260.0 160.0 40.0 mm, +-0.10 mm by overhead",)
+    assert lines(page) == ["cup (tag): 260.0 160.0 40.0 mm, +-0.10 mm by overhead"]
     assert page.woken
 
 
@@ -55,10 +60,10 @@ def test_a_second_press_is_told_that_it_is_busy_and_the_first_goes_on(page):
     page.picks.pick("cup", "bin")
     page.picks.look()
     assert [each.check for each in page.told] == ["busy", "busy"]
-    assert page.picks.lines == ("cup to bin",)
+    assert lines(page) == ["bin: 1.0 2.0 3.0 mm"]
     page.arm.goes_on.set()
     thread.join(60.0)
-    assert page.picks.lines == ("cup is at bin: seen +-0.1 mm, 12.5 s",)
+    assert lines(page) == ["cup is at bin: seen +-0.1 mm, 12.5 s"]
 
 
 def test_stop_ends_it_and_the_next_one_begins(page):
@@ -78,4 +83,4 @@ def test_stop_ends_it_and_the_next_one_begins(page):
     assert len(ended) == 1
     page.arm.goes_on.set()
     page.picks.pick("cup", "bin")
-    assert page.picks.lines[0].startswith("cup is at bin")
+    assert lines(page)[0].startswith("cup is at bin")

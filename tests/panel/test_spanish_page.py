@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ast
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -28,106 +26,21 @@ from gemelo.programs import (
 from gemelo.programs.steps import KINDS
 from gemelo.schemas.device import DeviceCommandKind, DeviceFault, DeviceMode, StopKind
 from gemelo.schemas.device_faults import fault_reason
-from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.reasons import Reason, because, plain, remedy
 from gemelo.services.panel.model.problems import problem_of
 from gemelo.services.panel.words.step_text import step_text
-from gemelo.services.panel.words.words import LANGUAGES, Words
+from gemelo.services.panel.words.words import Words
 from gemelo.services.stepper_gateway.device.command_handler import NOT_NOW, REMEDIES, complaint
 from gemelo.services.stepper_gateway.links.frames import Code
 from tests.table import table
 
 ROOT = Path(__file__).parents[2]
 SPANISH, ENGLISH = Words("es"), Words("en")
-SAID_WITHIN = "carrying it"  # a sentence that is known, to stand at the places of values
-ERRORS = (
-    "BadArgument",
-    "Refused",
-    "Aborted",
-    "Error",
-    "Lost",
-    "Canceled",
-)
-
-
-def sentences_in(path: Path) -> Iterator[str]:
-    """What is refused, raised or returned as a text in the file, with `SAID_WITHIN` for every value."""
-    tree = ast.parse(path.read_text())
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in ERRORS:
-            for argument in node.args:
-                yield from _texts(argument)
-        elif isinstance(node, ast.FunctionDef) and node.returns is not None and ast.unparse(node.returns) == "str":
-            for inner in ast.walk(node):
-                if isinstance(inner, ast.Return) and inner.value is not None:
-                    yield from _texts(inner.value)
-
-
-def _texts(node: ast.expr) -> Iterator[str]:
-    if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
-        yield node.value
-    elif isinstance(node, ast.JoinedStr):
-        text = "".join(map(_part, node.values))
-        if re.search(r"\w{2,} \w{2,}", text.replace(SAID_WITHIN, "")):
-            yield text
-    elif isinstance(node, ast.IfExp | ast.BoolOp):
-        for inner in (node.body, node.orelse) if isinstance(node, ast.IfExp) else node.values:
-            yield from _texts(inner)
-
-
-def _part(node: ast.expr) -> str:
-    if isinstance(node, ast.Constant):
-        return str(node.value)
-    expression = ast.unparse(node)
-    if "suggestion(" in expression or expression in ("{hint}",):
-        return "; known are one, two"
-    return SAID_WITHIN
-
-
-PARTS = [
-    "gemelo",
-]
-WITHIN_OTHERS = {  # parts of sentences, which are tested as a whole below
-    "not usable": "the device is {}",
-    "picked": "{} is at {}: seen +-{} mm{}{}, {} s{}",
-    "unseen": "{}; not seen afterwards: {}",
-    "configuration": "the device refused the configuration: {}{}",
-}
-NOT_ON_THE_PAGE = {  # of files, logs and clients that a page does not have, and arguments that only a script gives
-    "gemelo/api/connection.py": ("no {} of {} at the router",),
-    "gemelo/api/control_file.py": ("{} belongs to user", "{}: {}: name another file in"),
-    "gemelo/api/motion.py": ("{} in {} s{}, final error",),
-    "gemelo/api/robot_files.py": ("no router at",),
-    "gemelo/api/planning.py": ("{} holds no plan",),
-    "gemelo/programs/export.py": ("if __name__",),
-    "gemelo/api/session.py": ("this connection belongs to process", "this waits for messages"),
-}  # fmt: skip
-
-
-@table("part", PARTS)
-def test_every_sentence_in_the_code_is_said_in_spanish_with_its_values(part: str):
-    root, found = ROOT / part, 0
-    for path in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
-        beginnings = NOT_ON_THE_PAGE.get(str(path.relative_to(ROOT)), ())
-        for sentence in sentences_in(path):
-            template = sentence.replace("; known are one, two", "{}").replace(SAID_WITHIN, "{}")
-            found += 1
-            if template not in WITHIN_OTHERS.values() and not template.startswith(beginnings or ("\0",)):
-                assert SPANISH.said(sentence) != sentence, f"{path}: {template}"
-                assert not english_in(SPANISH.said(sentence)), f"{path}: {template}: {SPANISH.said(sentence)}"
-    assert found
 
 
 def english_in(said: str) -> list[str]:
     """The commonest English words in a sentence that is to be Spanish."""
     return [word for word in (" the ", " is ", " and ", " its ", " run ", " not ") if word in f" {said} "]
-
-
-def told_in_spanish(english: str) -> str:
-    """What a person reads, who must not find English words in it."""
-    said = SPANISH.said(english)
-    assert said != english, english
-    return spanish(said)
 
 
 def spanish(said: str) -> str:
@@ -157,16 +70,6 @@ def test_every_fault_has_its_meaning_and_remedy_in_spanish(fault: int, joint: st
     assert fault == 99 or DeviceFault(fault).name not in said
 
 
-@table("code", [code for code in FollowErrorCode if code])
-def test_every_code_of_a_goal_is_said_in_spanish_where_its_sentence_is_not_known(code: FollowErrorCode):
-    for error in (gemelo.Refused("odd", check="execution", code=code), gemelo.Aborted("odd", code=code)):
-        heading, text = SPANISH.problem(problem_of(error))
-        assert text != "odd"
-        assert "«odd»" in text
-        assert heading != ENGLISH.problem(problem_of(error))[0]
-        assert ENGLISH.problem(problem_of(error))[1] == "odd"
-
-
 @table("kind", StopKind)
 def test_a_stop_that_is_refused_says_why(kind: StopKind):
     why = because("command.goal_active", command=kind.name)
@@ -174,23 +77,29 @@ def test_a_stop_that_is_refused_says_why(kind: StopKind):
     assert SPANISH.problem(problem_of(refused))[1].startswith("El brazo va hacia una meta: pulse PARAR antes de ")
 
 
+CUP = {"thing": "cup", "place": "bin", "error": 0.4, "time": 9.1}
+SEEN = because("detect.seen", thing="cup", kind="tag", at=(260.0, 160.0, 40.0), error=0.1, camera="overhead")
+UNSEEN = because("detect.not_seen", remedy("view_camera"), thing="cup", cameras="overhead")
+HELD = because("gripper.ended.holds", opening=20.0, how="stopped_commanded", object="cup")
+
+
 @table(
-    ("english", "spanish"),
+    ("line", "expected"),
     [
-        ("cup is not seen by overhead, and nothing else: is it in the image, lit, and not behind the arm? `gemelo "
-         "camera view`", "overhead no ve cup, ni nada más"),
-        ("cup is not seen by overhead, which see red_block: is it in the image, lit, and not behind the arm? `gemelo "
-         "camera view`", "ve red_block"),
-        ("cup is at bin: seen +-0.4 mm, turned 3 deg by the jaws, at attempt 2, 9.1 s", "cup está en bin"),
-        ("cup is at bin: seen +-0.4 mm, 9.1 s; not seen afterwards: cup is not seen by overhead, and nothing else: is "
-         "it in the image, lit, and not behind the arm? `gemelo camera view`", "9.1 s; después no se vio: overhead no "
-         "ve cup"),
-        ("gripper: 20.0 mm, stopped by what is between the jaws (commanded, not measured), holds cup", "lleva cup"),
-        ("cup: it is seen 2 times: take the others away, or give each a tag of its own", "cup: se ve 2 veces"),
+        (SEEN, "cup (etiqueta): 260.0 160.0 40.0 mm, +-0.10 mm por overhead"),
+        (because("detect.seen.unfit", SEEN, because("detect.twice", count=2)), "por overhead: se ve 2 veces"),
+        (because("pick.place", place="bin", at=(1.0, 2.0, 3.0)), "bin: 1.0 2.0 3.0 mm"),
+        (because("pick.above"), "encima"),
+        (because("pick.gripper", HELD), "pinza: 20.0 mm, la detuvo lo que hay entre las mordazas (mandada, no medida), "
+         "lleva cup"),
+        (because("pick.done.turned_again", angle=3.0, count=2, **CUP),
+         "girada 3° por las mordazas, al intento 2, 9.1 s"),
+        (because("pick.done.unseen", because("pick.done", **CUP), UNSEEN), "9.1 s; después no se vio: no se ve "
+         "cup con overhead, ni nada más"),
     ],
 )  # fmt: skip
-def test_sentences_that_are_put_together_keep_their_values(english: str, spanish: str):
-    assert spanish in told_in_spanish(english)
+def test_the_lines_of_a_pick_are_spanish_with_their_values(line: Reason, expected: str):
+    assert expected in spanish(SPANISH.line(line))
 
 
 OFFLINE = because("device.offline", device="x")
@@ -237,10 +146,8 @@ def test_a_reason_of_the_gateway_is_spanish_on_the_page_with_its_values_and_butt
     assert expected in spanish(SPANISH.why(reason))
 
 
-def test_a_sentence_around_one_that_is_not_known_is_left_as_it_came():
-    assert LANGUAGES["es"].sentences.of("refused by stepper_gateway: never heard of before") is None
-    assert LANGUAGES["es"].sentences.of("FAULTY: nobody: knows; this") is None
-    assert SPANISH.said("never heard of before") == "never heard of before"
+def test_the_sentence_of_an_older_program_is_left_as_it_came():
+    assert SPANISH.problem(problem_of(gemelo.Refused("never seen before", check="execution")))[1] == "never seen before"
 
 
 def test_what_the_gateway_and_the_device_say_to_do_is_to_press_buttons_in_both_languages():

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import gemelo
 from gemelo.libraries.arm.cell.cell_file import Cell
+from gemelo.schemas.reasons import Reason
 from gemelo.services.panel.model.problems import Problem
 
 
@@ -21,7 +22,7 @@ class Picks:
         self.places = tuple(each.name for each in cell.places)
         self._one = threading.Lock()
         self._stops = 0
-        self.lines: tuple[str, ...] = ()  # what was seen, or what the pick is at
+        self.lines: tuple[Reason, ...] = ()  # what was seen, or what the pick is at
 
     def look(self) -> None:
         """What the cameras see."""
@@ -36,17 +37,17 @@ class Picks:
         self._stops += 1
 
     def _look(self) -> None:
-        self._show(*(str(each) for each in self._arm.detect()))
+        self._show(*(each.summary for each in self._arm.detect()))
 
     def _pick(self, thing: str, place: str) -> None:
         stops = self._stops
         self._show()
 
-        def follow(text: str) -> None:
-            self._show(*self.lines, text)
+        def follow(part: Reason) -> None:
+            self._show(*self.lines, part)
 
         picked = self._arm.pick(thing, to=place, on_progress=follow, is_cancelled=lambda: stops != self._stops)
-        self._show(str(picked))
+        self._show(picked.summary)
 
     def _alone(self, action: Callable[[], None]) -> None:
         if not self._one.acquire(blocking=False):
@@ -57,6 +58,6 @@ class Picks:
         finally:
             self._one.release()
 
-    def _show(self, *lines: str) -> None:
+    def _show(self, *lines: Reason) -> None:
         self.lines = lines
         self._wake()

@@ -29,7 +29,6 @@ class Problem:
     limit: float | None = None  # that the value is beyond
     is_refusal: bool = True  # False: something moved, and ended before its goal
     reason: Reason | None = None  # as data, of who refused
-    code: int = 0  # of a goal that the gateway has refused or ended, as in `FollowErrorCode`
 
     @property
     def has_nearest(self) -> bool:
@@ -48,12 +47,10 @@ def problem_of(error: Exception) -> Problem:
     if isinstance(error, gemelo.Refused):
         return Problem(
             str(error), error.check, error.remedy, error.nearest, error.contacts,
-            error.subject, error.value, error.limit, reason=error.reason, code=error.code,
+            error.subject, error.value, error.limit, reason=error.reason,
         )  # fmt: skip
     if isinstance(error, gemelo.Aborted):
-        return Problem(
-            str(error), error.status.name.lower(), is_refusal=False, code=error.code, reason=error.reason
-        )  # fmt: skip
+        return Problem(str(error), error.status.name.lower(), is_refusal=False, reason=error.reason)
     if isinstance(error, gemelo.Error):
         return Problem(str(error), "lost" if isinstance(error, gemelo.Lost) else "argument", reason=error.reason)
     return Problem(f"{type(error).__name__}: {error}", "defect")

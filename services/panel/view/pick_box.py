@@ -30,7 +30,7 @@ class PickBox:
 
     def refresh(self) -> None:
         """What was seen, or what the pick is at."""
-        set_if_new(self._lines, "content", note("<br>".join(map(esc, map(self._kit.words.said, self._picks.lines)))))
+        set_if_new(self._lines, "content", note("<br>".join(map(esc, map(self._kit.words.line, self._picks.lines)))))
 
     def _pick(self) -> None:
         self._kit.operator.forget_problem()

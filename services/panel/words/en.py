@@ -1,5 +1,7 @@
 """The page in English."""
 
+from gemelo.services.panel.words.language import Language
+
 ENGLISH: dict[str, str] = {
     # always there
     "arms": "Arms",
@@ -332,3 +334,5 @@ ENGLISH: dict[str, str] = {
     "text_busy": "Another plan is being made: wait, or press Stop.",
     "text_no_plan": "Press Plan first.",
 }
+
+LANGUAGE = Language("English", ENGLISH)

@@ -1,5 +1,7 @@
 """The page in Spanish."""
 
+from gemelo.services.panel.words.language import Language
+
 SPANISH: dict[str, str] = {
     # always there
     "arms": "Brazos",
@@ -332,3 +334,24 @@ SPANISH: dict[str, str] = {
     "text_busy": "Se está haciendo otro plan: espere, o pulse Parar.",
     "text_no_plan": "Pulse antes Planificar.",
 }
+
+VALUES: dict[str, dict[str, str]] = {  # of other parts, by the kind of thing that they are
+    "mode": {
+        "BOOT": "arrancando",
+        "UNREFERENCED": "sin referencia",
+        "HOMING": "buscando el origen",
+        "IDLE": "en reposo",
+        "RUN": "en movimiento",
+        "HOLD": "en pausa",
+        "FAULT": "fallo",
+        "ESTOP": "parada de emergencia",
+    },
+    "phase": {
+        "waits": "espera",
+        "to its switch": "hacia su interruptor",
+        "off its switch": "saliendo de su interruptor",
+        "home": "en su origen",
+    },
+}
+
+LANGUAGE = Language("Español", SPANISH, VALUES)

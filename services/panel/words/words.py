@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from msgspec.structs import replace
-
 from gemelo.schemas.actions import GoalStatusCode
-from gemelo.schemas.reasons import PLAIN, FrontEnd, plain, say
+from gemelo.schemas.reasons import PLAIN, FrontEnd, say
 from gemelo.schemas.reasons import Reason as Explained
 from gemelo.services.panel.model.availability import Reason
 from gemelo.services.panel.model.problems import Problem
-from gemelo.services.panel.words.en import ENGLISH
-from gemelo.services.panel.words.es import SPANISH
-from gemelo.services.panel.words.es_device import GOAL_CODES, VALUES
-from gemelo.services.panel.words.es_work import WORK
-from gemelo.services.panel.words.sentences import Language, Sentences
+from gemelo.services.panel.words import en, es
 
-SPANISH_SENTENCES = Sentences(WORK, VALUES)
 LANGUAGES = {  # by the first part of a browser's language; the first one is that of all other browsers
-    "en": Language("English", ENGLISH),
-    "es": Language("Español", SPANISH, SPANISH_SENTENCES, GOAL_CODES),
+    "en": en.LANGUAGE,
+    "es": es.LANGUAGE,
 }
 
 
@@ -49,33 +42,24 @@ class Words:
     def problem(self, problem: Problem) -> tuple[str, str]:
         """A heading for the check, and a sentence; where this language has none, that of the part that refused."""
         heading = self.check(problem.check) or self("check_other" if problem.is_refusal else "check_ended")
-        return heading, self._table.get(f"text_{problem.text.replace(' ', '_')}") or self._told(problem)
+        return heading, self._table.get(f"text_{problem.text.replace(' ', '_')}") or self._sentence_of(problem)
+
+    def _sentence_of(self, problem: Problem) -> str:
+        """That of its reason; an older program sent a text alone, which stays as it came."""
+        has_code = problem.reason is not None and problem.reason.code != PLAIN
+        return self.why(problem.reason) if has_code and problem.reason is not None else _without_heading(problem)
 
     def why(self, reason: Explained) -> str:
-        """The sentence of a reason; of causes that have no code, what `said` makes of them."""
-        return as_sentence(say(self._of_known(reason), self.language, FrontEnd.PAGE))
+        """The sentence of a reason."""
+        return as_sentence(self.line(reason))
 
-    def _of_known(self, reason: Explained) -> Explained:
-        if reason.code == PLAIN:
-            return plain(self.said(str(reason)))
-        return replace(reason, causes=tuple(self._of_known(cause) for cause in reason.causes))
-
-    def said(self, text: str) -> str:
-        """What another part says, line by line; a line that this language does not have is left as it is."""
-        return "\n".join(self._of.sentences.of(line) or line for line in text.split("\n"))
+    def line(self, reason: Explained) -> str:
+        """The same without a full stop, as one line of several."""
+        return say(reason, self.language, FrontEnd.PAGE)
 
     def value(self, name: str, value: str) -> str:
         """A single word of another part, as `name` calls it: a mode, a phase of homing, ..."""
-        return self._of.sentences.value(name, value)
-
-    def _told(self, problem: Problem) -> str:
-        """By the sentence; where that is not known, by the code, with the sentence as it came."""
-        if problem.reason is not None and problem.reason.code != PLAIN:
-            return self.why(problem.reason)
-        of = self._of.sentences.of
-        known = of(problem.text) or of(str(problem.reason or ""))
-        about = self._of.codes.get(problem.code)
-        return known or (f"{about} («{problem.text}»)" if about else self.said(_without_heading(problem)))
+        return self._of.values.get(name, {}).get(value, value)
 
 
 def _without_heading(problem: Problem) -> str:

@@ -9,7 +9,9 @@ import msgspec
 import gemelo
 from gemelo.libraries.arm.cell.cell_file import deployed_cell
 from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.schemas.reasons import because, remedy
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option
 
@@ -36,7 +38,8 @@ def run(options: Options) -> ExitCode:
     if options.json:
         print(msgspec.json.encode([_fields(seen) for seen in found]).decode())
     else:
-        print("\n".join(map(str, found)) or "nothing of the cell file is seen: `gemelo camera view`")
+        lines = [sentence(seen.summary) for seen in found]
+        print("\n".join(lines) or sentence(because("detect.nothing", remedy("view_camera"))))
     return ExitCode.OK
 
 

@@ -10,6 +10,7 @@ import msgspec
 import gemelo
 from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.output import control
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.units import LENGTH, parse_quantity
@@ -75,7 +76,8 @@ def grip(arm: Arm, to: Grip, max_effort: float, as_json: bool) -> ExitCode:
     finally:
         if is_live:
             control("\r", sys.stderr)
-    print(msgspec.json.encode(gripped._asdict()).decode() if as_json else f"gripper: {gripped}")
+    line = sentence(because("pick.gripper", gripped.summary))
+    print(msgspec.json.encode(gripped._asdict()).decode() if as_json else line)
     return ExitCode.OK
 
 

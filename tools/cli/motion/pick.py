@@ -10,11 +10,13 @@ import gemelo
 from gemelo.libraries.arm.cell.cell_file import deployed_cell
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option
 
 if TYPE_CHECKING:
     from gemelo import Robot
+    from gemelo.schemas.reasons import Reason
 
 
 def add_options(parser: Parser) -> None:
@@ -28,9 +30,9 @@ def add_options(parser: Parser) -> None:
 def run(options: Options) -> ExitCode:
     """Picks it, with a line for each part; raises `CommandError` with the reason where it cannot."""
 
-    def show(text: str) -> None:
+    def show(part: Reason) -> None:
         if not options.json:
-            print(text, flush=True)
+            print(sentence(part), flush=True)
 
     with connect_arm(load_robot()) as arm:
         try:
@@ -38,7 +40,7 @@ def run(options: Options) -> ExitCode:
         except gemelo.Error as error:
             raise CommandError(error) from error
     fields = picked._asdict() | {"seen": picked.seen._asdict()}
-    print(msgspec.json.encode(fields).decode() if options.json else picked)
+    print(msgspec.json.encode(fields).decode() if options.json else sentence(picked.summary))
     return ExitCode.OK
 
 
