@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.schemas.device_config import config_text
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.common.session import load_robot
 from gemelo.tools.cli.common.terminal import confirm
@@ -88,14 +89,14 @@ def settle(port: str, baud: int, arm: ArmDescription, credentials: CredentialsCh
     with opened_again(port, BAUD) as line:
         answer = BoardExchange(line).send(credentials.text())
         if not answer.accepted:
-            raise CommandError(f"the firmware runs, and refuses that: {answer.reason or 'without a reason'}")
+            raise CommandError(because("flash.refused", error=answer.reason or "-"))
     print(f"3/3  giving it the configuration of {arm.name}, {len(config)} bytes", flush=True)
     with opened_again(port, baud) as line:
         exchange = BoardExchange(line)
         exchange.configure(config)
         who = exchange.newest_status or exchange.status(STATUS_PERIOD)
     if who is None:
-        raise CommandError("it took the configuration and is silent since: gemelo device doctor --serial " + port)
+        raise CommandError(because("flash.silent_since", port=port))
     print(f"it is ready: {who.device}, firmware {who.firmware}")
 
 

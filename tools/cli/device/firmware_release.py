@@ -15,6 +15,7 @@ from pathlib import Path
 
 import msgspec
 
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError
 from gemelo.tools.cli.device.flash_parts import (
     FIRMWARE,
@@ -52,10 +53,10 @@ def make_release(builds: Path, release: Path) -> str:
     folders = sorted(each.parent for each in builds.glob(f"*/{FIRMWARE}") if not each.parent.name.endswith(DEBUG))
     found = {folder.name: build_of(folder) for folder in folders}
     if not found:
-        raise CommandError(f"{builds} has no folder with a {FIRMWARE}: run `pio run` in firmware/ first")
+        raise CommandError(because("flash.no_builds", path=str(builds), firmware=FIRMWARE))
     versions = {build.header.version for build in found.values()}
     if len(versions) > 1:
-        raise CommandError(f"the builds are of several versions: {', '.join(sorted(versions))}; build all of them anew")
+        raise CommandError(because("flash.versions", versions=tuple(sorted(versions))))
     version = versions.pop()
     release.mkdir(parents=True)
     for name, build in found.items():

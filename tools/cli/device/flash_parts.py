@@ -17,6 +17,7 @@ from typing import NamedTuple
 import msgspec
 
 from gemelo.libraries.runtime.firmware_update import MAGIC, ImageHeader, NoImage, read_header
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, usage
 
 BOOTLOADER, TABLE, OTA_DATA, FIRMWARE = "bootloader.bin", "partitions.bin", "ota_data.bin", "firmware.bin"
@@ -103,29 +104,29 @@ def read_builds(path: Path, is_usb: bool = False) -> tuple[FirmwareBuild, ...]:
             return _of_manifest(text, str(path), lambda name: (folder / name).read_bytes())
         if not path.is_dir() and path.name != FIRMWARE:
             require_there(path)
-            raise usage(f"{path}: give the folder of a build, with {FIRMWARE}, or a release's .zip or {MANIFEST}")
+            raise usage(because("flash.kind", path=str(path), firmware=FIRMWARE, manifest=MANIFEST))
         return (build_of(folder),)
     except OSError as error:
-        raise usage(f"cannot read {error.filename or path}: {error.strerror or error}") from error
+        said = str(error.strerror or error)
+        raise usage(because("flash.unread", path=str(error.filename or path), error=said)) from error
 
 
 def require_there(path: Path) -> None:
     """Raises `CommandError` where there is no such file."""
     if not path.exists():
-        raise usage(f"there is no {path}: build it (firmware/README.md), or download a release")
+        raise usage(because("flash.none", path=str(path)))
 
 
 def build_of(folder: Path) -> FirmwareBuild:
     """What PlatformIO has built in `folder`; raises `CommandError`."""
     missing = [name for name in (BOOTLOADER, TABLE, FIRMWARE) if not (folder / name).is_file()]
     if missing:
-        raise usage(
-            f"{folder} has no {', '.join(missing)}: give the folder of a build, as .pio/build/esp32, or a release"
-        )
+        raise usage(because("flash.missing", path=str(folder), files=tuple(missing)))
     firmware, table = (folder / FIRMWARE).read_bytes(), (folder / TABLE).read_bytes()
     header = read_image_header(firmware, str(folder / FIRMWARE))
     if header.chip not in BOOTLOADER_AT:
-        raise usage(f"{folder / FIRMWARE} is for {header.chip}: gemelo's firmware is for {', '.join(BOOTLOADER_AT)}")
+        chips = tuple(BOOTLOADER_AT)
+        raise usage(because("flash.unknown_chip", path=str(folder / FIRMWARE), chip=header.chip, chips=chips))
     partitions = read_table(table, str(folder / TABLE))
     ota_data, slot = partition(partitions, _DATA, _OTA_DATA, folder), partition(partitions, _APP, _OTA_0, folder)
     parts = (
@@ -143,15 +144,17 @@ def require_sound(build: FirmwareBuild, source: str) -> FirmwareBuild:
     by_name = {part.name: part for part in build.parts}
     missing = [name for name in (BOOTLOADER, TABLE, OTA_DATA, FIRMWARE) if name not in by_name]
     if missing:
-        raise usage(f"{source}: the build for {build.chip} lacks {', '.join(missing)}")
+        raise usage(because("flash.lacks", path=source, chip=build.chip, files=tuple(missing)))
     bootloader, firmware = by_name[BOOTLOADER], by_name[FIRMWARE]
     for part in (bootloader, firmware):
         require_whole(part.content, f"{source}: {part.name}")
     if build.header.project != PROJECT:
-        raise usage(f'{source}: {FIRMWARE} is the firmware "{build.header.project}", not {PROJECT}\'s')
+        raise usage(because("flash.foreign", path=source, file=FIRMWARE, project=build.header.project))
     its_chip = _IMAGE.unpack_from(bootloader.content)[2]
     if its_chip != build.header.chip_id:
-        raise usage(f"{source}: {BOOTLOADER} is for another chip (number {its_chip}) than {FIRMWARE} ({build.chip})")
+        raise usage(
+            because("flash.mixed", path=source, file=BOOTLOADER, number=its_chip, firmware=FIRMWARE, chip=build.chip)
+        )
     partitions = read_table(by_name[TABLE].content, f"{source}: {TABLE}")
     slot = partition(partitions, _APP, _OTA_0, source)
     places = {
@@ -160,27 +163,29 @@ def require_sound(build: FirmwareBuild, source: str) -> FirmwareBuild:
     }  # fmt: skip
     for name, place in places.items():
         if by_name[name].offset != place:
-            raise usage(f"{source}: {name} is to go to {by_name[name].offset:#x}; it would start from {place or 0:#x}")
+            at = f"{by_name[name].offset:#x}"
+            raise usage(because("flash.place", path=source, file=name, at=at, place=f"{place or 0:#x}"))
     if len(firmware.content) > slot.size:
-        raise usage(f"{source}: {FIRMWARE} has {len(firmware.content)} bytes, its slot {slot.size}")
+        size = len(firmware.content)
+        raise usage(because("flash.too_large", path=source, file=FIRMWARE, size=size, slot=slot.size))
     return build
 
 
 def require_whole(image: bytes, what: str) -> None:
     """Raises `CommandError` unless the SHA-256 behind an image is that of its bytes."""
     if len(image) < _IMAGE.size or image[0] != MAGIC:
-        raise usage(f"{what} is no image of ESP-IDF")
+        raise usage(because("flash.no_image", path=what))
     _, segments, _, has_digest = _IMAGE.unpack_from(image)
     end = _IMAGE.size
     for _ in range(segments):
         if end + _SEGMENT.size > len(image):
-            raise usage(f"{what} is cut off after {len(image)} bytes: download or build it again")
+            raise usage(because("flash.cut", path=what, size=len(image)))
         end += _SEGMENT.size + _SEGMENT.unpack_from(image, end)[1]
     end += 16 - end % 16  # the checksum is the last byte of a block of 16
     if has_digest and image[end : end + 32] != hashlib.sha256(image[:end]).digest():
-        raise usage(f"{what} is damaged: its SHA-256 is not that of its bytes; download or build it again")
+        raise usage(because("flash.damaged", path=what))
     if len(image) < end:
-        raise usage(f"{what} is cut off after {len(image)} bytes: download or build it again")
+        raise usage(because("flash.cut", path=what, size=len(image)))
 
 
 def read_table(table: bytes, what: str) -> tuple[Partition, ...]:
@@ -192,7 +197,7 @@ def read_table(table: bytes, what: str) -> tuple[Partition, ...]:
             break
         found.append(Partition(label.split(b"\0", 1)[0].decode("ascii", "replace"), kind, subtype, offset, size))
     if not found:
-        raise usage(f"{what} is no partition table")
+        raise usage(because("flash.no_table", path=what))
     return tuple(found)
 
 
@@ -202,7 +207,7 @@ def partition(partitions: Sequence[Partition], kind: int, subtype: int, source: 
         if (each.kind, each.subtype) == (kind, subtype):
             return each
     name = "ota_0" if kind == _APP else "otadata"
-    raise usage(f"{source}: {TABLE} has no partition {name}, as firmware/platform/esp32/partitions.csv has one")
+    raise usage(because("flash.no_partition", path=str(source), file=TABLE, name=name))
 
 
 def build_for(builds: Sequence[FirmwareBuild], chip: str) -> FirmwareBuild:
@@ -210,8 +215,7 @@ def build_for(builds: Sequence[FirmwareBuild], chip: str) -> FirmwareBuild:
     for build in builds:
         if build.chip == chip:
             return build
-    chips = ", ".join(build.chip for build in builds)
-    raise CommandError(f"the board is an {chip}, and the image is for {chips}: take that of its chip")
+    raise CommandError(because("flash.other_chip", chip=chip, chips=tuple(build.chip for build in builds)))
 
 
 def read_image_header(image: bytes, what: str) -> ImageHeader:
@@ -219,7 +223,7 @@ def read_image_header(image: bytes, what: str) -> ImageHeader:
     try:
         return read_header(image)
     except NoImage as error:
-        raise usage(f"{what}: {error}") from error
+        raise usage(because("flash.header", path=what, error=str(error))) from error
 
 
 def _of_zip(path: Path, manifest: str) -> tuple[FirmwareBuild, ...]:
@@ -227,21 +231,21 @@ def _of_zip(path: Path, manifest: str) -> tuple[FirmwareBuild, ...]:
     try:
         with zipfile.ZipFile(path) as opened:
             if sum(each.file_size for each in opened.infolist()) > LARGEST_RELEASE:
-                raise usage(f"{path} holds more than {LARGEST_RELEASE} bytes: it is no release of the firmware")
+                raise usage(because("flash.huge", path=str(path), most=LARGEST_RELEASE))
             names = [name for name in opened.namelist() if PurePosixPath(name).name == manifest]
             if not names:
-                raise usage(f"{path} has no {manifest}: is it a release of gemelo's firmware?")
+                raise usage(because("flash.no_manifest", path=str(path), manifest=manifest))
             within = PurePosixPath(names[0]).parent
             return _of_manifest(opened.read(names[0]), str(path), lambda name: opened.read(str(within / name)))
     except (zipfile.BadZipFile, KeyError) as error:
-        raise usage(f"{path}: {str(error).strip(chr(34))}; download it again") from error
+        raise usage(because("flash.bad_zip", path=str(path), error=str(error).strip("'\""))) from error
 
 
 def _of_manifest(text: bytes, source: str, read: Read) -> tuple[FirmwareBuild, ...]:
     try:
         manifest = msgspec.json.decode(text, type=Manifest)
     except msgspec.DecodeError as error:
-        raise usage(f"{source}: its manifest is none of ESP Web Tools: {error}") from error
+        raise usage(because("flash.bad_manifest", path=source, error=str(error))) from error
     return tuple(_of_build(each, source, read) for each in manifest.builds)
 
 
@@ -249,8 +253,9 @@ def _of_build(build: ManifestBuild, source: str, read: Read) -> FirmwareBuild:
     parts = tuple(FlashPart(PurePosixPath(each.path).name, each.offset, read(each.path)) for each in build.parts)
     firmware = next((part.content for part in parts if part.name == FIRMWARE), None)
     if firmware is None:
-        raise usage(f"{source}: the build for {build.chip_family} lacks {FIRMWARE}")
+        raise usage(because("flash.lacks", path=source, chip=build.chip_family, files=(FIRMWARE,)))
     header = read_image_header(firmware, f"{source}: {FIRMWARE}")
     if header.chip != build.chip_family:
-        raise usage(f"{source}: {FIRMWARE} for {build.chip_family} is for {header.chip}")
+        expected = build.chip_family
+        raise usage(because("flash.wrong_chip", path=source, file=FIRMWARE, expected=expected, chip=header.chip))
     return require_sound(FirmwareBuild(header, parts), source)

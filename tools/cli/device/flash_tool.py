@@ -13,24 +13,21 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.common.errors import CommandError
 from gemelo.tools.cli.device.flash_parts import FirmwareBuild
 
 BAUD = 460_800  # chosen: what every USB converter on such boards carries; esptool itself begins at 115200
 LONGEST = 10.0  # [s] chosen: for it to end, once it has closed its output
 CHIP = re.compile(r"(?:Chip type:\s*|Chip is |Detecting chip type\.\.\.\s*)(ESP32(?:-[A-Z]\d+)?)")
-SIGNS = (  # of esptool 4 and 5, most telling first
-    (r"This chip is (\S+?),? not (\S+?)[.!]", "the board is an {0}, the image is for {1}: take that of its chip"),
-    (r"Permission denied", "you may not use {port}: join its group (sudo usermod -aG dialout $USER), and log in again"),
-    (r"could not open", "cannot open {port}: is it plugged in, and does no other program hold it? "
-     "`python -m serial.tools.list_ports` lists the ports"),
-    (r"Wrong boot mode|Failed to connect|No serial data|Timed out waiting for packet", "the board does not answer its "
-     "boot loader: hold BOOT, press and release EN, release BOOT, and try again; then: is {port} its port, and is the "
-     "cable one for data?"),
-    (r"(?:will not fit|larger than|exceeds).*flash", "the board's flash is smaller than 4 MB: another board"),
-    (r"MD5 of file does not match|Hash of data|digest mismatch", "what was written reads back otherwise: a worn flash, "
-     "a weak supply or a bad cable"),
-)  # fmt: skip
+SIGNS = (  # of esptool 4 and 5, most telling first; what is found has the names of the reason's values
+    (r"This chip is (?P<chip>\S+?),? not (?P<chips>\S+?)[.!]", "flash.other_chip"),
+    (r"Permission denied", "flash.not_allowed"),
+    (r"could not open", "flash.no_port"),
+    (r"Wrong boot mode|Failed to connect|No serial data|Timed out waiting for packet", "flash.silent"),
+    (r"(?:will not fit|larger than|exceeds).*flash", "flash.small"),
+    (r"MD5 of file does not match|Hash of data|digest mismatch", "flash.differs"),
+)
 
 
 def find_esptool() -> list[str]:
@@ -40,7 +37,7 @@ def find_esptool() -> list[str]:
         found = shutil.which(name, path=str(beside)) or shutil.which(name)
         if found is not None:
             return [found]
-    raise CommandError("esptool, which writes a board's flash, is not installed: pipx install esptool")
+    raise CommandError(because("flash.no_esptool"))
 
 
 def chip_of(port: str) -> str:
@@ -48,7 +45,7 @@ def chip_of(port: str) -> str:
     output = run_esptool(["--port", port, "--after", "no_reset", "chip_id"], port, lambda _: None)
     found = CHIP.findall(output)
     if not found:
-        raise CommandError(f"esptool does not say which chip the board at {port} has: {last_line(output)}")
+        raise CommandError(because("flash.which_chip", port=port, error=last_line(output)))
     return str(found[-1])
 
 
@@ -89,12 +86,12 @@ def run_esptool(words: Sequence[str], port: str, show: Callable[[str], None]) ->
     return text
 
 
-def cause_of(output: str, port: str) -> str:
+def cause_of(output: str, port: str) -> Reason:
     """What a failure most likely means, with the remedy."""
-    for pattern, cause in SIGNS:
+    for pattern, code in SIGNS:
         if found := re.search(pattern, output, re.IGNORECASE):
-            return cause.format(*found.groups(), port=port)
-    return f"esptool failed: {last_line(output)}"
+            return because(code, **(found.groupdict() or {"port": port}))
+    return because("flash.failed", error=last_line(output))
 
 
 def last_line(output: str) -> str:
