@@ -22,6 +22,7 @@ from gemelo.libraries.runtime.process.shutdown import (
 )
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.reasons.catalogue import read_early
 
 Run = Callable[[Node, Deployment], None]
 EXPECTED = (ConfigurationError, BusError, RequestRefused)  # a sentence says all; anything else shows where it happened
@@ -33,6 +34,7 @@ def service(name: str, run: Run, arguments: Sequence[str] | None = None, grace: 
     It has `grace` [s] to stop; those who supervise it wait 5 s.
     """
     options = _parse(name, arguments)
+    read_early()
     stop = ShutdownRequest()
     end_with_any_thread(line_logger(name, options.log_level), lambda: stop.is_set)
     give_back_freed_memory()

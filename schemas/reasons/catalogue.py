@@ -34,13 +34,26 @@ def languages() -> tuple[str, ...]:
 
 
 def template(code: str, language: str, context: str = "") -> str | None:
-    """The template for that front end, else the one for all; None where the language has none."""
-    known = _catalogue(language)
+    """The template for that front end, else the one for all; None where the language has none.
+
+    None as well while the file cannot be read: a process without a free descriptor says the code and its values.
+    """
+    try:
+        known = _catalogue(language)
+    except FileNotFoundError:
+        raise  # not compiled
+    except OSError:
+        known = None
     if known is None:
         return None
     own = known.pgettext(context, code)
     found = own if own != code else known.gettext(code)
     return found if found != code else None
+
+
+def read_early() -> None:
+    """Reads the English of all codes now: later a process may have no descriptor left for it."""
+    _catalogue(ENGLISH)
 
 
 def entries(language: str) -> frozenset[tuple[str, str]]:

@@ -21,6 +21,7 @@ from gemelo.libraries.runtime.process.priority import step_ahead
 from gemelo.libraries.runtime.process.readiness import Readiness
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.deployment import Broker, Deployment, MqttSection
+from gemelo.schemas.reasons.catalogue import read_early
 from gemelo.services.broker import embedded, mosquitto
 from gemelo.services.broker.replacement import NotInstalled, become
 
@@ -34,6 +35,7 @@ RENEWAL = (
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs until SIGTERM; 1 with one sentence where it cannot start."""
     options = _parse(arguments)
+    read_early()
     log = line_logger("broker", options.log_level)
     try:
         return run(load_deployment(options.config), log)

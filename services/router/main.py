@@ -16,6 +16,7 @@ from gemelo.libraries.runtime.process.priority import step_ahead
 from gemelo.libraries.runtime.process.readiness import Readiness
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest, stop_on_signals
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
+from gemelo.schemas.reasons.catalogue import read_early
 
 BEAT = 1.0  # [s]
 
@@ -26,6 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--config", type=Path, default=None, metavar="FILE", help="deployment file [deploy/local.toml]")
     parser.add_argument("--log-level", default="info", choices=LEVELS)
     options = parser.parse_args(arguments)
+    read_early()
     log = line_logger("router", options.log_level)
     stop = ShutdownRequest()
     try:

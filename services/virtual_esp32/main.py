@@ -34,6 +34,7 @@ from gemelo.libraries.runtime.process.readiness import Readiness
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest, end_with_any_thread
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.deployment import Deployment, DeviceKind, Wire
+from gemelo.schemas.reasons.catalogue import read_early
 from gemelo.schemas.robot import Dialect
 
 NAME = "virtual_esp32"
@@ -44,6 +45,7 @@ log = logging.getLogger(NAME)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs until SIGTERM or SIGINT and returns 0; 1 with one sentence where it cannot start."""
     options = _parse(arguments)
+    read_early()
     log.setLevel(options.log_level.upper())
     log.handlers = line_logger(NAME).handlers
     log.propagate = False

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import string
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 
@@ -154,3 +156,19 @@ def test_the_index_has_every_template_that_the_files_have():
 
 def test_a_value_may_be_quoted_as_python_writes_it():
     assert str(because("program.name.blank", kind="point", name=" P1")).startswith("the point's name ' P1' ")
+
+
+WITHOUT_DESCRIPTORS = """
+import gettext, resource
+from gemelo.schemas.reasons import because
+soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+resource.setrlimit(resource.RLIMIT_NOFILE, (0, hard))
+print(because("goal.joints.unknown", joint="elbow"))
+resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+print(because("goal.joints.unknown", joint="elbow"))
+"""
+
+
+def test_a_process_without_a_free_descriptor_says_the_code_and_later_the_sentence():
+    done = subprocess.run([sys.executable, "-c", WITHOUT_DESCRIPTORS], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["goal.joints.unknown (joint elbow)", 'joint "elbow" is unknown']
