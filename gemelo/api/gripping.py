@@ -52,7 +52,11 @@ class Gripped(NamedTuple):
 
     @property
     def summary(self) -> Reason:
-        """One line for a person, as data."""
+        """One line for a person, as data.
+
+        >>> arm.grip("open").summary.values["how"]
+        'there'
+        """
         how = ("stopped" if self.stalled else "there") + ("" if self.measured else "_commanded")
         opening = 1e3 * self.position  # [mm]
         if self.held:

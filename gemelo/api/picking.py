@@ -65,7 +65,11 @@ class Picked(NamedTuple):
 
     @property
     def summary(self) -> Reason:
-        """One line for a person, as data."""
+        """One line for a person, as data.
+
+        >>> gemelo.Picked("cup", "bin", gemelo.Pose((0.2, 0.1, 0.04)), 0.0001, 0.1, 2, 12.5, None).summary.code
+        'pick.done.turned_again'
+        """
         values: dict[str, Value] = {"thing": self.name, "place": self.place, "time": self.took}
         has_turned, is_again = abs(self.turned) > SEEN_TURN, self.attempts != 1
         values |= {"angle": math.degrees(self.turned)} if has_turned else {}

@@ -58,7 +58,11 @@ class Seen(NamedTuple):
 
     @property
     def summary(self) -> Reason:
-        """One line for a person, as data."""
+        """One line for a person, as data.
+
+        >>> gemelo.Seen("cup", gemelo.Pose((0.26, 0.16, 0.04)), 0.0001, "tag", "overhead", 0, "").summary.code
+        'detect.seen'
+        """
         at = tuple(1e3 * value for value in self.pose.position)  # [mm]
         seen = because(
             "detect.seen", thing=self.name, kind=self.kind, at=at, error=1e3 * self.sigma, camera=self.camera
