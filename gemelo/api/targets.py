@@ -45,6 +45,7 @@ LONGEST_PLAN = 3600.0  # [s]
 ALLOWED, ALLOWED_OF_A_POINT, MOST_ALLOWED = 5.0, 0.01, 120.0  # [s] for a plan, and for each point that it passes
 GOALS = ("named", "joints", "position", "pose", "offset")  # arguments that say where to
 FULL = 6  # joints that an arm has at least if it can turn its tool as it likes
+TYPED_DIGITS = 3  # chosen: behind the point, of an angle or a length that a person types
 
 
 def as_target(goal: ToolGoal) -> Target:
@@ -406,7 +407,10 @@ def _positive(name: str, value: float, unit: str, most: float) -> float:
 
 
 def _require_unit(arm: ArmDescription, name: str, value: float) -> None:
-    """Refuses what is out of the limits as it stands, and within them in degrees or millimetres."""
+    """Refuses what is out of the limits as it stands, and within them in degrees or millimetres.
+
+    A value that was converted, as 400deg to 6.981317..., has more digits than a person types.
+    """
     joint = arm.joint(name)
     factor, helper = (math.radians(1.0), "in_degrees") if joint.unit == "rad" else (0.001, "in_millimetres")
     lower, upper = (joint.lower, joint.upper) if math.isfinite(joint.lower) else (-math.tau, math.tau)
@@ -414,6 +418,7 @@ def _require_unit(arm: ArmDescription, name: str, value: float) -> None:
         not lower <= value <= upper
         and lower <= value * factor <= upper
         and abs(value) >= 2.0 * max(abs(lower), abs(upper))
+        and value == round(value, TYPED_DIGITS)
     ):
         raise BadArgument(
             because(

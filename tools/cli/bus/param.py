@@ -11,7 +11,7 @@ from gemelo.schemas.reasons import because
 from gemelo.schemas.system import Empty, Parameter, ParameterValue, SetParameter
 from gemelo.tools.cli.bus.messages import dump
 from gemelo.tools.cli.bus.node import TIMEOUT, living, node_option, require_alive
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, nearest, usage
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, hint_of, usage
 from gemelo.tools.cli.common.forms import print_value
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
@@ -113,9 +113,7 @@ def parameter_of(session: CommandSession, node: str, name: str) -> Parameter:
     """One parameter of a node; raises `CommandError` with the nearest name."""
     known = {parameter.name: parameter for parameter in parameters_of(session, node)}
     if name not in known:
-        guess = nearest(name, known)
-        hint = f'did you mean "{guess}"?' if guess else f"it has {', '.join(known) or 'none'}"
-        raise usage(f'{node} has no parameter "{name}": {hint}')
+        raise usage(because("cli.param.unknown", hint_of(name, known), node=node, name=name))
     return known[name]
 
 

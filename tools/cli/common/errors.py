@@ -12,7 +12,7 @@ from gemelo.tools.cli.common.language import sentence
 
 if TYPE_CHECKING:
     from gemelo.libraries.arm.model.description import ArmDescription, Joint
-    from gemelo.schemas.reasons import Reason
+    from gemelo.schemas.reasons import Reason, Remedy
     from gemelo.schemas.robot import DigitalOutput, Input, Sensor
 
 
@@ -68,14 +68,19 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 
 def unknown(kind: str, name: str, known: Iterable[str], *, is_sorted: bool = True) -> CommandError:
     """`no topic "joint_state": did you mean "joint_states"?`, or the list of all known names."""
-    from gemelo.schemas.reasons import because, remedy  # 30 ms, where something is refused
+    from gemelo.schemas.reasons import because  # 30 ms, where something is refused
+
+    return usage(because("cli.unknown", hint_of(name, known, is_sorted=is_sorted), kind=kind, name=name))
+
+
+def hint_of(name: str, known: Iterable[str], *, is_sorted: bool = True) -> Remedy:
+    """The known name that is most like it, else all of them."""
+    from gemelo.schemas.reasons import remedy  # 30 ms, where something is refused
 
     known = sorted(known) if is_sorted else list(known)
     if guess := nearest(name, known):
-        hint = remedy("did_you_mean", name=guess)
-    else:
-        hint = remedy("there_is", names=", ".join(known)) if known else remedy("there_is_none")
-    return usage(because("cli.unknown", hint, kind=kind, name=name))
+        return remedy("did_you_mean", name=guess)
+    return remedy("there_is", names=", ".join(known)) if known else remedy("there_is_none")
 
 
 def joint_of(arm: ArmDescription, name: str) -> Joint:

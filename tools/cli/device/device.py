@@ -16,6 +16,7 @@ from gemelo.schemas.device import (
     SpeedCommand,
     StopKind,
 )
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, require_name, usage
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.units import parse_joints, share, show
@@ -150,7 +151,7 @@ def speed(arm: Arm, scale: float) -> ExitCode:
 def require_share(scale: float) -> float:
     """Returns the time scale; raises `CommandError` outside of 0 to 1."""
     if not 0.0 <= scale <= 1.0:
-        raise usage(f"a speed of {100.0 * scale:g}% is not in 0% to 100%: the planner's own speed is 100%")
+        raise usage(because("cli.speed.range", speed=scale))
     return scale
 
 

@@ -28,7 +28,7 @@ from gemelo.programs import (
     programs_folder,
 )
 from gemelo.schemas.reasons import because
-from gemelo.tools.cli.common.errors import ExitCode, unknown, usage
+from gemelo.tools.cli.common.errors import ExitCode, hint_of, usage
 from gemelo.tools.cli.common.session import connect_arm, load_robot, reported
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option
@@ -147,7 +147,8 @@ def _load(name: str, robot: gemelo.Robot) -> tuple[Program, Points, Programs]:
         points = Points.load(programs.folder, robot.description)
         if name not in programs:
             programs.file(name)
-            raise unknown(f"program in {programs.folder}", name, programs)
+            hint = hint_of(name, programs)
+            raise usage(because("cli.program.unknown", hint, folder=str(programs.folder), name=name))
         if mistakes := find_mistakes_in_file(programs.file(name), robot.description, points, programs):
             raise ProgramError(mistakes)
         return programs[name], points, programs
