@@ -37,6 +37,10 @@ COMMANDS = """
 --simulate reference --joints brazo_joint=400deg
 --simulate program check nothing
 --simulate resume
+--simulate hold
+--simulate device arm
+--simulate device disarm
+--simulate grip 20mm
 --simulate device selftest --current q1=fast
 --simulate jog elbow
 --simulate topic echo nothing

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import gemelo
+from gemelo.api.errors import why_of
 from gemelo.schemas.device import (
     ArmCommand,
     DeviceCommand,
@@ -18,6 +19,7 @@ from gemelo.schemas.device import (
 )
 from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, require_name, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.units import parse_joints, share, show
 from gemelo.tools.cli.parser import Choices, Options, Parser
@@ -34,10 +36,7 @@ BY_NAME: dict[str, DeviceCommand | StopKind] = {
     "hold": StopKind.HOLD,
     "disarm": StopKind.DISARM,
 }
-AFTERWARDS: dict[str, str] = {
-    "arm": "the motors hold; `gemelo home` or `gemelo reference` if a joint is unreferenced",
-    "disarm": "the motors are without current, and every joint is unreferenced",
-}
+AFTERWARDS = {"arm": because("cli.device.armed"), "disarm": because("cli.device.disarmed")}  # what is so then
 
 
 def stop_options(parser: Parser) -> None:
@@ -117,7 +116,7 @@ def command(arm: Arm, name: str) -> ExitCode:
     """Sends a command of `BY_NAME` and prints the device's answer; raises `CommandError` if it refuses."""
     code = send(arm, BY_NAME[name])
     if name in AFTERWARDS:
-        print(f"  {AFTERWARDS[name]}")
+        print(f"  {sentence(AFTERWARDS[name])}")
     return code
 
 
@@ -126,7 +125,8 @@ def reference(arm: Arm, assignments: Sequence[str]) -> ExitCode:
     request = reference_request(arm.description, assignments)
     code = send(arm, request)
     for name, position in zip(request.name, request.position, strict=True):
-        print(f"  {name} is at {show(position, arm.description.joint(name).unit)}")
+        place = show(position, arm.description.joint(name).unit)
+        print(f"  {sentence(because('cli.device.joint_at', joint=name, place=place))}")
     return code
 
 
@@ -162,5 +162,6 @@ def send(arm: Arm, wanted: DeviceCommand | StopKind, what: str = "") -> ExitCode
     except gemelo.Refused as error:
         raise CommandError(error) from error
     what = what or (wanted.value if isinstance(wanted, StopKind) else str(wanted.__struct_config__.tag))
-    print(f"{what} done: device mode {answer.mode.name}{f'; {answer.reason}' if answer.reason else ''}")
+    done = because("cli.device.done", what=what, mode=answer.mode.name)
+    print(sentence(because("cli.device.done.but", done, why_of(answer)) if answer.reason else done))
     return ExitCode.OK
