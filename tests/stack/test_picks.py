@@ -75,7 +75,7 @@ def stop_a_program_that_picks():
         assert check.ok
         assert "planned when the thing is seen" in check.legs[0].note
         unknown = check_program(arm, Program("take", (Pick(thing="cap", place="bin"),)), {}, {})
-        assert "no [[thing]]" in unknown.refusals[0]
+        assert "no [[thing]]" in str(unknown.refusals[0])
         run = ProgramRun(arm, picks_cup, {}, {})
         run.start()
         assert arm.wait_for(lambda: max(map(abs, arm.velocities.values())) > 0.05, 60.0)
