@@ -28,7 +28,7 @@ def test_a_stack_that_does_not_start_says_of_each_process_why(tmp_path):
     assert re.search(r"started anew \d+ times, last exit code 1\)", broker.reason)
     assert f"port {port} on 127.0.0.1 is taken" in broker.lines[-1]
     assert publisher.name == "state_publisher"
-    assert publisher.reason.startswith("no fresh joint_states: is the stepper_gateway running? (process ")
+    assert publisher.reason.startswith("no fresh joint_states; see that the stepper_gateway runs (process ")
     for each in (broker, publisher):
         assert str(each) in str(raised.value)
 
