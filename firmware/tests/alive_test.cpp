@@ -66,6 +66,22 @@ TEST(Status, SaysWhoTheDeviceIs) {
         "\"queue_capacity\": 128, \"referenced\": true, \"armed\": true, \"config_crc32\": 0, \"virtual\": false}");
 }
 
+TEST(Status, SaysWhatIsLeftOfTheMemoryWhereTheBoardKnowsIt) {
+    std::string said;
+    Sink sink;
+    sink.context = &said;
+    sink.put = [](void* context, Output, const uint8_t* bytes, size_t size) {
+        static_cast<std::string*>(context)->assign(reinterpret_cast<const char*>(bytes), size);
+    };
+    sink.memory = [] { return MemoryReport{71000, 40200, 812, "wire"}; };
+    Reporter reporter;
+    reporter.begin(sink, 1, 2);
+    const DeviceConfig config = wired_joints();
+    reporter.status(StatusReport{&config, "wired", "power_on", 1, "", true, true, false});
+    EXPECT_NE(said.find("\"heap_free\": 71000, \"heap_least\": 40200, \"stack_least\": 812, \"stack_task\": \"wire\""),
+              std::string::npos);
+}
+
 TEST(Status, IsSaidEveryTenSecondsToTheSlot) {
     Rig rig;
     count_statuses(rig);

@@ -117,7 +117,7 @@ def test_keys_during_a_planned_motion_are_refused_and_do_not_disturb_it(stack, o
         handle = operator.send(plan)
         assert operator.wait_for(operator.is_moving, 60.0)
         typist.hold(UP, 0.6)
-        assert typist.until("refused: a goal is being carried out: cancel it first", 60.0), typist.shown
+        assert typist.until("refused: a goal is being carried out; cancel it first", 60.0), typist.shown
         outcome = handle.wait(plan.duration + 10.0)
         typist.type("x")
         assert typist.ended() == ExitCode.OK
