@@ -39,6 +39,11 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # What the user's own twin of this folder was started with is none of the tests' business.
 os.environ["GEMELO_STARTED"] = "/dev/null/started.toml"  # no file can be there
 
+# Nor is the language of their terminal: sentences are compared in English, those of processes that tests start too.
+for variable in ("LC_ALL", "LC_MESSAGES", "LANG"):
+    os.environ.pop(variable, None)
+os.environ["LANG"] = "C.UTF-8"
+
 profiles.load()
 sys.addaudithook(optional.on_audit_event)
 

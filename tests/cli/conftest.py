@@ -43,6 +43,7 @@ from gemelo.schemas.topics import (
     STEP_ERRORS,
 )
 from gemelo.services.planner.core import Planner
+from gemelo.tools.cli.common import language
 from gemelo.tools.cli.common.session import CommandSession
 from tests.runtime.support import RouterProcess, spinning
 
@@ -108,6 +109,13 @@ class PretendGateway:
                 accepted=False, reason=str(self.command_refusal), mode=self.mode, why=self.command_refusal
             )
         return DeviceCommandResponse(accepted=True, mode=self.mode)
+
+
+@pytest.fixture(autouse=True)
+def english_again() -> Iterator[None]:
+    """The language that a command line of this process has chosen ends with its test."""
+    yield
+    language.choose(language.ENGLISH)
 
 
 @pytest.fixture(scope="session")

@@ -18,12 +18,6 @@ from gemelo.tools.cli.motion.home import home
 METHOD = re.compile(r"\b(arm\.[a-z_.]+\(|gemelo\.(mm|deg|connect)\()")
 
 
-@pytest.fixture(autouse=True)
-def english_again():
-    yield
-    language.choose(language.ENGLISH)
-
-
 @pytest.mark.parametrize("code", languages())
 def test_only_a_script_reads_of_methods(code: str) -> None:
     entries = [each for file in sorted((LANGUAGES / code).glob("*.po")) for each in polib.pofile(str(file))]

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import pytest
 
-from gemelo.tools.cli.common import language as chosen
 from tests.cli.dialogues import COMMANDS, LANGUAGES, golden, said
 
 pytestmark = pytest.mark.full  # a simulated arm for most commands
 
 
 @pytest.fixture(autouse=True)
-def _english_again(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def _a_hundred_columns(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "100")
-    yield
-    chosen.choose(chosen.ENGLISH)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

@@ -13,14 +13,6 @@ from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 
 
-@pytest.fixture(autouse=True)
-def english_again(monkeypatch):
-    for variable in language.VARIABLES:
-        monkeypatch.delenv(variable, raising=False)
-    yield
-    language.choose(language.ENGLISH)
-
-
 @pytest.fixture
 def third_language(tmp_path, monkeypatch):
     """A folder `xx` that has one text, beside the languages that there are."""

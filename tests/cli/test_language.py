@@ -14,14 +14,6 @@ from gemelo.tools.cli.main import run
 from tests.table import table
 
 
-@pytest.fixture(autouse=True)
-def english_again(monkeypatch):
-    for variable in language.VARIABLES:
-        monkeypatch.delenv(variable, raising=False)
-    yield
-    language.choose(language.ENGLISH)
-
-
 @pytest.fixture(scope="module")
 def plan_from_elsewhere(tmp_path_factory) -> str:
     path = str(tmp_path_factory.mktemp("plan") / "plan.json")

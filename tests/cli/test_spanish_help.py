@@ -9,19 +9,10 @@ import pytest
 
 from gemelo.schemas.reasons.catalogue import HELP, entries, help_text
 from gemelo.tools.cli.commands import COMMANDS, GROUPS
-from gemelo.tools.cli.common import language
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import ABOUT, EPILOG, run
 from gemelo.tools.cli.parser import ONE_OF, Parser, complete
 from tests.table import table
-
-
-@pytest.fixture(autouse=True)
-def english_again(monkeypatch):
-    for variable in language.VARIABLES:
-        monkeypatch.delenv(variable, raising=False)
-    yield
-    language.choose(language.ENGLISH)
 
 
 class Listed(Parser):
