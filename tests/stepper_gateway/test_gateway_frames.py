@@ -13,12 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gemelo.services.stepper_gateway.links.frames import (
+    REPLACE,
     Ack,
     BadFrame,
     Chunk,
     CommandFrame,
     CommandReply,
     Heartbeat,
+    Replacement,
     StateFrame,
     Sync,
     SyncReply,
@@ -58,12 +60,16 @@ def rows(joints: int, count: int) -> st.SearchStrategy[tuple[tuple[int, ...], ..
     return st.tuples(*[row] * count)
 
 
+replacements = st.none() | st.builds(Replacement, from_us=u64, tail=u16, tail_dt_us=u32)
+
+
 @st.composite
 def chunks(draw: st.DrawFn) -> Chunk:
     joints, knots = draw(st.integers(1, 6)), draw(st.integers(1, 20))
     return Chunk(
-        boot_id=draw(u32), stream=draw(u32), seq=draw(u32), expires_us=draw(u64), dt_us=draw(u32), flags=draw(u16),
-        positions=draw(rows(joints, knots)), velocities=draw(rows(joints, knots)),
+        boot_id=draw(u32), stream=draw(u32), seq=draw(u32), expires_us=draw(u64), dt_us=draw(u32),
+        flags=draw(u16) & ~REPLACE, positions=draw(rows(joints, knots)), velocities=draw(rows(joints, knots)),
+        replace=draw(replacements),
     )  # fmt: skip
 
 
@@ -156,6 +162,8 @@ def test_the_shared_vectors_are_read_and_written_alike(vector: dict[str, Any]) -
             assert encode(decode(payload)) == payload
         return
     fields = {name: as_rows(value) for name, value in vector["fields"].items()}
+    if "replace" in fields:
+        fields["replace"] = Replacement(**fields["replace"])
     assert decode(payload) == KINDS[vector["type"]](**in_units(vector["type"], fields))
     assert encode(decode(payload)) == payload
 

@@ -20,12 +20,14 @@ Q8 = 256.0  # of a velocity; standard: Q24.8 of firmware/PROTOCOL.md
 ANY_BOOT = 0  # as the boot id of a command that stops; standard: firmware/PROTOCOL.md
 NEVER_EXPIRES = 2**64 - 1  # [us] standard: firmware/PROTOCOL.md
 NO_JOINT = 255  # standard: firmware/PROTOCOL.md
+REPLACE_SINCE = 2  # of `status.protocol`: the first version that knows REPLACE; standard: firmware/PROTOCOL.md
 
 Row = tuple[int, ...]
 
 _HEADER = struct.Struct("<BBBBI")
 _CRC = struct.Struct("<I")
 _TRAJ = struct.Struct("<IIQIHH")
+_REPLACE = struct.Struct("<QIHH")
 _ACK = struct.Struct("<IIIBBHiiHHQ")
 _CMD = struct.Struct("<IQBBH")
 _CMD_ACK = struct.Struct("<IBBBBQ")
@@ -82,6 +84,9 @@ class Code(IntEnum):
     NO_HOMING = 19
     BAD_ARGUMENT = 20
     ACCELERATION_LIMIT = 21
+    LATE = 22
+    OTHER_KNOT = 23
+    NO_STOP = 24
 
 
 def code_name(code: int) -> str:
@@ -100,6 +105,10 @@ class ChunkFlag(IntFlag):
 
     FIRST = 1  # knot 0 is the present position at rest, at stream time 0
     LAST = 2  # the last knot is at rest and the stream ends there
+    REPLACE = 4  # knot 0 is one that the device has, and what it has behind that is forgotten
+
+
+REPLACE = int(ChunkFlag.REPLACE)
 
 
 class Frame(msgspec.Struct, frozen=True, kw_only=True, gc=False):
@@ -108,8 +117,19 @@ class Frame(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     boot_id: int = 0
 
 
+class Replacement(msgspec.Struct, frozen=True, kw_only=True, gc=False):
+    """What REPLACE adds to a chunk: where its knot 0 is, and the spacing of its last `tail` knots."""
+
+    from_us: int  # stream time of knot 0
+    tail: int = 0  # [knots] that only lead to rest
+    tail_dt_us: int = 0
+
+
 class Chunk(Frame, frozen=True, kw_only=True, gc=False):
-    """TRAJ: `positions` and `velocities` have a row per knot and a column per joint."""
+    """TRAJ: `positions` and `velocities` have a row per knot and a column per joint.
+
+    `flags` has no REPLACE: that flag is on the wire where there is a `replace`.
+    """
 
     stream: int
     seq: int
@@ -118,6 +138,7 @@ class Chunk(Frame, frozen=True, kw_only=True, gc=False):
     flags: int = 0
     positions: tuple[Row, ...] = ()
     velocities: tuple[Row, ...] = ()
+    replace: Replacement | None = None
 
 
 class Ack(Frame, frozen=True, kw_only=True, gc=False):
@@ -213,10 +234,7 @@ def encode(frame: AnyFrame) -> bytes:
     match frame:
         case Chunk():
             kind, joints = FrameType.TRAJ, len(frame.positions[0]) if frame.positions else 0
-            knots = len(frame.positions)
-            numbers = [n for p, v in zip(frame.positions, frame.velocities, strict=True) for n in (*p, *v)]
-            body = _TRAJ.pack(frame.stream, frame.seq, frame.expires_us, frame.dt_us, knots, frame.flags)
-            body += _rows(numbers)
+            body = _chunk(frame)
         case Ack():
             kind, joints = FrameType.ACK, 0
             body = _ACK.pack(
@@ -269,6 +287,17 @@ def decode(payload: bytes) -> AnyFrame:
         raise BadFrame(f"a {FrameType(kind).name} frame of {len(payload)} bytes: {error}") from error
 
 
+def _chunk(frame: Chunk) -> bytes:
+    knots, flags, replace = len(frame.positions), frame.flags & ~REPLACE, frame.replace
+    if replace is not None:
+        flags |= REPLACE
+    numbers = [n for p, v in zip(frame.positions, frame.velocities, strict=True) for n in (*p, *v)]
+    body = _TRAJ.pack(frame.stream, frame.seq, frame.expires_us, frame.dt_us, knots, flags)
+    if replace is not None:
+        body += _REPLACE.pack(replace.from_us, replace.tail_dt_us, replace.tail, 0)
+    return body + _rows(numbers)
+
+
 def _rows(numbers: list[int] | Row) -> bytes:
     return struct.pack(f"<{len(numbers)}i", *numbers)
 
@@ -280,10 +309,14 @@ def _read_rows(body: bytes, offset: int, columns: int, rows: int) -> list[Row]:
 
 def _read_chunk(boot_id: int, joints: int, body: bytes) -> Chunk:
     stream, seq, expires_us, dt_us, knots, flags = _TRAJ.unpack_from(body)
-    rows = _read_rows(body, _TRAJ.size, joints, 2 * knots)
+    begin, replace = _TRAJ.size, None
+    if flags & REPLACE:
+        from_us, tail_dt_us, tail, _ = _REPLACE.unpack_from(body, begin)
+        begin, replace = begin + _REPLACE.size, Replacement(from_us=from_us, tail=tail, tail_dt_us=tail_dt_us)
+    rows = _read_rows(body, begin, joints, 2 * knots)
     return Chunk(
-        boot_id=boot_id, stream=stream, seq=seq, expires_us=expires_us, dt_us=dt_us, flags=flags,
-        positions=tuple(rows[0::2]), velocities=tuple(rows[1::2]),
+        boot_id=boot_id, stream=stream, seq=seq, expires_us=expires_us, dt_us=dt_us, flags=flags & ~REPLACE,
+        positions=tuple(rows[0::2]), velocities=tuple(rows[1::2]), replace=replace,
     )  # fmt: skip
 
 
