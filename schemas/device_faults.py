@@ -43,12 +43,18 @@ def fault_text(fault: int, joint: str = "") -> str:
     return str(fault_reason(fault, joint) or "")
 
 
+def meaning_and_remedy(fault: int) -> tuple[Reason, Reason]:
+    """Of the fault with that number on the wire, apart from one another."""
+    meaning = _meaning(fault)
+    return because(meaning.code), because("fault.remedy", *meaning.remedies)
+
+
 def explain(fault: int) -> FaultDescription | None:
     """The fault with that number on the wire; None for none."""
     if fault == DeviceFault.NONE:
         return None
-    meaning = _meaning(fault)
-    return FaultDescription(_name(fault), str(because(meaning.code)), str(because("fault.remedy", *meaning.remedies)))
+    meaning, mend = meaning_and_remedy(fault)
+    return FaultDescription(_name(fault), str(meaning), str(mend))
 
 
 def _meaning(fault: int) -> Reason:

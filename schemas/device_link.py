@@ -13,17 +13,21 @@ def is_old(age: float) -> bool:
     return age > OLD
 
 
-def round_trip_text(round_trip: float, age: float) -> str:
-    """`round trip 2.3 ms`, and `measured 40 s ago` where it is old: `round_trip` [s], measured `age` [s] ago."""
-    trip = f"round trip {1e3 * round_trip:.1f} ms"
-    return f"{trip}, measured {age:.0f} s ago" if is_old(age) else trip
+def round_trip(time: float, age: float) -> Reason:
+    """A round trip of `time` [s], and where that is old, that it was measured `age` [s] ago."""
+    return because("link.round_trip.old", time=time, age=age) if is_old(age) else because("link.round_trip", time=time)
+
+
+def state_round_trip(state: DeviceState, more_age: float = 0.0) -> Reason:
+    """The round trip of a state that came `more_age` [s] ago."""
+    if not state.is_round_trip_of_wire:
+        return because("link.round_trip.unmeasured")
+    return round_trip(state.round_trip, state.round_trip_age + more_age)
 
 
 def state_round_trip_text(state: DeviceState, more_age: float = 0.0) -> str:
-    """The round trip of a state that came `more_age` [s] ago."""
-    if not state.is_round_trip_of_wire:
-        return "round trip not measured"
-    return round_trip_text(state.round_trip, state.round_trip_age + more_age)
+    """As `state_round_trip`, `more_age` in [s], in a sentence."""
+    return str(state_round_trip(state, more_age))
 
 
 def deaf_for(status: DeviceStatus, now: int) -> float:
@@ -51,11 +55,6 @@ def reason_text(status: DeviceStatus, now: int) -> str:
 def why_offline(status: DeviceStatus, now: int) -> Reason:
     """As `why_not_usable`, of a device that is offline or, where its states arrive, not usable."""
     return because("device.is_not_usable" if status.speaks else "device.is_offline", why_not_usable(status, now))
-
-
-def offline_text(status: DeviceStatus, now: int) -> str:
-    """`offline: ...` or, where the device's states arrive, `not usable: ...`."""
-    return f"{offline_word(status.speaks)}: {reason_text(status, now)}"
 
 
 def offline_word(speaks: bool) -> str:

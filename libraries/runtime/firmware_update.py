@@ -12,6 +12,8 @@ from typing import NamedTuple
 import msgspec
 
 from gemelo.libraries.runtime.serial_frames import build_frame
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import because
 
 UPDATE = 18  # frame type
 PIECE = 4096  # [bytes] of an image in one frame: a sector of the flash
@@ -25,8 +27,8 @@ HEADER = _IMAGE.size + _DESCRIPTION.size  # [bytes]
 _STEP = struct.Struct("<IIB3x")
 
 
-class NoImage(ValueError):
-    """The bytes are no image of a firmware; the message says why."""
+class NoImage(ReasonedError, ValueError):
+    """The bytes are no image of a firmware; the reason says why."""
 
 
 class ImageHeader(NamedTuple):
@@ -64,13 +66,13 @@ class UpdateAck(msgspec.Struct, frozen=True, kw_only=True):
 def read_header(image: bytes) -> ImageHeader:
     """What the image says of itself; raises NoImage."""
     if len(image) < HEADER:
-        raise NoImage(f"{len(image)} bytes are too few for an image of a firmware: it has at least {HEADER}")
+        raise NoImage(because("firmware.image.short", size=len(image), least=HEADER))
     magic, chip_id = _IMAGE.unpack_from(image)
     if magic != MAGIC:
-        raise NoImage(f"its first byte is {magic:#04x}, not {MAGIC:#04x} as of every image of ESP-IDF")
+        raise NoImage(because("firmware.image.magic", byte=f"{magic:#04x}", magic=f"{MAGIC:#04x}"))
     word, version, project = _DESCRIPTION.unpack_from(image, _IMAGE.size)
     if word != DESCRIPTION_MAGIC:
-        raise NoImage("it has no description of an application: is it firmware.bin, not bootloader.bin?")
+        raise NoImage(because("firmware.image.no_application"))
     return ImageHeader(chip_id, _text(version), _text(project))
 
 

@@ -54,6 +54,7 @@ _SAME: dict[str, Written] = {
     "mm": _short(" mm", _thousand),
     "mm/s": _short(" mm/s", _thousand),
     "s": _unit("s", 3),
+    "ms": _unit("ms", 1, _thousand),
     "mrad": _short(" mrad", _thousand),
     "us": _short(" us", lambda value: 1e6 * value),
     "%": _unit("%", 0, _hundred),

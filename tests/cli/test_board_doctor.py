@@ -18,36 +18,43 @@ from gemelo.tools.cli.main import run
 
 ROM = b"ets Jul 29 2019 12:21:46\r\n\r\nrst:0x1 (POWERON_RESET),boot:0x13 (SPI_FAST_FLASH_BOOT)\r\n"
 SAID = {
-    "no firmware": (ROM + b"invalid header: 0xffffffff\r\n" * 9, "there is no firmware in its flash"),
-    "an empty ESP32 of old": (ROM + b"flash read err, 1000\r\nets_main.c 371\r\n", "there is no firmware in its flash"),
+    "no firmware": (ROM + b"invalid header: 0xffffffff\r\n" * 9, "board.empty"),
+    "an empty ESP32 of old": (ROM + b"flash read err, 1000\r\nets_main.c 371\r\n", "board.empty"),
     "small flash": (
         ROM + b"E (36) spi_flash: Detected size(4096k) smaller than the size in the binary image header(8192k).\r\n",
-        "its flash is smaller than the firmware was built for",
+        "board.small",
     ),
     "held for flashing": (
         b"ESP-ROM:esp32s3-20210327\r\nrst:0x1 (POWERON),boot:0x0 (DOWNLOAD(USB/UART0))\r\nwaiting for download\r\n",
-        "BOOT was held low while it started",
+        "board.waits",
     ),
-    "damaged": (ROM + b"E (71) esp_image: Checksum failed. Calculated 0x1 read 0x2\r\n", "holds damaged firmware"),
-    "weak supply": (ROM + b"Brownout detector was triggered\r\n", "its 3.3 V break down"),
-    "crash": (ROM + b"Guru Meditation Error: Core 0 panic'ed (LoadProhibited).\r\n", "stops with an error"),
-    "boot loop": (ROM * 5, "it starts again and again, 5 times in 3 s"),
-    "silent firmware": (ROM + b"load:0x3fff0030,len:4\r\n", "its boot loader runs, gemelo's firmware does not answer"),
-    "another firmware": (b"connecting to wifi ...\r\n" * 3, "another firmware speaks there"),
-    "wrong rate": (bytes(range(128, 256)), "what it says is no text at 921600, 115200 baud"),
-    "held in reset": (b"", "it says nothing"),
-    "noise of a plug": (b"\x00\xff", "it says nothing"),
+    "damaged": (ROM + b"E (71) esp_image: Checksum failed. Calculated 0x1 read 0x2\r\n", "board.damaged"),
+    "weak supply": (ROM + b"Brownout detector was triggered\r\n", "board.brownout"),
+    "crash": (ROM + b"Guru Meditation Error: Core 0 panic'ed (LoadProhibited).\r\n", "board.panic"),
+    "boot loop": (ROM * 5, "board.loops"),
+    "silent firmware": (ROM + b"load:0x3fff0030,len:4\r\n", "board.only_boots"),
+    "another firmware": (b"connecting to wifi ...\r\n" * 3, "board.other"),
+    "wrong rate": (bytes(range(128, 256)), "board.no_text"),
+    "held in reset": (b"", "board.silent"),
+    "noise of a plug": (b"\x00\xff", "board.silent"),
 }
 
 
 @pytest.mark.parametrize("name", SAID)
 def test_the_cause_is_told_from_what_is_heard(name):
-    data, cause = SAID[name]
+    data, code = SAID[name]
     at_wrong_rate = bytes(byte | 128 for byte in data)  # text is not read as text there
     finding = diagnose([MeasuredArrivals(921_600, at_wrong_rate[:400], None), MeasuredArrivals(115_200, data, None)])
-    assert cause in finding.cause
-    assert finding.remedy
+    assert (finding.cause.code, finding.remedy.code) == (code, f"{code}.mend")
     assert not finding.is_well
+
+
+def test_a_cause_has_the_values_that_were_measured():
+    loop = diagnose([MeasuredArrivals(921_600, b"", None), MeasuredArrivals(115_200, ROM * 5, None)])
+    assert loop.cause.values == {"count": 5, "time": 3.0}
+    no_text = bytes(range(128, 256))
+    noise = diagnose([MeasuredArrivals(921_600, no_text, None), MeasuredArrivals(115_200, no_text, None)])
+    assert noise.cause.values == {"rates": "921600, 115200"}
 
 
 def test_a_board_that_is_well_is_said_to_be():
@@ -66,7 +73,7 @@ def test_a_board_whose_memory_runs_out_is_not_well(heap, stack, said):
     status = BoardStatus(device="rm1", heap_free=71_000, heap_least=heap, stack_least=stack, stack_task="wire")
     finding = diagnose([MeasuredArrivals(921_600, b"", status)])
     assert finding.is_well == (said == "")
-    assert said in finding.remedy
+    assert said in str(finding.remedy)
 
 
 @pytest.fixture

@@ -30,6 +30,7 @@ from gemelo.schemas.deployment import Deployment, PathsSection
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.message import encode
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from gemelo.schemas.reasons import because
 from gemelo.schemas.system import Failure
 from gemelo.schemas.topics import CONTROL, CONTROL_TAKE, DEVICE_EVENTS, FOLLOW_JOINT_TRAJECTORY, GATEWAY_INPUTS, LOG
 from gemelo.services.stepper_gateway.core import GatewayCore
@@ -423,7 +424,7 @@ def test_who_it_is_is_said_in_a_sentence() -> None:
     state = ControlState(
         held=True, name="ana", node="cli-1", host="desk", since=10**18, members=("cli-1", "pick-3"), number=1
     )
-    text = describe(state, "rm1", 10**9 + 12.4)
+    text = str(describe(state, "rm1", 10**9 + 12.4))
     assert text.startswith("ana holds control of rm1 since ")
     assert text.endswith(" (12 s), from node cli-1 on desk; shared by pick-3")
-    assert describe(ControlState(), "rm1", 0.0) == "nobody holds control of rm1: everybody may move it"
+    assert describe(ControlState(), "rm1", 0.0) == because("cli.control.free", robot="rm1")

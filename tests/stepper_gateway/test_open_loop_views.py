@@ -47,8 +47,8 @@ def test_gemelo_state_shows_what_was_sent_and_no_executed_step(moved: SketchArm)
 
 def test_gemelo_device_status_says_it_beside_the_device(moved: SketchArm) -> None:
     who = device_status.who_it_is(newest(moved, "device/status"), 0)
-    assert "SENT, NOT VERIFIED" in who
-    assert "sketch" in who
+    assert (who.code, [cause.code for cause in who.causes]) == ("status.online.open_loop", ["status.open_loop"])
+    assert "sketch" in str(who.values["firmware"])
 
 
 def test_no_view_shows_a_round_trip_that_the_boards_wire_has_not_made(moved: SketchArm) -> None:

@@ -16,6 +16,7 @@ from gemelo.schemas.topics import ACTIONS, Action
 from gemelo.tools.cli.bus.messages import dump, fields_of, message_of
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown, usage
 from gemelo.tools.cli.common.forms import json_line, print_value
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import CommandSession, connect, share_control
 from gemelo.tools.cli.common.terminal import CANCELLING, two_stage_interrupt
 from gemelo.tools.cli.common.text_table import table
@@ -136,7 +137,7 @@ def send_goal(
             if interrupt.is_set and not interrupt.is_answered:
                 interrupt.is_answered = True
                 handle.cancel()
-                print(CANCELLING, file=sys.stderr if as_json else sys.stdout, flush=True)
+                print(sentence(CANCELLING), file=sys.stderr if as_json else sys.stdout, flush=True)
 
         try:
             handle = client.send(goal, on_feedback=on_feedback if with_feedback else None)

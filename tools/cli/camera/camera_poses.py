@@ -25,6 +25,7 @@ from gemelo.libraries.vision.camera_model import model_of
 from gemelo.libraries.vision.other_boards import other_board, remedy
 from gemelo.libraries.vision.rigid import Array, from_transform, rigid, to_transform
 from gemelo.schemas.camera import CameraInfo
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.bus.request_text import joints_text
 from gemelo.tools.cli.camera.camera_boards import tag_board
 from gemelo.tools.cli.camera.camera_images import Eye, Subject
@@ -136,7 +137,7 @@ def measure(arm: Arm, eye: Eye, task: Task, is_agreed: bool) -> MountFit:
     with _carrying(arm, task, belief):
         belief, chosen = _choose(arm, task, belief, start)
         _show(arm, task, chosen)
-        confirm("The arm goes there now, and looks from each. Is its way free?", is_agreed)
+        confirm(because("camera.poses.ask"), is_agreed)
         views, numbers = drive(arm, eye, task, chosen.joints)
         arm.move(joints=_named(arm, start), speed=SPEED)
     return solved([first, *views], [0, *numbers], belief)

@@ -32,6 +32,7 @@ class CommandError(Exception):
     def __init__(self, cause: Reason | BaseException | str, code: ExitCode = ExitCode.FAILED) -> None:
         """`cause`: why, as data; another's error, with its reason where it has one; or a sentence."""
         super().__init__(cause if isinstance(cause, str) else text_of(cause))
+        self.reason = None if isinstance(cause, str) else reason_of(cause)
         self.code = code
 
 
@@ -105,11 +106,11 @@ def require_name(kind: str, name: str, parts: Sequence[Input] | Sequence[Digital
 
 def text_of(cause: Reason | BaseException) -> str:
     """The sentence in the language of this command line; of an error without a code, its own."""
-    reason = _reason_of(cause)
+    reason = reason_of(cause)
     return str(cause) if reason is None else sentence(reason)
 
 
-def _reason_of(cause: Reason | BaseException) -> Reason | None:
+def reason_of(cause: Reason | BaseException) -> Reason | None:
     """What is said whole, else what an error is about; None where that has no code."""
     from gemelo.schemas.reasons import PLAIN, Reason  # 30 ms, where something is refused
 

@@ -56,6 +56,18 @@ def sentence(reason: Reason) -> str:
     return say(reason, language(), FrontEnd.COMMAND)
 
 
+def word(kind: str, name: str) -> str:
+    """One of the catalogue's words of a kind, as `word.column.joint`; `name` itself where there is none."""
+    from gemelo.schemas.reasons.catalogue import template  # 30 ms, where something is refused
+
+    return template(f"word.{kind}.{name}", language()) or name
+
+
+def columns(*names: str) -> tuple[str, ...]:
+    """The headings of a table."""
+    return tuple(word("column", name) for name in names)
+
+
 def reason_or(why: Reason | None, text: str) -> str:
     """The sentence of `why`; `text`, the same in English, where an older program sent it alone."""
     return text if why is None else sentence(why)

@@ -10,13 +10,14 @@ from contextlib import contextmanager
 from types import FrameType
 
 from gemelo.schemas.plain_text import COLOUR
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.output import control, print_coloured, unescaped
 
 UP_AND_CLEAR = "\x1b[{}F\x1b[J"
 PLAIN_EVERY = 0.25  # of the whole motion
-CANCELLING = "cancelling: the arm slows down on its path (Ctrl-C again leaves without waiting)"
+CANCELLING = because("cli.cancelling")
 ShowProgress = Callable[[float, float], None]  # elapsed [s], duration [s]
 
 
@@ -89,7 +90,9 @@ def _bar(duration: float) -> Iterator[ShowProgress]:
     from rich.console import Console  # slow to load, for a terminal alone
     from rich.progress import BarColumn, Progress, TextColumn
 
-    columns = (TextColumn("moving"), BarColumn(40), TextColumn("{task.completed:.1f} of {task.total:.1f} s"))
+    moving, of = sentence(because("cli.moving")), sentence(because("cli.of"))
+    times = TextColumn(f"{{task.completed:.1f}} {of} {{task.total:.1f}} s")
+    columns = (TextColumn(moving), BarColumn(40), times)
     with Progress(*columns, console=Console(file=unescaped(sys.stdout)), transient=True) as bar:
         task = bar.add_task("move", total=duration)
         yield lambda elapsed, whole: bar.update(task, completed=min(elapsed, whole), total=whole)
@@ -106,17 +109,17 @@ class _PlainProgress:
         if share < self._next or share >= 1.0:
             return
         self._next = (share // PLAIN_EVERY + 1.0) * PLAIN_EVERY
-        print(f"moving: {share * 100.0:.0f} %, {elapsed:.1f} of {whole:.1f} s", flush=True)
+        print(sentence(because("cli.moved", share=share, elapsed=elapsed, whole=whole)), flush=True)
 
 
-def confirm(question: str, is_answered: bool) -> None:
+def confirm(question: Reason, is_answered: bool) -> None:
     """Returns if the person says yes, or `is_answered` by --yes; raises `CommandError` otherwise."""
     if is_answered:
         return
     if not sys.stdin.isatty():
-        raise usage(because("cli.nobody_to_ask", question=question))
-    print(f"{question} [y/N] ", end="", flush=True)
-    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+        raise usage(because("cli.nobody_to_ask", question))
+    print(f"{sentence(because('cli.ask', question))} ", end="", flush=True)
+    if sys.stdin.readline().strip().lower() not in sentence(because("cli.ask.yes")).split():
         raise CommandError(because("cli.nothing_done"), ExitCode.CANCELLED)
 
 

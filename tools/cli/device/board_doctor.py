@@ -7,6 +7,7 @@ import time
 from typing import NamedTuple
 
 from gemelo.libraries.runtime.serial_frames import JsonFrame, PacketDecoder, packet, parse_json_frame, sync_frame
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.device.board_memory import memory_left, memory_low
@@ -19,7 +20,6 @@ ASK_AGAIN = 0.5  # [s]
 READABLE = 0.85  # share of text among bytes that were read at the right rate
 SPOKEN = 16  # [bytes] that are worth a judgement
 LOOP = 3  # starts within LISTENING
-MANUAL = "firmware/README.md"
 
 
 class MeasuredArrivals(NamedTuple):
@@ -33,25 +33,25 @@ class MeasuredArrivals(NamedTuple):
 class BoardDiagnosis(NamedTuple):
     """The likely cause, and what to do."""
 
-    cause: str
-    remedy: str
+    cause: Reason
+    remedy: Reason
     is_well: bool = False
+
+    @property
+    def reason(self) -> Reason:
+        """Both in one sentence."""
+        return because("board.found", self.cause, self.remedy)
 
 
 # What the boot loaders of the ESP32, S3 and C3 print, most telling first.
 SIGNS = (
-    (rb"invalid header: 0xffffffff|flash read err, 1000|No bootable app", "there is no firmware in its flash",
-     f"flash it: {MANUAL}, Build and flash"),
+    (rb"invalid header: 0xffffffff|flash read err, 1000|No bootable app", "board.empty", "board.empty.mend"),
     (rb"Detected size\(\d+k\) smaller than the size in the binary|spi flash probe failed|exceeds flash chip size",
-     "its flash is smaller than the firmware was built for",
-     "build it as firmware/platformio.ini has it, for 4 MB, and flash bootloader and firmware"),
-    (rb"waiting for download|DOWNLOAD\(|DOWNLOAD_BOOT", "it waits to be flashed: BOOT was held low while it started",
-     "release BOOT and press EN; if it stays so, something pulls the BOOT pin low: unplug what is wired to it"),
-    (rb"partition table|invalid magic number|Checksum failed|Image hash failed", "its flash holds damaged firmware",
-     f"erase it (`esptool erase-flash`), then flash all three files: {MANUAL}, Build and flash"),
-    (rb"[Bb]rownout", "its 3.3 V break down while it starts",
-     "a better 5 V supply and a shorter cable, 470 uF at 5V; nothing else on its 3.3 V"),
-    (rb"Guru Meditation|abort\(\) was called|panic", "its firmware stops with an error", "report it with these lines"),
+     "board.small", "board.small.mend"),
+    (rb"waiting for download|DOWNLOAD\(|DOWNLOAD_BOOT", "board.waits", "board.waits.mend"),
+    (rb"partition table|invalid magic number|Checksum failed|Image hash failed", "board.damaged", "board.damaged.mend"),
+    (rb"[Bb]rownout", "board.brownout", "board.brownout.mend"),
+    (rb"Guru Meditation|abort\(\) was called|panic", "board.panic", "board.panic.mend"),
 )  # fmt: skip
 START = re.compile(rb"rst:0x[0-9a-f]+ \(|ESP-ROM:")
 
@@ -66,20 +66,21 @@ def run(options: Options) -> ExitCode:
     """Listens at the firmware's rate, then at the boot loader's; prints what was heard, the cause and the remedy."""
     heard = []
     for baud in dict.fromkeys((options.baud, BOOT_BAUD)):
-        print(f"listening to {options.serial} at {baud} baud for {LISTENING:g} s ...", flush=True)
+        listening = because("board.listening", port=str(options.serial), baud=baud, time=LISTENING)
+        print(sentence(listening), flush=True)
         with open_line(options.serial, baud) as line:
             heard.append(listen(line, baud, LISTENING))
         if heard[-1].status is not None:
             break
     for line_of_text in lines_of(heard):
-        print(f"  it says: {line_of_text}")
+        print(f"  {sentence(because('board.line', text=line_of_text))}")
     if (status := heard[-1].status) is not None and (left := memory_left(status)) is not None:
-        print(f"  memory: {sentence(left)}")
+        print(f"  {sentence(because('board.memory', left))}")
     finding = diagnose(heard)
     if finding.is_well:
-        print(f"{finding.cause}: {finding.remedy}")
+        print(sentence(finding.reason))
         return ExitCode.OK
-    raise CommandError(f"{finding.cause}: {finding.remedy}")
+    raise CommandError(finding.reason)
 
 
 def listen(line: BoardLine, baud: int, seconds: float) -> MeasuredArrivals:
@@ -104,37 +105,28 @@ def diagnose(heard: list[MeasuredArrivals]) -> BoardDiagnosis:
     for each in heard:
         if each.status is not None:
             if (low := memory_low(each.status)) is not None:
-                return BoardDiagnosis("gemelo's firmware runs and answers", sentence(low))
-            return BoardDiagnosis(
-                "gemelo's firmware runs and answers", "`gemelo device provision` tells it its networks", True
-            )
+                return BoardDiagnosis(because("board.runs"), low)
+            return BoardDiagnosis(because("board.runs"), because("board.runs.next"), True)
     everything = b"\n".join(each.data for each in heard)
     for pattern, cause, remedy in SIGNS:
         if re.search(pattern, everything):
-            return BoardDiagnosis(cause, remedy)
+            return BoardDiagnosis(because(cause), because(remedy))
     starts = max(len(START.findall(each.data)) for each in heard)
     if starts >= LOOP:
-        return BoardDiagnosis(
-            f"it starts again and again, {starts} times in {LISTENING:g} s",
-            "disconnect all but USB and look again; then its supply, then flash it anew",
-        )
+        return BoardDiagnosis(because("board.loops", count=starts, time=LISTENING), because("board.loops.mend"))
     return _by_amount(heard, starts)
 
 
 def _by_amount(heard: list[MeasuredArrivals], starts: int) -> BoardDiagnosis:
     spoken = [each for each in heard if len(each.data) >= SPOKEN]
     if not spoken:
-        return BoardDiagnosis(
-            "it says nothing",
-            "press EN while this listens; then: is this its port, is the cable one for data, is it the socket marked "
-            "UART, and is EN held low by something wired to it?",
-        )
+        return BoardDiagnosis(because("board.silent"), because("board.silent.mend"))
     if starts:
-        return BoardDiagnosis("its boot loader runs, gemelo's firmware does not answer", f"flash it anew: {MANUAL}")
+        return BoardDiagnosis(because("board.only_boots"), because("board.only_boots.mend"))
     if any(_share_of_text(each.data) >= READABLE for each in spoken):
-        return BoardDiagnosis("another firmware speaks there", f"flash gemelo's: {MANUAL}, Build and flash")
+        return BoardDiagnosis(because("board.other"), because("board.other.mend"))
     rates = ", ".join(str(each.baud) for each in heard)
-    return BoardDiagnosis(f"what it says is no text at {rates} baud", "another --baud, or a bad cable or ground")
+    return BoardDiagnosis(because("board.no_text", rates=rates), because("board.no_text.mend"))
 
 
 def lines_of(heard: list[MeasuredArrivals], most: int = 6) -> list[str]:

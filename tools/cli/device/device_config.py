@@ -8,7 +8,9 @@ import msgspec
 
 import gemelo
 from gemelo.schemas.device import DeviceConfiguration
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, text_of
+from gemelo.schemas.reasons import Reason, because, plain
+from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm
 from gemelo.tools.cli.common.terminal import confirm
 from gemelo.tools.cli.parser import Options, Parser, json_option
@@ -16,7 +18,7 @@ from gemelo.tools.cli.parser import Options, Parser, json_option
 if TYPE_CHECKING:
     from gemelo import Arm
 
-QUESTION = "The drivers go off (an arm that its motors hold up may sink) and every joint has to be referenced anew."
+QUESTION = because("cli.device.config.ask")
 
 
 def add_options(parser: Parser) -> None:
@@ -41,7 +43,7 @@ def show(arm: Arm, as_json: bool) -> ExitCode:
         print(msgspec.json.encode(wanted).decode())
         return ExitCode.OK
     print(msgspec.json.format(wanted.text, indent=2))
-    print(f"crc32 {wanted.crc32:08x}, {_force(wanted)}")
+    print(sentence(because("cli.device.config.crc32", in_force(wanted), crc32=f"{wanted.crc32:08x}")))
     return ExitCode.OK
 
 
@@ -49,23 +51,23 @@ def push(arm: Arm, yes: bool) -> ExitCode:
     """Disarms, configures and arms again; asks before the drivers go off. Raises `CommandError` if refused."""
     wanted = arm.device.configuration
     if wanted.accepted:
-        print(f"nothing to do: {_force(wanted)} (crc32 {wanted.crc32:08x})")
+        print(sentence(because("cli.device.config.nothing_to_do", in_force(wanted), crc32=f"{wanted.crc32:08x}")))
         return ExitCode.OK
     was_armed = arm.device.state.armed
     try:
         crc32 = arm.device.configure(before_disarm=lambda: confirm(QUESTION, yes))
     except gemelo.Refused as error:
-        again = ", and push again" if error.check == "device" else ""
-        raise CommandError(f"{text_of(error)}{again}") from error
-    print(f"the device works with configuration {crc32:08x}")
-    if was_armed:
-        print("armed again; no joint is referenced: `gemelo home` or `gemelo reference`")
-    else:
-        print("disarmed; no joint is referenced: `gemelo device arm`, then `gemelo home` or `gemelo reference`")
+        again = because("cli.device.config.again", error.message)
+        raise CommandError(again if error.check == "device" else error) from error
+    print(sentence(because("cli.device.config.works", crc32=f"{crc32:08x}")))
+    print(sentence(because("cli.device.config.armed" if was_armed else "cli.device.config.disarmed")))
     return ExitCode.OK
 
 
-def _force(wanted: DeviceConfiguration) -> str:
+def in_force(wanted: DeviceConfiguration) -> Reason:
+    """Whether the device works with it, else why not."""
     if wanted.accepted:
-        return "in force: the device works with it"
-    return f"NOT in force: {wanted.reason or 'the device has another'}"
+        return because("cli.device.config.in_force")
+    if why := wanted.why or (plain(wanted.reason) if wanted.reason else None):
+        return because("cli.device.config.not_in_force", why)
+    return because("cli.device.config.other")

@@ -12,6 +12,7 @@ from gemelo.libraries.arm.device.device_config import device_config
 from gemelo.schemas.device_config import config_text
 from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import load_robot
 from gemelo.tools.cli.common.terminal import confirm
 from gemelo.tools.cli.device import flash_tool
@@ -68,36 +69,37 @@ def run(options: Options) -> ExitCode:
     flash_tool.find_esptool()
     port = options.serial
     build = builds[0] if len(builds) == 1 else build_for(builds, flash_tool.chip_of(port))
-    print(f"{options.image}: {build.header.project} {build.header.version} for {build.chip}", flush=True)
-    confirm(f"The firmware of the board at {port} is replaced, and its motors lose their current.", options.yes)
+    what = {"project": build.header.project, "version": build.header.version, "chip": build.chip}
+    print(sentence(because("flash.image", path=str(options.image), **what)), flush=True)
+    confirm(because("flash.ask", port=port), options.yes)
     flash(build, port, options.flash_baud)
     settle(port, options.serial_baud or BAUD, arm, credentials, config)
-    print("next: docs/my_board.md, A real arm")
+    print(sentence(because("flash.next")))
     return ExitCode.OK
 
 
 def flash(build: FirmwareBuild, port: str, baud: int) -> None:
     """Step 1: the flash."""
     size = sum(len(part.content) for part in build.parts)
-    print(f"1/3  writing {len(build.parts)} parts, {size} bytes, to {port} at {baud} baud", flush=True)
+    print(sentence(because("flash.step.write", parts=len(build.parts), size=size, port=port, baud=baud)), flush=True)
     flash_tool.write(build, port, baud, lambda line: print(f"     {line}", flush=True))
 
 
 def settle(port: str, baud: int, arm: ArmDescription, credentials: CredentialsChange, config: bytes) -> None:
     """Steps 2 and 3: name and networks, then the configuration; raises `CommandError` where the board refuses."""
-    print(f"2/3  telling it {credentials.summary()}", flush=True)
+    print(sentence(because("flash.step.networks", what=credentials.summary())), flush=True)
     with opened_again(port, BAUD) as line:
         answer = BoardExchange(line).send(credentials.text())
         if not answer.accepted:
             raise CommandError(because("flash.refused", error=answer.reason or "-"))
-    print(f"3/3  giving it the configuration of {arm.name}, {len(config)} bytes", flush=True)
+    print(sentence(because("flash.step.configuration", robot=arm.name, size=len(config))), flush=True)
     with opened_again(port, baud) as line:
         exchange = BoardExchange(line)
         exchange.configure(config)
         who = exchange.newest_status or exchange.status(STATUS_PERIOD)
     if who is None:
         raise CommandError(because("flash.silent_since", port=port))
-    print(f"it is ready: {who.device}, firmware {who.firmware}")
+    print(sentence(because("flash.ready", device=who.device, firmware=who.firmware)))
 
 
 @contextmanager

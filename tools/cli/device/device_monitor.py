@@ -10,10 +10,13 @@ import msgspec
 
 from gemelo.api.homing import joint_name
 from gemelo.schemas.device import DeviceConfiguration, DeviceEvent, DeviceState, DeviceStatus
-from gemelo.schemas.device_faults import fault_text
+from gemelo.schemas.device_faults import fault_reason
+from gemelo.schemas.device_link import why_not_usable
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.topics import DEVICE_CONFIGURATION, DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.common.forms import Form, count_options, form_of, form_options
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.terminal import LiveBlock
 from gemelo.tools.cli.common.units import positive_seconds
@@ -25,6 +28,10 @@ if TYPE_CHECKING:
     from gemelo.libraries.arm.model.description import ArmDescription
 
 REFRESH = 5.0  # [Hz]
+REFERENCED = {True: "monitor.referenced", False: "monitor.unreferenced"}
+INPUT = {True: "monitor.input.pressed", False: "monitor.input.released"}
+OUTPUT = {True: "monitor.output.on", False: "monitor.output.off"}
+COUNTERS = {"underruns": "monitor.underruns", "refused": "monitor.refused", "bad_frames": "monitor.bad_frames"}
 
 
 def add_options(parser: Parser) -> None:
@@ -37,8 +44,9 @@ def add_options(parser: Parser) -> None:
 def run(options: Options) -> ExitCode:
     """Monitors the device."""
     with connect() as session:
-        form = form_of(options, timed_line)
-        return monitor(session, options.count, options.duration, form, is_live=form is timed_line)
+        is_for_person = not (options.csv or options.json)
+        form = form_of(options, str)
+        return monitor(session, options.count, options.duration, None if is_for_person else form, is_for_person)
 
 
 class MonitorLine(msgspec.Struct, frozen=True):
@@ -48,16 +56,16 @@ class MonitorLine(msgspec.Struct, frozen=True):
     text: str
 
 
-def timed_line(change: MonitorLine) -> str:
-    """A change for a person, with the time of day."""
-    time = datetime.datetime.fromtimestamp(change.stamp / 1e9).strftime("%H:%M:%S.%f")[:-3]
-    return f"{time} {change.text}"
+def timed_line(stamp: int, change: Reason) -> str:
+    """A change for a person, with the time of day of its reception [ns UNIX]."""
+    time = datetime.datetime.fromtimestamp(stamp / 1e9).strftime("%H:%M:%S.%f")[:-3]
+    return f"{time} {sentence(change)}"
 
 
 class Monitor:
-    """Prints every change once, at most `count` of them."""
+    """Prints every change once, at most `count` of them; for a person where there is no form for a program."""
 
-    def __init__(self, session: CommandSession, block: LiveBlock, count: int | None, form: Form) -> None:
+    def __init__(self, session: CommandSession, block: LiveBlock, count: int | None, form: Form | None) -> None:
         self._session, self._block, self._count, self._form = session, block, count, form
         self._status: DeviceStatus | None = None
         self._state: DeviceState | None = None
@@ -66,12 +74,12 @@ class Monitor:
         node = session.node
         node.subscribe(DEVICE_STATUS, self._on_status)
         node.subscribe(DEVICE_CONFIGURATION, self._on_configuration)
-        node.subscribe(DEVICE_EVENTS, lambda event: self._say([event_text(event)]))
+        node.subscribe(DEVICE_EVENTS, lambda event: self._say([event_change(event)]))
         node.subscribe(DEVICE_STATE, self._on_state)
 
     def _on_status(self, status: DeviceStatus) -> None:
         before, self._status = self._status, status
-        self._say(status_changes(before, status))
+        self._say(status_changes(before, status, self._session.node.now()))
 
     def _on_configuration(self, configuration: DeviceConfiguration) -> None:
         before, self._configuration = self._configuration, configuration
@@ -81,21 +89,24 @@ class Monitor:
         before, self._state = self._state, state
         self._say(state_changes(self._session.arm, before, state))
 
-    def _say(self, lines: list[str]) -> None:
+    def _say(self, changes: Sequence[Reason]) -> None:
         now = self._session.node.now()
-        for line in lines:
+        for each in changes:
             if self._count is not None and self._said >= self._count:
                 return
             self._said += 1
-            self._block.say(self._form(MonitorLine(now, line)))
+            self._block.say(self._form(MonitorLine(now, str(each))) if self._form else timed_line(now, each))
         if self._count is not None and self._said >= self._count:
             self._session.node.stop()
 
 
 def monitor(
-    session: CommandSession, count: int | None, duration: float | None, form: Form = timed_line, is_live: bool = True
+    session: CommandSession, count: int | None, duration: float | None, form: Form | None = None, is_live: bool = True
 ) -> ExitCode:
-    """Runs until Ctrl-C, `count` lines or `duration` [s]; `is_live`: the device's status is shown below the lines."""
+    """Runs until Ctrl-C, `count` lines or `duration` [s]; `form` is None for a person.
+
+    `is_live`: the device's status is shown below the lines.
+    """
     block = LiveBlock() if is_live else LiveBlock(is_live=False)
     view = DeviceView(session)
     Monitor(session, block, count, form)
@@ -110,63 +121,68 @@ def monitor(
     return ExitCode.OK
 
 
-def status_changes(before: DeviceStatus | None, after: DeviceStatus) -> list[str]:
-    """A line if the device came online, went offline or restarted."""
-    if before is None or (before.online, before.boot_id, before.reason) != (after.online, after.boot_id, after.reason):
-        reason = f": {after.reason}" if after.reason else ""
-        boot = f", boot {after.boot_id:08x} ({after.reset_cause})" if after.online else ""
-        how = "online" if after.online else "NOT USABLE" if after.speaks else "OFFLINE"
-        return [f"{after.device or 'the device'} is {how}{boot}{reason}"]
-    return []
+def status_changes(before: DeviceStatus | None, after: DeviceStatus, now: int) -> list[Reason]:
+    """What to say at `now` [ns UNIX] if the device came online, went offline or restarted."""
+    if before is not None and (before.online, before.boot_id, before.reason) == (
+        after.online, after.boot_id, after.reason
+    ):  # fmt: skip
+        return []
+    device = after.device or "-"
+    if not after.online:
+        why = why_not_usable(after, now)
+        return [because("monitor.not_usable" if after.speaks else "monitor.offline", why, device=device)]
+    boot = {"boot": f"{after.boot_id:08x}", "cause": after.reset_cause}
+    if not after.reason:
+        return [because("monitor.online", device=device, **boot)]
+    return [because("monitor.online.but", after.why or plain(after.reason), device=device, **boot)]
 
 
-def configuration_changes(before: DeviceConfiguration | None, after: DeviceConfiguration) -> list[str]:
-    """A line if the configuration in force changed."""
+def configuration_changes(before: DeviceConfiguration | None, after: DeviceConfiguration) -> list[Reason]:
+    """What to say if the configuration in force changed."""
     known = None if before is None else (before.crc32, before.accepted, before.reason)
     if known == (after.crc32, after.accepted, after.reason):
         return []
-    said = "in force" if after.accepted else f"NOT in force: {after.reason or 'the device has another'}"
-    return [f"configuration {after.crc32:08x} {said}"]
+    crc32 = f"{after.crc32:08x}"
+    if after.accepted:
+        return [because("monitor.configuration.in_force", crc32=crc32)]
+    why = after.why or (plain(after.reason) if after.reason else because("device.configuration.changed"))
+    return [because("monitor.configuration.not_in_force", why, crc32=crc32)]
 
 
-def state_changes(arm: ArmDescription, before: DeviceState | None, after: DeviceState) -> list[str]:
-    """A line for every change of the state, steps and times left out."""
+def state_changes(arm: ArmDescription, before: DeviceState | None, after: DeviceState) -> list[Reason]:
+    """Every change of the state, steps and times left out."""
     old = before or DeviceState()
-    lines = [] if before is not None and old.mode is after.mode else [f"mode {after.mode.name}"]
-    if after.fault and (old.fault, old.fault_joint) != (after.fault, after.fault_joint):
-        lines.append(f"fault {fault_text(after.fault, joint_name(arm, after.fault_joint))}")
+    changes = [] if before is not None and old.mode is after.mode else [because("monitor.mode", mode=after.mode.name)]
+    fault = fault_reason(after.fault, joint_name(arm, after.fault_joint))
+    if fault is not None and (old.fault, old.fault_joint) != (after.fault, after.fault_joint):
+        changes.append(because("monitor.fault", fault))
     if before is None or old.armed != after.armed:
-        lines.append("drivers armed" if after.armed else "drivers disarmed")
-    lines += _referenced(old, after)
-    lines += _named("input", old.inputs, after.inputs, "PRESSED", "released")
-    lines += _named("output", old.outputs, after.outputs, "on", "off")
-    lines += [f"speed {after.speed:.0%}"] if old.speed != after.speed else []
-    counters = ("underruns", "refused", "bad_frames")
-    lines += [
-        f"{name.replace('_', ' ')} {getattr(after, name)}"
-        for name in counters
+        changes.append(because("monitor.armed" if after.armed else "monitor.disarmed"))
+    changes += _referenced(old, after)
+    changes += _named(INPUT, old.inputs, after.inputs) + _named(OUTPUT, old.outputs, after.outputs)
+    changes += [because("monitor.speed", speed=after.speed)] if old.speed != after.speed else []
+    return changes + [
+        because(code, count=getattr(after, name))
+        for name, code in COUNTERS.items()
         if before is not None and getattr(old, name) != getattr(after, name)
     ]
-    return lines
 
 
-def event_text(event: DeviceEvent) -> str:
-    """A line for an event of the device."""
-    return f"event {event.event}" + (f": {event.detail}" if event.detail else "")
+def event_change(event: DeviceEvent) -> Reason:
+    """An event of the device."""
+    if not event.detail:
+        return because("monitor.event", event=event.event)
+    return because("monitor.event.detail", event.why or plain(event.detail), event=event.event)
 
 
-def _referenced(before: DeviceState, after: DeviceState) -> list[str]:
+def _referenced(before: DeviceState, after: DeviceState) -> list[Reason]:
     old = dict(zip(before.name, before.referenced, strict=False))
     new = dict(zip(after.name, after.referenced, strict=False))
-    return [
-        f"{name} is {'referenced' if known else 'UNREFERENCED'}"
-        for name, known in new.items()
-        if old.get(name) != known
-    ]
+    return [because(REFERENCED[known], joint=name) for name, known in new.items() if old.get(name) != known]
 
 
-def _named(kind: str, before: Sequence[str], after: Sequence[str], yes: str, no: str) -> list[str]:
+def _named(codes: dict[bool, str], before: Sequence[str], after: Sequence[str]) -> list[Reason]:
     return [
-        *(f"{kind} {name} {yes}" for name in after if name not in before),
-        *(f"{kind} {name} {no}" for name in before if name not in after),
+        *(because(codes[True], name=name) for name in after if name not in before),
+        *(because(codes[False], name=name) for name in before if name not in after),
     ]

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 import gemelo
 from gemelo.schemas.device import InjectKind, InjectRequest
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, joint_of, require_name, unknown, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.units import LENGTH, TIME, parse_quantity
 from gemelo.tools.cli.parser import Choices, Options, Parser
@@ -69,7 +71,7 @@ def request_of(arm: ArmDescription, word: str, rest: Sequence[str]) -> InjectReq
         raise unknown("thing to press", word, PRESSES)
     press = PRESSES[word]
     if len(rest) != len(press.follows):
-        raise usage(f"write it as: gemelo device press {' '.join([word, *press.follows])}")
+        raise usage(because("press.form", words=" ".join([word, *press.follows])))
     return press.request(arm, rest)
 
 
@@ -79,19 +81,19 @@ def press(arm: Arm, word: str, rest: Sequence[str]) -> ExitCode:
     try:
         arm.device.inject(request.kind.value, request.target, request.value)
     except gemelo.Refused as error:
-        raise CommandError(error if error.check == "virtual" else f"press refused: {error.reason}") from error
-    print(f"{' '.join([word, *rest])}: done")
+        raise CommandError(error if error.check == "virtual" else because("press.refused", error.reason)) from error
+    print(sentence(because("press.done", words=" ".join([word, *rest]))))
     return ExitCode.OK
 
 
 def number(text: str, what: str) -> float:
-    """A finite number of `what`, in its unit; raises `CommandError` otherwise."""
+    """A finite number of `what`, a word of the catalogue or a sensor, in its unit; raises `CommandError` otherwise."""
     try:
         value = float(text)
     except ValueError:
-        raise usage(f'"{text}" is not a number of {what}') from None
+        raise usage(because("press.not_a_number", text=text, what=what)) from None
     if not math.isfinite(value):
-        raise usage(f"{text} {what} is not finite")
+        raise usage(because("press.not_finite", text=text, what=what))
     return value
 
 
@@ -99,14 +101,14 @@ def seconds(text: str) -> float:
     """A time [s] that is not negative; raises `CommandError` otherwise."""
     value = parse_quantity(text, TIME)
     if value < 0.0:
-        raise usage(f"{text} s is negative")
+        raise usage(because("press.negative", text=text))
     return value
 
 
 def _switch(arm: ArmDescription, rest: Sequence[str]) -> InjectRequest:
     name = require_name("input", rest[0], arm.inputs)
     if rest[1] not in HELD:
-        raise usage(f'a switch is held on, held off, or left on auto, not "{rest[1]}"')
+        raise usage(because("press.held", text=rest[1]))
     return InjectRequest(kind=InjectKind.SWITCH, target=name, value=HELD[rest[1]])
 
 
@@ -120,7 +122,7 @@ def _slip(arm: ArmDescription, rest: Sequence[str]) -> InjectRequest:
 
 def _sensor(arm: ArmDescription, rest: Sequence[str]) -> InjectRequest:
     name = require_name("sensor", rest[0], arm.sensors)
-    return InjectRequest(kind=InjectKind.SENSOR, target=name, value=number(rest[1], f"sensor {name}"))
+    return InjectRequest(kind=InjectKind.SENSOR, target=name, value=number(rest[1], name))
 
 
 def _object(arm: ArmDescription, rest: Sequence[str]) -> InjectRequest:

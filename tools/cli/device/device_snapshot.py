@@ -10,7 +10,8 @@ import msgspec
 from gemelo.api.homing import joint_name
 from gemelo.schemas.device import DeviceConfiguration, DeviceState, DeviceStatus, SensorReadings
 from gemelo.schemas.device_faults import FaultDescription, explain
-from gemelo.schemas.device_link import offline_text
+from gemelo.schemas.device_link import why_offline
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATE, DEVICE_STATUS, SENSORS
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.common.session import CommandSession, other_robots
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
 PATIENCE = 2.0  # [s] for the first messages
 POLL = 0.02  # [s]
 
-OPEN_LOOP = "SENT, NOT VERIFIED: this board does not say what it has executed; the positions are what it was sent"
+OPEN_LOOP = because("status.open_loop")
+IN_FORCE = "status.configuration.in_force"
 
 
 class DeviceView:
@@ -49,7 +51,7 @@ class DeviceView:
         """Waits for the first message of the device; raises `CommandError` if there is none."""
         self.wait_for(lambda: self._is_settled)
         if self.status.message is None and self.state.message is None:
-            silence = f"nothing heard of the device in {PATIENCE:g} s: is stepper_gateway running? `gemelo node list`"
+            silence = because("status.silent", time=PATIENCE)
             raise CommandError(other_robots(self.session.deployment, self.session.arm) or silence, ExitCode.NO_STACK)
 
     def require_state(self) -> DeviceState:
@@ -57,16 +59,16 @@ class DeviceView:
         self.require_heard()
         status = self.status.message
         if status is not None and not status.online:
-            raise CommandError(f"the device is {offline_text(status, self.session.node.now())}")
+            raise CommandError(why_offline(status, self.session.node.now()))
         if self.state.message is None or self.state.is_stale:
-            raise CommandError("the device says nothing of its state: `gemelo device status`", ExitCode.NO_STACK)
+            raise CommandError(because("status.no_state"), ExitCode.NO_STACK)
         return self.state.message
 
     def require_status(self) -> DeviceStatus:
         """The device's status; raises `CommandError` if nobody publishes it."""
         self.wait_for(lambda: self.status.message is not None)
         if self.status.message is None:
-            raise CommandError("nobody says who the device is: is stepper_gateway running?", ExitCode.NO_STACK)
+            raise CommandError(because("status.unknown_device"), ExitCode.NO_STACK)
         return self.status.message
 
     @property
@@ -111,6 +113,7 @@ class DeviceSnapshot(msgspec.Struct, frozen=True, kw_only=True):
     sensors: tuple[Reading, ...] = ()
     now: int = 0  # [ns] UNIX time of this snapshot
     state_age: float = 0.0  # [s]
+    configuration_why: Reason | None = None  # `configuration` as data
 
 
 def snapshot_of(view: DeviceView) -> DeviceSnapshot:
@@ -139,17 +142,17 @@ def device_snapshot(
 
     `age` [s] is that of the device's state.
     """
-    status = status or DeviceStatus(reason="nobody has said who the device is")
+    status = status or unknown_device()
     about = explain(state.fault) if state is not None else None
     about = about or FaultDescription("", "", "")
     active = frozenset(state.inputs) if state is not None else frozenset[str]()
     on = frozenset(state.outputs) if state is not None else frozenset[str]()
-    configured, said = _configured(status, configuration)
+    why = configuration_in_force(status, configuration)
     return DeviceSnapshot(
         status=status,
         state=state,
-        configured=configured,
-        configuration=said,
+        configured=why.code == IN_FORCE,
+        configuration=str(why),
         fault=about.name,
         fault_joint=joint_name(arm, state.fault_joint) if state is not None else "",
         meaning=about.meaning,
@@ -160,7 +163,14 @@ def device_snapshot(
         sensors=readings(arm, sensors),
         now=now,
         state_age=age,
+        configuration_why=why,
     )
+
+
+def unknown_device() -> DeviceStatus:
+    """The status before the first one."""
+    why = because("status.nobody")
+    return DeviceStatus(reason=str(why), why=why)
 
 
 def readings(arm: ArmDescription, sensors: SensorReadings | None) -> tuple[Reading, ...]:
@@ -170,15 +180,19 @@ def readings(arm: ArmDescription, sensors: SensorReadings | None) -> tuple[Readi
     return tuple(Reading(name=each.name, value=values.get(each.name), unit=each.unit) for each in arm.sensors)
 
 
-def _configured(status: DeviceStatus, configuration: DeviceConfiguration | None) -> tuple[bool, str]:
+def configuration_in_force(status: DeviceStatus, configuration: DeviceConfiguration | None) -> Reason:
+    """Whether the device works with what robot.toml asks for, else why not."""
     wanted = configuration.crc32 if configuration is not None else status.wanted_crc32
-    if configuration is not None and configuration.accepted:
-        return True, f"in force (crc32 {wanted:08x})"
-    if status.config_crc32 and status.config_crc32 == wanted:
-        return True, f"in force (crc32 {wanted:08x})"
-    reason = configuration.reason if configuration is not None else ""
-    has = f"the device has {status.config_crc32:08x}" if status.config_crc32 else "the device has none"
-    return False, f"NOT in force: {reason or f'{has}, robot.toml asks for {wanted:08x}; `gemelo device config --push`'}"
+    is_accepted = configuration is not None and configuration.accepted
+    if is_accepted or (status.config_crc32 and status.config_crc32 == wanted):
+        return because(IN_FORCE, crc32=f"{wanted:08x}")
+    if configuration is not None and (
+        why := configuration.why or (configuration.reason and plain(configuration.reason))
+    ):
+        return because("cli.device.config.not_in_force", why)
+    if status.config_crc32:
+        return because("status.configuration.other", crc32=f"{status.config_crc32:08x}", wanted=f"{wanted:08x}")
+    return because("status.configuration.none", wanted=f"{wanted:08x}")
 
 
 def _joint(arm: ArmDescription, name: str, state: DeviceState | None, active: frozenset[str]) -> DeviceJoint:

@@ -14,7 +14,9 @@ from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.firmware_update import ImageHeader, NoImage, leave_for_older, read_header
 from gemelo.libraries.runtime.signatures import SignatureError, make_key, sign
 from gemelo.libraries.runtime.started import load_started
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.terminal import LiveBlock
 from gemelo.tools.cli.device.provision import BAUD, open_line
 from gemelo.tools.cli.device.update_transfer import (
@@ -59,15 +61,19 @@ def run(options: Options) -> ExitCode:
         if options.make_key:
             return make(key)
         if options.file is None:
-            raise usage("which file? the image that `pio run` has built, as .pio/build/esp32/firmware.bin")
+            raise usage(because("update.which_file"))
         image, header = read_image(options.file)
         require_private(str(key))
         signature = sign(key, image)  # also that the key is good, before anything is asked of the device
     except SignatureError as error:
         raise CommandError(error) from error
     except AccessError as error:
-        raise CommandError(f"{error}; `gemelo device update --make-key` makes a key") from error
-    print(f"{options.file}: {header.project} {header.version} for {header.chip}, {len(image)} bytes", flush=True)
+        raise CommandError(because("update.key.unusable", error.reason)) from error
+    image_is = because(
+        "update.image",
+        file=str(options.file), project=header.project, version=header.version, chip=header.chip, size=len(image),
+    )  # fmt: skip
+    print(sentence(image_is), flush=True)
     with wire_of(options) as wire:
         older = key if options.downgrade else None
         return update(wire, image, signature, older)
@@ -76,11 +82,11 @@ def run(options: Options) -> ExitCode:
 def make(key: Path) -> ExitCode:
     """Makes a pair and says what to do with it."""
     if key.suffix == ".pub":
-        raise usage(f"--key {key}: .pub is the ending of the public key: give the private one another name")
+        raise usage(because("update.key.ending", key=str(key)))
     public = key.with_suffix(".pub")
     make_key(key, public)
-    print(f"{key}: the private key, for you alone; who has it can replace the firmware of your devices")
-    print(f"{public}: tell each device of it once: gemelo device provision --serial PORT --update-key {public}")
+    print(sentence(because("update.key.private", key=str(key))))
+    print(sentence(because("update.key.public", key=str(public))))
     return ExitCode.OK
 
 
@@ -90,9 +96,9 @@ def read_image(file: Path) -> tuple[bytes, ImageHeader]:
         image = file.read_bytes()
         return image, read_header(image)
     except OSError as error:
-        raise usage(f"cannot read {file}: {error.strerror}") from error
+        raise usage(because("update.file.unreadable", file=str(file), error=str(error.strerror))) from error
     except NoImage as error:
-        raise usage(f"{file}: {error}") from error
+        raise usage(because("update.file.no_image", error.reason, file=str(file))) from error
 
 
 @contextmanager
@@ -119,17 +125,15 @@ def update(wire: UpdateWire, image: bytes, signature: bytes, older: Path | None 
     """
     before = await_status(wire, TO_ANSWER, lambda _: True)
     if before is None:
-        raise CommandError(
-            f"no device has said status in {TO_ANSWER:g} s: is it switched on, and --serial or --device the right one?"
-        )
+        raise CommandError(because("update.nobody", time=TO_ANSWER))
     if before.armed:
-        raise CommandError("the device is armed: `gemelo device disarm` first, the arm must be able to do without")
+        raise CommandError(because("update.armed"))
     if older is not None:
         signature = sign(older, leave_for_older(hashlib.sha256(image).digest(), before.boot_id))
     block = LiveBlock()
-    transfer = Transfer(wire, image, signature, lambda sent: block.draw(f"{100 * sent // len(image)} % sent"))
+    transfer = Transfer(wire, image, signature, lambda sent: block.draw(_progress(sent, len(image))))
     had = transfer.run(before.boot_id)
-    block.say(f"{f'{had} bytes were there already; ' if had else ''}all of it is there; the device starts anew")
+    block.say(sentence(because("update.there.rest", size=had) if had else because("update.there")))
     after = await_status(wire, TRIAL + TO_START, lambda status: status.boot_id != before.boot_id)
     return outcome(before, after)
 
@@ -137,14 +141,15 @@ def update(wire: UpdateWire, image: bytes, signature: bytes, older: Path | None 
 def outcome(before: UpdateStatus, after: UpdateStatus | None) -> ExitCode:
     """Prints what runs now; raises `CommandError` if that is not the new firmware."""
     if after is None:
-        raise CommandError(
-            f"no word from it for {TRIAL + TO_START:g} s; it goes back to firmware {before.firmware} by itself, then "
-            "`gemelo device status` shows it; else look at it over its cable: `gemelo device doctor --serial PORT`"
-        )
+        raise CommandError(because("update.silent_since", time=TRIAL + TO_START, firmware=before.firmware))
     if after.slot == before.slot:
-        raise CommandError(
-            f"the new firmware did not say status within {TRIAL:g} s: the device has gone back to firmware "
-            f"{after.firmware} in {after.slot}"
-        )
-    print(f"it runs firmware {after.firmware} from {after.slot}; before it was {before.firmware} in {before.slot}")
+        raise CommandError(because("update.gone_back", time=TRIAL, firmware=after.firmware, slot=after.slot))
+    runs = because(
+        "update.runs", firmware=after.firmware, slot=after.slot, before=before.firmware, before_slot=before.slot
+    )
+    print(sentence(runs))
     return ExitCode.OK
+
+
+def _progress(sent: int, size: int) -> str:
+    return sentence(because("update.sent", percent=100 * sent // size))

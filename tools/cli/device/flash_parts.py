@@ -223,7 +223,7 @@ def read_image_header(image: bytes, what: str) -> ImageHeader:
     try:
         return read_header(image)
     except NoImage as error:
-        raise usage(because("flash.header", path=what, error=str(error))) from error
+        raise usage(because("flash.header", error.reason, path=what)) from error
 
 
 def _of_zip(path: Path, manifest: str) -> tuple[FirmwareBuild, ...]:

@@ -15,16 +15,16 @@ import msgspec
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.device import EchoRequest, EchoResponse
 from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import DEVICE_ECHO, JOINT_STATES, JOINT_TARGETS
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.language import columns, sentence, word
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.common.units import parse_joints
 from gemelo.tools.cli.parser import Options, Parser, positive_integer, positive_number
 
-SILENCE = "nothing heard of the arm: is stepper_gateway running? `gemelo node list`"
 PATIENCE = 2.0  # [s] for one answer, the bus included
-PUBLISHED = "29.8 ms mean at 12.5 Hz; wanted: 25 Hz, below 10 ms, jitter below 2 ms, 0 lost of 1000"
 SWING = 4.0  # [s] of one turn of --move
 SHOWN = 0.5  # [ms] of waiting; chosen: a board of ours thinks for less
 SIZE, EDGE = (720, 240), 40  # of the plot
@@ -65,7 +65,7 @@ def add_options(parser: Parser) -> None:
 def run(options: Options) -> ExitCode:
     """Measures, prints the table, writes CSV and plot."""
     if options.rate > 200.0:
-        raise usage("--rate: at most 200 Hz: the wire carries the arm's own frames too")
+        raise usage(because("link.bench.rate"))
     with connect() as session:
         swing = swinging(session, options.move) if options.move else lambda _elapsed: None
         measured = measure(session, options.rate, options.count, swing)
@@ -110,7 +110,7 @@ def swinging(session: CommandSession, assignment: str) -> Callable[[float], None
     while states.message is None and session.node.monotonic() < deadline:
         session.node.wait(0.02)
     if states.message is None:
-        raise CommandError(SILENCE, ExitCode.NO_STACK)
+        raise CommandError(because("status.silent.arm", time=PATIENCE), ExitCode.NO_STACK)
     start = dict(zip(states.message.name, states.message.position, strict=True))[name]
 
     def swing(elapsed: float) -> None:
@@ -142,14 +142,16 @@ def result_of(measured: Measured, rate: float) -> Result:
 
 def text_of(result: Result, folder: Path) -> str:
     """The table, with what the old system published beside it."""
-    rows = [("rate", f"{result.reached:.2f} Hz of {result.rate:g}"), ("lost", f"{result.lost} of {result.count}")]
+    reached = because("link.bench.reached", reached=result.reached, rate=result.rate)
+    lost = because("link.bench.lost", lost=result.lost, count=result.count)
+    rows = [(word("bench", "rate"), sentence(reached)), (word("bench", "lost"), sentence(lost))]
     for name in ("median", "mean", "p99", "jitter", "largest"):
         value = getattr(result, name)
-        rows.append((name, "-" if value is None else f"{value:.3f} ms"))
+        rows.append((word("bench", name), "-" if value is None else f"{value:.3f} ms"))
     if result.waiting is not None and result.waiting >= SHOWN:
-        rows.append(("waiting apart", f"{result.waiting:.3f} ms until the board's next line"))
-    said = table(("round trip", "measured"), rows)
-    return f"{said}\n\npublished for the old driver: {PUBLISHED}\n{folder}/link_bench.csv, link_bench.svg"
+        rows.append((word("bench", "waiting"), sentence(because("link.bench.waiting", time=result.waiting))))
+    said = table(columns("round trip", "measured"), rows)
+    return f"{said}\n\n{sentence(because('link.bench.published'))}\n{folder}/link_bench.csv, link_bench.svg"
 
 
 def write_csv(path: Path, trips: Sequence[float | None], rate: float) -> None:

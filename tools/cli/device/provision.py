@@ -21,7 +21,9 @@ from gemelo.libraries.runtime.serial_frames import (
     parse_json_frame,
     sync_frame,
 )
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.terminal import confirm
 from gemelo.tools.cli.hosts.credentials import (
     MQTT_DEVICE_PASSWORD,
@@ -86,8 +88,8 @@ def run(options: Options) -> ExitCode:
 
     if options.factory_reset:
         if any(each is not None for each in given):
-            raise usage("--factory-reset forgets everything: tell the device anew afterwards, in a command of its own")
-        confirm(f"The device at {options.serial} forgets its networks, passwords and configuration.", options.yes)
+            raise usage(because("provision.reset_alone"))
+        confirm(because("provision.ask_reset", port=str(options.serial)), options.yes)
         return provision(options.serial, options.baud, CredentialsChange(factory_reset=True))
     return provision(options.serial, options.baud, credentials_of(options, options.device))
 
@@ -105,10 +107,8 @@ def credentials_of(options: Options, device: str | None) -> CredentialsChange:
         mqtt_key=private_key(options.mqtt_key),
         update_key=update_key(options.update_key),
         serial_baud=None if options.serial_baud is None else str(options.serial_baud),
-        wifi_password=None if wifi is None else password("Wi-Fi password", WIFI_PASSWORD, os.environ),
-        mqtt_password=None
-        if mqtt is None
-        else password("MQTT password", MQTT_PASSWORD, os.environ, MQTT_DEVICE_PASSWORD),
+        wifi_password=None if wifi is None else password("wifi", WIFI_PASSWORD, os.environ),
+        mqtt_password=None if mqtt is None else password("mqtt", MQTT_PASSWORD, os.environ, MQTT_DEVICE_PASSWORD),
     )
     return require_sound(credentials)
 
@@ -153,14 +153,18 @@ def provision(port: str, baud: int, credentials: CredentialsChange) -> ExitCode:
         exchange = BoardExchange(line)
         answer = exchange.send(credentials.text())
         if not answer.accepted:
-            raise CommandError(f"the device refused: {answer.reason or 'without a reason'}")
-        said = "everything forgotten" if credentials.factory_reset else f"taken: {credentials.summary()}"
-        print(f"{said}; the device starts anew", flush=True)
+            raise CommandError(refusal(answer.reason))
+        done = because("provision.forgotten") if credentials.factory_reset else because(
+            "provision.taken", what=credentials.summary()
+        )  # fmt: skip
+        print(sentence(done), flush=True)
         who = exchange.status()
     if who is None:
-        print(f"no word from it for {TO_RESTART:g} s: look at `gemelo device status`, or at the port's own messages")
+        print(sentence(because("provision.silent_since", time=TO_RESTART)))
+    elif who.device:
+        print(sentence(because("provision.back", device=who.device, firmware=who.firmware)))
     else:
-        print(f"it is back: {who.device or 'without a name'}, firmware {who.firmware}")
+        print(sentence(because("provision.back.unnamed", firmware=who.firmware)))
     return ExitCode.OK
 
 
@@ -180,10 +184,7 @@ class BoardExchange:
         """
         ack = self._exchange(packet(json_frame(JsonFrame.PROVISION, text)), JsonFrame.PROVISION_ACK, patience, AGAIN)
         if ack is None:
-            raise CommandError(
-                f"no answer in {patience:g} s: is it the right --serial port and --baud, and does gemelo's firmware "
-                "run there? `python -m serial.tools.list_ports` lists the ports"
-            )
+            raise CommandError(because("provision.no_answer", time=patience))
         return decoded(ack, ProvisionAnswer)
 
     def configure(self, text: bytes, patience: float = PATIENCE) -> None:
@@ -195,11 +196,12 @@ class BoardExchange:
         question = packet(json_frame(JsonFrame.CONFIG, text))
         ack = self._exchange(question, JsonFrame.CONFIG_ACK, patience, AGAIN)
         if ack is None:
-            raise CommandError(f"the board does not answer its configuration in {patience:g} s")
+            raise CommandError(because("provision.configuration.unanswered", time=patience))
         answer = decoded(ack, ConfigAnswer)
         if not answer.accepted:
-            part = f"{answer.part}: " if answer.part else ""
-            raise CommandError(f"the board refuses the configuration of robot.toml: {part}{answer.reason}")
+            why = plain(answer.reason)
+            why = because("provision.part", why, part=answer.part) if answer.part else why
+            raise CommandError(because("provision.configuration.refused", why))
 
     def status(self, patience: float = TO_RESTART) -> BoardStatus | None:
         """The board's status after its restart; None if it says nothing for `patience` [s]."""
@@ -224,12 +226,17 @@ class BoardExchange:
         return None
 
 
+def refusal(reason: str) -> Reason:
+    """What the device answers, in its own words."""
+    return because("provision.refused", reason=reason) if reason else because("provision.refused.unexplained")
+
+
 def decoded(text: bytes, kind: type[T]) -> T:
     """The JSON of a frame; raises `CommandError` where it is none of that kind."""
     try:
         return msgspec.json.decode(text, type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise CommandError(f"the device answered what is no {kind.__name__}: {error}") from error
+        raise CommandError(because("provision.bad_answer", kind=kind.__name__, error=str(error))) from error
 
 
 @contextmanager
@@ -246,13 +253,10 @@ def open_line(port: str, baud: int) -> Iterator[BoardLine]:
         line.port = port
         line.open()
     except (serial.SerialException, ValueError, OSError) as error:
-        raise CommandError(
-            f"cannot open {port}: {error}; is it plugged in, may you use it (group dialout), and does no other program "
-            "(a gateway with wire = serial) hold it?"
-        ) from error
+        raise CommandError(because("provision.port.unopened", port=port, error=str(error))) from error
     try:
         yield line
     except (serial.SerialException, OSError) as error:
-        raise CommandError(f"{port} failed: {error}") from error
+        raise CommandError(because("provision.port.failed", port=port, error=str(error))) from error
     finally:
         line.close()

@@ -8,6 +8,9 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import Reason, because
+
 if TYPE_CHECKING:
     from gemelo.libraries.arm.model.description import ArmDescription, Joint
 
@@ -16,8 +19,8 @@ LARGEST = 256  # [bytes] of a message
 FARTHEST = 1.0e6  # [deg] of one message
 
 
-class RefusedMessage(ValueError):
-    """A message that is not followed; the text says why."""
+class RefusedMessage(ReasonedError, ValueError):
+    """A message that is not followed; the reason says why."""
 
 
 class RequestedMotion(NamedTuple):
@@ -25,7 +28,7 @@ class RequestedMotion(NamedTuple):
 
     moves: tuple[Fraction, ...] | None  # [steps] by joint, relative
     output: bool | None
-    objection: str = ""  # why the joints that it names do not move, though its output is switched
+    objection: Reason | None = None  # why the joints that it names do not move, though its output is switched
 
 
 class RaIntake:
@@ -75,12 +78,12 @@ class RaIntake:
         found = _object(payload)
         output = found.get(OUTPUT)
         if output is not None and (isinstance(output, str) or output not in (0, 1)):
-            raise RefusedMessage(f'"{OUTPUT}" is {output!r}: write 0 or 1')
+            raise RefusedMessage(because("ra.output", output=OUTPUT, value=repr(output)))
         missing = [name for name in self._names if name not in found]
         if len(missing) == len(self._names) and output is not None:
             return RequestedMotion(None, bool(output))
         if missing:
-            objection = f"{', '.join(missing)} missing: the sketch moves only by {', '.join(self._names)} together"
+            objection = because("ra.missing", missing=", ".join(missing), names=", ".join(self._names))
             if output is None:
                 raise RefusedMessage(objection)
             return RequestedMotion(None, bool(output), objection)
@@ -91,21 +94,21 @@ class RaIntake:
 
 def _object(payload: bytes) -> dict[str, object]:
     if len(payload) > LARGEST:
-        raise RefusedMessage(f"{len(payload)} bytes, more than the {LARGEST} of a sketch's buffer")
+        raise RefusedMessage(because("ra.long", size=len(payload), most=LARGEST))
     try:
         found = json.loads(payload)
     except (ValueError, RecursionError) as error:
-        raise RefusedMessage(f"no JSON: {payload[:40]!r}: {error}") from error
+        raise RefusedMessage(because("ra.no_json", text=repr(payload[:40]), error=str(error))) from error
     if not isinstance(found, dict):
-        raise RefusedMessage(f"no JSON object: {payload[:40]!r}")
+        raise RefusedMessage(because("ra.no_object", text=repr(payload[:40])))
     return found
 
 
 def _degrees(value: object, name: str) -> Fraction:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise RefusedMessage(f'"{name}" is {value!r}: write a number of degrees')
+        raise RefusedMessage(because("ra.not_degrees", name=name, value=repr(value)))
     if not (math.isfinite(value) and abs(value) <= FARTHEST) if isinstance(value, float) else abs(value) > FARTHEST:
-        raise RefusedMessage(f'"{name}" is {value!s:.20}: no joint turns that far in one message')
+        raise RefusedMessage(because("ra.far", name=name, value=f"{value!s:.20}"))
     return Fraction(value)
 
 
@@ -119,7 +122,8 @@ def _require_within(joint: Joint, steps: Fraction) -> None:
         return
     limit = joint.lower if position < joint.lower else joint.upper
     too_far = abs(position - limit) / joint.steps.travel_per_turn * 360.0
-    raise RefusedMessage(
-        f'joint "{joint.name}" ({joint.wire_name}) would be at {position:.4f} {joint.unit}, beyond its limit of '
-        f"{limit:.4f} {joint.unit}: {too_far:.3f} degrees too far"
-    )
+    why = because(
+        "ra.limit",
+        joint=joint.name, wire_name=joint.wire_name, position=position, limit=limit, unit=joint.unit, degrees=too_far,
+    )  # fmt: skip
+    raise RefusedMessage(why)

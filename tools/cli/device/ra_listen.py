@@ -11,8 +11,9 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from gemelo.libraries.mqtt.client import stop_loop
 from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
-from gemelo.schemas.device import DeviceCommandRequest, DeviceEvent, OutputCommand
+from gemelo.schemas.device import DeviceCommandRequest, DeviceEvent, DeviceStatus, OutputCommand
 from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_EVENTS,
@@ -21,7 +22,8 @@ from gemelo.schemas.topics import (
     JOINT_TARGETS,
     SENSORS,
 )
-from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, reason_of
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import CommandSession, connect, share_control
 from gemelo.tools.cli.device.ra_intake import OUTPUT, RaIntake, RefusedMessage
 from gemelo.tools.cli.parser import Options
@@ -41,7 +43,7 @@ def run(options: Options) -> ExitCode:
         try:
             listener.run()
         except KeyboardInterrupt:
-            print("\nno longer listening; an arm that moves slows down to rest")
+            print(f"\n{sentence(because('ra.ended'))}")
         finally:
             listener.close()
     return ExitCode.OK
@@ -65,7 +67,7 @@ class Listener:
     def run(self) -> None:
         """Follow and tell, again and again."""
         names = ", ".join(joint.wire_name for joint in self._session.arm.joints)
-        print(f"{JOINTS} moves {self._session.arm.name} now ({names}, relative degrees); Ctrl-C ends it", flush=True)
+        _print(because("ra.begun", topic=JOINTS, robot=self._session.arm.name, names=names))
         while True:
             self._session.node.wait(PERIOD)
             while not self._inbox.empty():
@@ -87,7 +89,7 @@ class Listener:
         try:
             client.connect(mqtt.host, mqtt.port, keepalive=5)
         except OSError as error:
-            raise CommandError(f"no MQTT broker answers at {mqtt.host}:{mqtt.port} ({error})") from error
+            raise CommandError(because("ra.no_broker", host=mqtt.host, port=mqtt.port, error=str(error))) from error
         client.loop_start()
         return client
 
@@ -100,16 +102,16 @@ class Listener:
         if event.event in ENDS and self._is_following:
             self._intake.forget()
             self._is_following = False
-            print(f"stopped: {event.event}: {event.detail}; the next message counts from where the arm is", flush=True)
+            _print(because("ra.stopped", event.why or plain(event.detail), event=event.event))
 
     def _take(self, payload: bytes) -> None:
         try:
             wanted = self._intake.take(payload, self._stands())
         except RefusedMessage as refused:
-            print(f"refused: {refused}", flush=True)
+            _print(because("ra.refused", refused.reason))
             return
-        if wanted.objection:
-            print(f"refused: {wanted.objection}; {OUTPUT} is switched", flush=True)
+        if wanted.objection is not None:
+            _print(because("ra.refused.switched", wanted.objection, output=OUTPUT))
         self._is_following = self._is_following or wanted.moves is not None
         if wanted.output is not None:
             self._switch(wanted.output)
@@ -118,7 +120,7 @@ class Listener:
         """[steps]; raises `RefusedMessage` while the arm cannot be moved."""
         state, status = self._state.message, self._status.message
         if state is None or status is None or not status.online or status.reason:
-            raise RefusedMessage(status.reason if status is not None else "nothing is heard of the device")
+            raise RefusedMessage(why_not_moved(status))
         if not self._is_following:
             self._intake.forget_if_elsewhere(state.steps)
         return state.steps
@@ -141,10 +143,10 @@ class Listener:
         try:
             answer = self._session.node.call(DEVICE_COMMAND, request)
         except (RequestRefused, NoAnswer) as error:
-            print(f"refused: {OUTPUT}: {error}", flush=True)
+            _print(because("ra.refused.output", reason_of(error) or plain(str(error)), output=OUTPUT))
             return
         if not answer.accepted:
-            print(f"refused: {OUTPUT}: {answer.reason}", flush=True)
+            _print(because("ra.refused.output", answer.why or plain(answer.reason), output=OUTPUT))
 
     def _tell(self) -> None:
         now, state = self._session.node.monotonic(), self._state.message
@@ -157,3 +159,14 @@ class Listener:
         if readings is not None and not self._sensors.is_stale:
             said = {name: round(value, 3) for name, value in zip(readings.name, readings.value, strict=True)}
             self._client.publish(READINGS, json.dumps({**said, "Estado": mode}))
+
+
+def why_not_moved(status: DeviceStatus | None) -> Reason:
+    """Why no message moves the arm with that status, None for one that was not received."""
+    if status is None:
+        return because("ra.silent")
+    return status.why or plain(status.reason)
+
+
+def _print(what: Reason) -> None:
+    print(sentence(what), flush=True)

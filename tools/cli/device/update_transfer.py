@@ -27,8 +27,9 @@ from gemelo.libraries.runtime.serial_frames import (
     sync_frame,
 )
 from gemelo.schemas.device_topics import topic
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
-from gemelo.tools.cli.device.provision import BoardLine
+from gemelo.tools.cli.device.provision import BoardLine, refusal
 
 ANSWER_TIME = 2.0  # [s] for a piece: the flash of a board erases and writes 4 kB in a tenth of that
 CHECK_TIME = 15.0  # [s] for the first and the last step, in which a signature or the whole image is checked
@@ -81,7 +82,7 @@ class Transfer:
             ack = self._step(UpdateStep.DATA, next_byte, piece, ANSWER_TIME)
             gaps += not ack.accepted
             if gaps > MOST_GAPS:
-                raise CommandError(f"the device has lost {gaps} pieces: {self._cut_off(next_byte)}")
+                raise CommandError(because("update.lost_pieces", self._cut_off(next_byte), count=gaps))
             next_byte = ack.next
             self._show(next_byte)
         self._step(UpdateStep.END, next_byte, b"", CHECK_TIME)
@@ -98,8 +99,8 @@ class Transfer:
             is_gap = step is not UpdateStep.BEGIN and ack.receiving and ack.next != offset
             if ack.accepted or is_gap:
                 return ack
-            raise CommandError(f"the device refused: {ack.reason or 'without a reason'}")
-        raise CommandError(f"no answer in {TRIES * patience:g} s: {self._cut_off(offset)}")
+            raise CommandError(refusal(ack.reason))
+        raise CommandError(because("update.no_answer", self._cut_off(offset), time=TRIES * patience))
 
     def _answer(self, patience: float) -> UpdateAck | None:
         deadline = time.monotonic() + patience
@@ -108,14 +109,11 @@ class Transfer:
             if isinstance(said, UpdateAck) and said.session == self._session:
                 return said
             if isinstance(said, UpdateStatus) and said.online and said.boot_id != self._boot_id:
-                raise CommandError("the device has restarted in the middle of it: give the same command again")
+                raise CommandError(because("update.restarted"))
         return None
 
-    def _cut_off(self, at: int) -> str:
-        return (
-            f"cut off at {at} of {len(self._image)} bytes; what the device runs is as before, and the same command "
-            "goes on from there while it is not restarted"
-        )
+    def _cut_off(self, at: int) -> Reason:
+        return because("update.cut_off", at=at, size=len(self._image))
 
 
 def await_status(wire: UpdateWire, patience: float, is_wanted: Callable[[UpdateStatus], bool]) -> UpdateStatus | None:
@@ -207,25 +205,27 @@ def _read(text: bytes, kind: JsonFrame) -> UpdateAck | UpdateStatus | None:
 def mqtt_wire(access: BrokerAccess, device: str) -> Iterator[MqttWire]:
     """Yields the wire to `device` once its topics are subscribed; raises `CommandError` for a broker that says no."""
     client = MqttClient(access, f"gemelo-update-{secrets.token_hex(4)}")
-    answers: queue.SimpleQueue[str] = queue.SimpleQueue()
+    answers: queue.SimpleQueue[Reason | None] = queue.SimpleQueue()
     wire = MqttWire(client, device)
     wanted = [(topic(device, kind), 1) for kind in ("update/ack", "status")]
 
     def on_connect(_client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
         if is_failure(reason):
-            answers.put(f"{access} refuses: {reason}")
+            answers.put(because("update.broker.refuses", broker=str(access), error=str(reason)))
         else:
             client.subscribe(wanted)
 
     def on_subscribe(_client: paho.Client, _data: object, _mid: int, reasons: Any, _props: object) -> None:
         denied = [topic for (topic, _), reason in zip(wanted, reasons, strict=False) if is_failure(reason)]
-        answers.put(f"{denial(denied[0], access)}; `gemelo broker secure` writes the ACL anew" if denied else "")
+        answers.put(because("update.broker.denied", denial(denied[0], access)) if denied else None)
 
     client.on_connect, client.on_subscribe = on_connect, on_subscribe
     try:
         client.connect(access.host, access.port, keepalive=5)
     except OSError as error:
-        raise CommandError(f"{access} cannot be reached: {error}", ExitCode.NO_STACK) from error
+        raise CommandError(
+            because("update.broker.unreached", broker=str(access), error=str(error)), ExitCode.NO_STACK
+        ) from error
     client.loop_start()
     try:
         complaint = answers.get(timeout=5.0)
@@ -233,7 +233,7 @@ def mqtt_wire(access: BrokerAccess, device: str) -> Iterator[MqttWire]:
             raise CommandError(complaint)
         yield wire
     except queue.Empty:
-        raise CommandError(f"{access} does not answer", ExitCode.NO_STACK) from None
+        raise CommandError(because("update.broker.silent", broker=str(access)), ExitCode.NO_STACK) from None
     finally:
         client.disconnect()
         client.loop_stop()

@@ -12,7 +12,9 @@ from gemelo.libraries.mqtt.access import AUTHORITY
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.device.provision import BAUD, PASSWORDS, provision
 from gemelo.tools.cli.hosts.credentials import WIFI_PASSWORD, CredentialsChange, certificate, password, require_sound
 from gemelo.tools.cli.parser import Options, Parser, positive_integer
@@ -45,9 +47,9 @@ def run(options: Options) -> ExitCode:
     deployment = load_started()
     devices = options.device or [load_arm(project_root() / deployment.robot).device.name]
     if options.serial and len(devices) != 1:
-        raise usage(f"--serial tells one board: give one --device, not {len(devices)}")
+        raise usage(because("provision.one_board", count=len(devices)))
     if options.wifi_ssid and not options.serial:
-        raise usage("--wifi-ssid is for a board: give its --serial too")
+        raise usage(because("provision.serial_too"))
     folder = _folder(options, deployment)
     hosts = tuple(options.host or [deployment.mqtt.host])
     port = options.port or (TLS_PORT if deployment.mqtt.port == PLAIN_PORT else deployment.mqtt.port)
@@ -73,7 +75,7 @@ def credentials_of(folder: Path, device: str, uri: str, wifi: str | None = None)
     return CredentialsChange(
         device=device,
         wifi_ssid=wifi,
-        wifi_password=None if wifi is None else password("Wi-Fi password", WIFI_PASSWORD, os.environ),
+        wifi_password=None if wifi is None else password("wifi", WIFI_PASSWORD, os.environ),
         mqtt_uri=uri,
         mqtt_user=device,
         mqtt_password=secure_folder.password_of(folder, device),
@@ -85,18 +87,18 @@ def summary(folder: Path, hosts: tuple[str, ...], port: int, devices: tuple[str,
     """What was made, without a secret, and the lines of the deployment that use it."""
     root = project_root()
     said = folder.relative_to(root) if folder.is_relative_to(root) else folder
+    made = because("broker.secure.made", folder=str(said), hosts=", ".join(hosts), devices=", ".join(devices))
     lines = [
-        f"made in {said}, for you alone: an authority (ca.pem), the broker's certificate for {', '.join(hosts)},",
-        f"an ACL, and passwords for the users gateway, {', '.join(devices)}",
-        "in deploy/local.toml, then `make up`:",
+        sentence(made),
+        sentence(because("broker.secure.deployment")),
         "  [mqtt]",
-        '  broker = "embedded" # or "mosquitto"; "external" where it runs elsewhere, with the listener below',
+        f'  broker = "embedded" # {sentence(because("broker.secure.kind"))}',
         f'  host = "{hosts[0]}"',
         f"  port = {port}",
         f'  secure_folder = "{said}"',
-        "a mosquitto that you start yourself (copy the files to where it can read them):",
+        sentence(because("broker.secure.listener")),
         *(f"  {line}" for line in (f"listener {port}\n{secure_folder.listener(folder)}").splitlines()),
     ]
     if hosts[0] in LOOPBACK:
-        lines.append("only this machine reaches that address: for a board give --host and this machine's own")
+        lines.append(sentence(because("broker.secure.loopback")))
     return "\n".join(lines)

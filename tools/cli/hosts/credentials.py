@@ -10,7 +10,9 @@ from pathlib import Path
 import msgspec
 
 from gemelo.libraries.credentials.private_files import AccessError, require_private
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import usage
+from gemelo.tools.cli.common.language import sentence
 
 WIFI_PASSWORD, MQTT_PASSWORD = "GEMELO_WIFI_PASSWORD", "GEMELO_MQTT_PASSWORD"
 MQTT_DEVICE_PASSWORD = "GEMELO_MQTT_DEVICE_PASSWORD"  # wins over the other, which is the gateway's too
@@ -46,29 +48,31 @@ class CredentialsChange(msgspec.Struct, frozen=True, kw_only=True, omit_defaults
         said = [f"{name} {value}" for name in ("device", "wifi_ssid", "mqtt_uri", "mqtt_user", "serial_baud")
                 if (value := getattr(self, name)) is not None]  # fmt: skip
         hidden = [name for name in HIDDEN if getattr(self, name) is not None]
-        return ", ".join([*said, *(f"{name} given" for name in hidden)])
+        return ", ".join([*said, *(sentence(because("provision.given", name=name)) for name in hidden)])
 
 
 def require_sound(credentials: CredentialsChange) -> CredentialsChange:
     """Returns `credentials`; raises `CommandError` for values that no board could use."""
     ssid, uri = credentials.wifi_ssid, credentials.mqtt_uri
     if ssid is not None and len(ssid.encode()) > LONGEST_SSID:
-        raise usage(f"--wifi-ssid has {len(ssid.encode())} bytes: a network's name has at most {LONGEST_SSID}")
+        raise usage(because("provision.ssid.long", size=len(ssid.encode()), most=LONGEST_SSID))
     if credentials.wifi_password and not WPA[0] <= len(credentials.wifi_password) <= WPA[1]:
-        raise usage(f"the Wi-Fi password has {len(credentials.wifi_password)} characters, not {WPA[0]} to {WPA[1]}")
+        size = len(credentials.wifi_password)
+        raise usage(because("provision.password.length", size=size, least=WPA[0], most=WPA[1]))
     if uri is not None and not uri.startswith(("mqtt://", "mqtts://")):
-        raise usage(f'--mqtt-uri "{uri}" is written as mqtt://host:1883, or mqtts://host:8883 with TLS')
+        raise usage(because("provision.uri", uri=uri))
     if credentials.serial_baud is not None and not BAUD[0] <= int(credentials.serial_baud) <= BAUD[1]:
-        raise usage(f"--serial-baud {credentials.serial_baud} is not within {BAUD[0]} to {BAUD[1]}")
+        raise usage(because("provision.baud", baud=credentials.serial_baud, least=BAUD[0], most=BAUD[1]))
     if (credentials.mqtt_certificate is None) != (credentials.mqtt_key is None):
-        raise usage("--mqtt-cert and --mqtt-key belong together: a certificate is worth nothing without its key")
+        raise usage(because("provision.certificate_alone"))
     if credentials == CredentialsChange():
-        raise usage("nothing to tell the device: give --device, --wifi-ssid, --mqtt-uri, ... or --factory-reset")
+        raise usage(because("provision.nothing"))
     return credentials
 
 
 def password(what: str, variable: str, environ: Mapping[str, str], *more: str) -> str:
-    """The password from the environment, else asked for on a terminal without echo, else a line of standard input.
+    """The password of `what`, a `word.password`: from the environment, else asked for on a terminal without echo, else
+    a line of standard input.
 
     Of the variables `more` and `variable` the first that is set counts.
     """
@@ -76,10 +80,10 @@ def password(what: str, variable: str, environ: Mapping[str, str], *more: str) -
         if name in environ:
             return environ[name]
     if sys.stdin.isatty():
-        return getpass.getpass(f"{what} (empty: none): ")
+        return getpass.getpass(f"{sentence(because('provision.password.ask', what=what))} ")
     line = sys.stdin.readline()
     if not line:
-        raise usage(f"no {what}: set ${variable}, or write it to standard input as a line")
+        raise usage(because("provision.password.none", what=what, variable=variable))
     return line.rstrip("\r\n")
 
 
@@ -96,9 +100,9 @@ def private_key(path: Path | None) -> str | None:
     try:
         require_private(str(path))
     except AccessError as error:
-        raise usage(f"--mqtt-key: {error}") from error
+        raise usage(because("provision.pem.shared", error.reason, option="--mqtt-key")) from error
     if "ENCRYPTED" in text:
-        raise usage(f"--mqtt-key: {path} is encrypted, and a board has nobody to ask: take its password away")
+        raise usage(because("provision.pem.encrypted", option="--mqtt-key", path=str(path)))
     return text
 
 
@@ -111,9 +115,9 @@ def _pem(path: Path, option: str, marker: str, what: str, longest: int = LONGEST
     try:
         text = path.read_text(encoding="ascii")
     except (OSError, UnicodeDecodeError) as error:
-        raise usage(f"{option}: cannot read {path}: {error}") from error
+        raise usage(because("provision.pem.unreadable", option=option, path=str(path), error=str(error))) from error
     if marker not in text:
-        raise usage(f"{option}: {path} holds no {what} in PEM")
+        raise usage(because("provision.pem.none", option=option, path=str(path), what=what))
     if len(text) > longest:
-        raise usage(f"{option}: {path} has {len(text)} bytes, a board keeps {longest}: take one with a P-256 key")
+        raise usage(because("provision.pem.long", option=option, path=str(path), size=len(text), most=longest))
     return text

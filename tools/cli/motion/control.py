@@ -16,8 +16,9 @@ import gemelo
 from gemelo.api import control_file
 from gemelo.libraries.runtime.process.ending import EndedBySignal, ended_by_signals
 from gemelo.schemas.control import ControlState
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.parser import Options, Parser, json_option
 
@@ -45,10 +46,10 @@ def run_give(options: Options) -> ExitCode:
     held = control_file.read(path)
     with connect_arm(robot) as arm:
         if held is None:
-            raise CommandError(because("cli.control.none_shared", path=str(path), state=words_of(arm)))
+            raise CommandError(because("cli.control.none_shared", state_of(arm), path=str(path)))
         arm.control.give_with(held.secret)
         control_file.remove(path, held.secret)
-        print(words_of(arm))
+        print(sentence(state_of(arm)))
     return ExitCode.OK
 
 
@@ -58,7 +59,7 @@ def run_who(options: Options) -> ExitCode:
         if options.json:
             print(msgspec.json.encode(arm.control.state).decode())
         else:
-            print(words_of(arm))
+            print(sentence(state_of(arm)))
     return ExitCode.OK
 
 
@@ -74,10 +75,10 @@ def take(arm: Arm, name: str, force: bool, program: Sequence[str]) -> ExitCode:
             control_file.write(path, secret, name)
             if program:
                 return _run(arm, program)
-            print(f"{words_of(arm)}\nyour commands and scripts on this host share it; Ctrl-C gives it back", flush=True)
+            print(f"{sentence(state_of(arm))}\n{sentence(because('cli.control.shared'))}", flush=True)
             arm.wait_for(lambda: not arm.control.is_mine)
         except KeyboardInterrupt:
-            print("\ngiving control back")
+            print(f"\n{sentence(because('cli.control.giving'))}")
             return ExitCode.OK
         finally:
             control_file.remove(path, secret)
@@ -85,26 +86,28 @@ def take(arm: Arm, name: str, force: bool, program: Sequence[str]) -> ExitCode:
                 with suppress(gemelo.Error):
                     arm.control.give()
     if not is_mine and not arm.control.state.given:
-        raise CommandError(because("cli.control.lost", state=words_of(arm)))
-    print(words_of(arm))
+        raise CommandError(because("cli.control.lost", state_of(arm)))
+    print(sentence(state_of(arm)))
     return ExitCode.OK
 
 
-def words_of(arm: Arm) -> str:
-    """Who holds control, in a sentence."""
+def state_of(arm: Arm) -> Reason:
+    """Who holds control."""
     return describe(arm.control.state, arm.name, time.time())
 
 
-def describe(state: ControlState, robot: str, now: float) -> str:
+def describe(state: ControlState, robot: str, now: float) -> Reason:
     """The state in a sentence; `now` [s] UNIX."""
     if not state.held:
-        return f"nobody holds control of {robot}: everybody may move it"
-    clock = time.strftime("%H:%M:%S", time.localtime(state.since * 1e-9))
-    shared = state.members[1:]  # the first is the holder itself
-    more = (f"; shared by {', '.join(shared)}" if shared else "") + (f"; {state.pending}" if state.pending else "")
-    age = max(0.0, now - state.since * 1e-9)
-    where = f"from node {state.node} on {state.host}"
-    return f"{state.name} holds control of {robot} since {clock} ({age:.0f} s), {where}{more}"
+        return because("cli.control.free", robot=robot)
+    found = because(
+        "cli.control.held",
+        name=state.name, robot=robot, clock=time.strftime("%H:%M:%S", time.localtime(state.since * 1e-9)),
+        age=max(0.0, now - state.since * 1e-9), node=state.node, host=state.host,
+    )  # fmt: skip
+    if shared := state.members[1:]:  # the first is the holder itself
+        found = because("cli.control.held.shared", found, members=", ".join(shared))
+    return because("cli.control.held.pending", found, state.why or plain(state.pending)) if state.pending else found
 
 
 def _run(arm: Arm, program: Sequence[str]) -> ExitCode:
@@ -121,7 +124,7 @@ def _run(arm: Arm, program: Sequence[str]) -> ExitCode:
         except KeyboardInterrupt:  # the terminal has told the command too
             continue
     if not arm.control.is_mine:
-        raise CommandError(because("cli.control.lost_before", program=Path(program[0]).name, state=words_of(arm)))
+        raise CommandError(because("cli.control.lost_before", state_of(arm), program=Path(program[0]).name))
     if code:
         raise CommandError(because("cli.control.ended", program=Path(program[0]).name, code=code))
     return ExitCode.OK

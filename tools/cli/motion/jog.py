@@ -72,7 +72,7 @@ def run(options: Options) -> ExitCode:
     """Jogs with the keys, or as the options say."""
     by_hand = not (options.joint or options.twist or options.turn)
     if by_hand and options.seconds is None:
-        require_terminal("give --joint or --twist, and --for so many seconds")
+        require_terminal("jog_with_options")
         with connect_arm() as arm:
             return jog_by_hand(arm)
     if by_hand or options.seconds is None:

@@ -18,7 +18,9 @@ from types import FrameType
 from typing import Protocol
 
 from gemelo.schemas.planning import JogCommand
+from gemelo.schemas.reasons import because, remedy
 from gemelo.tools.cli.common.errors import usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.units import NamedJoint
 
 HELD = 0.15  # [s] after which a key that does not repeat has been let go
@@ -68,11 +70,8 @@ class JogKeys:
     @property
     def line(self) -> str:
         """The present speed, axes and joint as a line."""
-        frame = "tool" if self.frame else "base"
-        return (
-            f"speed {self.speed * 100.0:.0f} %, along the axes of the {frame}, "
-            f"joint {self.joint + 1}: {self._joints[self.joint].name}"
-        )
+        code = "cli.jog.keys.tool" if self.frame else "cli.jog.keys.base"
+        return sentence(because(code, speed=self.speed, number=self.joint + 1, joint=self._joints[self.joint].name))
 
     def _press(self, key: str, now: float) -> None:
         self._motion = None
@@ -105,10 +104,10 @@ def _along(axis: int, sign: float, speed: float) -> tuple[float, ...]:
     return tuple(sign * speed if index == axis else 0.0 for index in range(3))
 
 
-def require_terminal(remedy: str) -> None:
-    """Raises `CommandError` with the remedy if standard input is no terminal."""
+def require_terminal(instead: str) -> None:
+    """Raises `CommandError` if standard input is no terminal; `instead` is the code of the remedy."""
     if not sys.stdin.isatty():
-        raise usage(f"there is no terminal to read keys from: {remedy}")
+        raise usage(because("cli.no_terminal", remedy(instead)))
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from gemelo.schemas.planners import NAMES
 from gemelo.schemas.planning import PlanProgress, PlanRequest
 from gemelo.tools.cli.bus.request_text import refusal_error, request_text
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.terminal import CANCELLING, LiveBlock, motion_progress
 from gemelo.tools.cli.common.units import acceleration, angle, length, rotation, seconds, share, speed
@@ -190,7 +191,7 @@ def follow(arm: Arm, plan: Plan, quiet: bool = False) -> MoveReport:
 
         def on_cancel(motion: Motion) -> None:
             if not quiet:
-                print(CANCELLING, flush=True)
+                print(sentence(CANCELLING), flush=True)
 
         try:
             motion = arm.execute(plan, detached=True, on_progress=on_progress, on_cancel=on_cancel)

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import gemelo
 from gemelo.api.errors import reason_of
 from gemelo.schemas.device import StopKind
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.topics import DEVICE_STOP
-from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, text_of
+from gemelo.tools.cli.common.language import sentence
 
 if TYPE_CHECKING:
     from gemelo import Arm
@@ -27,18 +28,18 @@ def wait_ready(arm: Arm) -> ExitCode:
     """Stops the arm at each key until q; raises `CommandError` where the connection has ended for good."""
     from gemelo.tools.cli.motion.jog_keys import keyboard, require_terminal  # for commands with keys
 
-    require_terminal("`gemelo stop` stops the arm at once")
+    require_terminal("stop_at_once")
     with keyboard() as read:
         return watch(arm, read)
 
 
 def watch(arm: Arm, read: Read) -> ExitCode:
     """As `wait_ready`; `read(timeout [s])` gives what was typed, or nothing."""
-    said = ""
+    printed = None
     while True:
-        if (now := standing(arm)) != said:
-            said = now
-            print(said, flush=True)
+        if (now := standing(arm)) != printed:
+            printed = now
+            print(sentence(now), flush=True)
         typed = read(LOOK)
         if any(key in STOPS for key in typed):
             print(stopped(arm), flush=True)
@@ -46,17 +47,17 @@ def watch(arm: Arm, read: Read) -> ExitCode:
             return ExitCode.OK
 
 
-def standing(arm: Arm) -> str:
+def standing(arm: Arm) -> Reason:
     """Whether a stop would reach the gateway now; raises `CommandError` where it never will again."""
     try:
         node = arm.node
     except gemelo.Lost as error:
         raise CommandError(because("cli.stop.again", reason_of(error)), ExitCode.NO_STACK) from error
     if not node.is_connected:
-        return "NOT READY: the router is away; this waits for it"
+        return because("cli.stop.no_router")
     if not node.is_served(DEVICE_STOP):
-        return f"NOT READY: {DEVICE_STOP.server} is not there; this waits for it"
-    return f"ready: Enter or space stops {node.robot}, q leaves"
+        return because("cli.stop.no_server", node=DEVICE_STOP.server)
+    return because("cli.stop.ready", robot=node.robot)
 
 
 def stopped(arm: Arm) -> str:
@@ -65,7 +66,7 @@ def stopped(arm: Arm) -> str:
     try:
         answer = arm.device.send(StopKind.STOP)
     except gemelo.Error as error:
-        print(f"stop: {error}", file=sys.stderr, flush=True)
-        return "stop was NOT confirmed: press again, or use the emergency stop"
+        print(f"stop: {text_of(error)}", file=sys.stderr, flush=True)
+        return sentence(because("cli.stop.unconfirmed"))
     took = (time.monotonic() - began) * 1e3
-    return f"stop done after {took:.0f} ms: device mode {answer.mode.name}"
+    return sentence(because("cli.stop.done", time=took, mode=answer.mode.name))

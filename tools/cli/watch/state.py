@@ -10,9 +10,10 @@ import msgspec
 from gemelo.libraries.arm.frames.frame_buffer import FrameBuffer, FrameError
 from gemelo.schemas.control import ControlState
 from gemelo.schemas.device import DeviceState, DeviceStatus
-from gemelo.schemas.device_link import offline_word, reason_text, round_trip_text
+from gemelo.schemas.device_link import round_trip, warning_of, why_not_usable
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.ledger import StepLedger, StoppingDistance
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.topics import (
     CONTROL,
     DEVICE_STATE,
@@ -25,6 +26,7 @@ from gemelo.schemas.topics import (
     STOPPING_DISTANCE,
 )
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import columns, sentence, word
 from gemelo.tools.cli.common.output import control
 from gemelo.tools.cli.common.session import CommandSession, connect, other_robots
 from gemelo.tools.cli.common.text_table import table
@@ -88,6 +90,8 @@ class StateSnapshot(msgspec.Struct, frozen=True):
     ledger: StepLedger | None = None
     stopping: StoppingDistance | None = None
     control: ControlState | None = None
+    why: Reason | None = None  # `reason` as data
+    warning_why: Reason | None = None  # `warning` as data
 
 
 def snapshot(
@@ -130,6 +134,7 @@ def snapshot(
         )
         for joint in arm.joints
     )  # fmt: skip
+    why = _why(status, now)
     return StateSnapshot(
         robot=arm.name,
         joints=lines,
@@ -138,7 +143,7 @@ def snapshot(
         device=status.device if status else "",
         mode=device.mode.name if device else "unknown",
         online=bool(status and status.online),
-        reason=_reason(status, now),
+        reason=str(why or ""),
         time_scale=device.time_scale if device else None,
         buffered=device.buffered if device else None,
         round_trip=device.round_trip if device and device.is_round_trip_of_wire else None,
@@ -149,50 +154,71 @@ def snapshot(
         ledger=ledger,
         control=control,
         stopping=stopping,
+        why=why,
+        warning_why=warning_of(status) if status else None,
     )
 
 
-def _reason(status: DeviceStatus | None, now: int) -> str:
+def _why(status: DeviceStatus | None, now: int) -> Reason | None:
     if status is None:
-        return "nothing heard from stepper_gateway"
-    return status.reason if status.online else reason_text(status, now)
+        return because("state.no_gateway")
+    if not status.online:
+        return why_not_usable(status, now)
+    return status.why or (plain(status.reason) if status.reason else None)
 
 
 def text_of(view: StateSnapshot) -> str:
     """The snapshot as a table and three lines."""
-    headings = ("joint", "position", "unit", "velocity [unit/s]", "commanded [steps]", "executed [steps]",
-                "error [steps]", "sure", "verified by")  # fmt: skip
-    rows = [_row(line) for line in view.joints]
-    tool = (
-        "unknown" if view.tool is None else "x {:z.2f}  y {:z.2f}  z {:z.2f} mm".format(*(v * 1e3 for v in view.tool))
-    )
-    link = "online" if view.online else f"{offline_word(view.speaks)}: {view.reason}"
-    if view.round_trip is not None:
-        link += f"{',' if view.online else ';'} {round_trip_text(view.round_trip, view.round_trip_age or 0.0)}"
-    device = f"{view.device or 'unknown'}: {view.mode}"
-    if view.time_scale is not None and view.buffered is not None:
-        device += f", time scale {view.time_scale:.2f}, {view.buffered:.2f} s of path buffered"
-    if view.online and view.reason:
-        device += f"; {view.reason}"
-    sent = f"\n\n{OPEN_LOOP}" if view.open_loop else ""
-    notes = (ledger_text(view.ledger), stopping_text(view.stopping), control_text(view.control))
-    known = "".join(f"\n{line}" for line in notes if line)
-    warning = f"\nmend   {view.warning}" if view.warning else ""
-    shown = f"{table(headings, rows)}{sent}\n\ntool {view.tool_frame}: {tool}{known}\ndevice {device}\nlink   {link}"
-    return shown + warning
+    headings = columns("joint", "position", "unit", "velocity [unit/s]", "commanded [steps]", "executed [steps]",
+                       "error [steps]", "sure", "verified by")  # fmt: skip
+    parts = [table(headings, [_row(line) for line in view.joints])]
+    parts += ["", sentence(OPEN_LOOP)] if view.open_loop else []
+    parts += ["", sentence(_tool(view))]
+    parts += filter(None, (ledger_text(view.ledger), stopping_text(view.stopping), control_text(view.control)))
+    parts += [sentence(because("state.device", _device(view))), sentence(because("state.link", _link(view)))]
+    parts += [sentence(because("state.mend", view.warning_why))] if view.warning_why is not None else []
+    return "\n".join(parts)
+
+
+def _tool(view: StateSnapshot) -> Reason:
+    if view.tool is None:
+        return because("state.tool.unknown", frame=view.tool_frame)
+    x, y, z = (1e3 * value for value in view.tool)
+    return because("state.tool", frame=view.tool_frame, x=x, y=y, z=z)
+
+
+def _device(view: StateSnapshot) -> Reason:
+    device, mode = view.device or word("device_line", "unknown"), view.mode
+    if view.time_scale is None or view.buffered is None:
+        found = because("state.device.mode", device=device, mode=mode)
+    else:
+        found = because(
+            "state.device.path", device=device, mode=mode, time_scale=view.time_scale, buffered=view.buffered
+        )
+    return because("state.device.but", found, view.why) if view.online and view.why is not None else found
+
+
+def _link(view: StateSnapshot) -> Reason:
+    code = "state.link.online" if view.online else "state.link.not_usable" if view.speaks else "state.link.offline"
+    found = because(code) if view.online or view.why is None else because(code, view.why)
+    if view.round_trip is None:
+        return found
+    trip = round_trip(view.round_trip, view.round_trip_age or 0.0)
+    return because("state.link.online.trip" if view.online else "state.link.trip", found, trip)
 
 
 def ledger_text(ledger: StepLedger | None) -> str:
     """What the step ledger means at the tool; empty before the first."""
     if ledger is None:
         return ""
+    why = ledger.why or plain(ledger.reason)
     if ledger.open_loop or not any(ledger.confidence):
-        return f"ledger the tool's error is not known: {ledger.reason}"
-    lost = f"known {1e3 * ledger.tool_error:.2f} mm, " if any(ledger.lost) else ""
-    return (
-        f"ledger tool error {lost}at most {1e3 * ledger.tool_bound:.2f} mm ({ledger.level:.0%}); "
-        f"{_percent(ledger.arm_confidence)} sure that no step is lost; {ledger.reason}"
-    )
+        return sentence(because("state.ledger.unknown", why))
+    bound, level, sure = 1e3 * ledger.tool_bound, ledger.level, _percent(ledger.arm_confidence)
+    if any(ledger.lost):
+        known = 1e3 * ledger.tool_error
+        return sentence(because("state.ledger.lost", why, known=known, bound=bound, level=level, sure=sure))
+    return sentence(because("state.ledger", why, bound=bound, level=level, sure=sure))
 
 
 def stopping_text(stopping: StoppingDistance | None) -> str:
@@ -200,18 +226,16 @@ def stopping_text(stopping: StoppingDistance | None) -> str:
     if stopping is None:
         return ""
     if not stopping.is_known:
-        return f"stop   not known how far it goes if all is lost now: {stopping.reason}"
-    return (
-        f"stop   {1e3 * stopping.distance:.1f} mm in {stopping.duration:.2f} s at most if all is lost now "
-        f"(noticed after {stopping.reaction:.2f} s)"
-    )
+        return sentence(because("state.stop.unknown", stopping.why or plain(stopping.reason)))
+    times = {"duration": stopping.duration, "reaction": stopping.reaction}
+    return sentence(because("state.stop", distance=1e3 * stopping.distance, **times))
 
 
 def control_text(control: ControlState | None) -> str:
     """Who alone may move the arm; empty where nobody has taken control."""
     if control is None or not control.held:
         return ""
-    return f"control {control.name}, node {control.node} on {control.host}: nobody else moves the arm"
+    return sentence(because("state.control", name=control.name, node=control.node, host=control.host))
 
 
 def _percent(share: float | None) -> str:
@@ -224,7 +248,7 @@ def _row(line: JointLine) -> tuple[str, ...]:
     return (
         line.name, _number(line.position, factor, 3), shown, _number(line.velocity, factor, 3),
         _number(line.commanded_steps, 1.0, 2), _number(line.executed_steps, 1.0, 0), _number(line.error_steps, 1.0, 2),
-        _percent(line.confidence), line.verified_by or "-",
+        _percent(line.confidence), word("verified", line.verified_by) or "-",
     )  # fmt: skip
 
 
@@ -310,7 +334,7 @@ def wait_for(session: CommandSession, view: StateView) -> None:
     while not view.knows_control and session.node.monotonic() < began + TO_HEAR_OF_CONTROL:
         session.node.wait(0.02)
     if view.is_empty:
-        silence = f"nothing heard of the arm in {PATIENCE:g} s: is stepper_gateway running? `gemelo node list`"
+        silence = because("status.silent.arm", time=PATIENCE)
         raise CommandError(other_robots(session.deployment, session.arm) or silence, ExitCode.NO_STACK)
 
 
