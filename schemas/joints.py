@@ -23,6 +23,7 @@ class JointTargets(Message, frozen=True, kw_only=True):
     name: tuple[str, ...] = ()
     position: Vector = ()  # [rad] or [m]
     client: str = ""  # the node whose jogging they are, where the planner writes them; empty: the writer's own
+    velocity: Vector = ()  # [rad/s] or [m/s] there; empty: estimated from the targets; zeros: a place to rest at
 
 
 class StepErrors(Message, frozen=True, kw_only=True):

@@ -39,7 +39,7 @@ class JoggedRig:
             if command is not None:
                 self.jog.on_command(command, self.rig.now)
             state = self.rig.messages(JOINT_STATES)[-1]
-            output = self.jog.step(self.rig.now, 0, state, 0.02, self.goal_is_active)
+            output = self.jog.step(self.rig.now, self.rig.moment.unix, state, 0.02, self.goal_is_active)
             if output.targets is not None:
                 self.rig.handle(TargetsInput(output.targets))
             if self.jog.commanded is not None:

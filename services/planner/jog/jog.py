@@ -215,7 +215,8 @@ class Jog:
 
     def _output(self, now: float, stamp: int, present: JointState | None, said: str) -> JogOutput:
         target = tuple(self._target().tolist())
-        targets = JointTargets(stamp=stamp, name=self._arm.joint_names, position=target)
+        rest = (0.0,) * len(target)
+        targets = JointTargets(stamp=stamp, name=self._arm.joint_names, position=target, velocity=rest)
         if np.any(self._velocity) or self._is_heard:
             self._rested = now
         elif now - self._rested > ARRIVAL or (now - self._rested > DEAD_MAN and self._has_arrived(present)):
