@@ -297,6 +297,9 @@ class CommandChunk(Message, frozen=True, kw_only=True):
     acceleration: tuple[Vector, ...] = ()  # [rad/s^2] or [m/s^2]
     steps: tuple[tuple[int, ...], ...] = ()  # [1/256 step] absolute, as on the wire
     step_rate: tuple[tuple[int, ...], ...] = ()  # [1/256 step/s] as on the wire
+    replaces: bool = False  # from `time` on the path is this one: once acknowledged, what was sent behind it is void
+    tail: int = 0  # of a chunk that replaces: so many knots at its end are the stop, if nothing more comes
+    tail_dt: float = 0.0  # [s] between these
 
 
 class GatewayInputs(Message, frozen=True, kw_only=True):

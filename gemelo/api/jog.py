@@ -103,7 +103,7 @@ class JogCommands:
 
 
 class Streaming:
-    """One connection's streamed targets. The gateway follows the newest, and brakes 0.5 s after the last."""
+    """One connection's streamed targets. The gateway follows the newest, and brakes 0.11 s after the last."""
 
     def __init__(self, session: Session) -> None:
         self._session = session

@@ -1,7 +1,11 @@
-"""Every command as a row: a knot as it was sent, and what the device answered. Pure."""
+"""Every command as a row: a knot as it was sent, and what the device answered. Pure.
+
+Of a chunk that replaces the path's end there are the rows that count: those that the next one has not replaced.
+"""
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -9,6 +13,8 @@ from datetime import UTC, datetime
 from gemelo.schemas.device import CommandAck, CommandChunk
 
 ACK_TIMEOUT = 2_000_000_000  # [ns] after which an unanswered chunk counts as lost
+OK = 0  # standard: firmware/PROTOCOL.md
+SAME_TIME = 1e-7  # [s] rounding of a stream's time
 LOST, RESENT, UNANSWERED = "lost", "resent", "unanswered"
 MAX_EARLY = 64  # answers kept for a chunk that is still on its way here
 
@@ -38,6 +44,7 @@ class CommandLog:
         self.malformed = 0  # chunks whose tables do not fit together; they are in the MCAP only
         self._pending: dict[tuple[int, int], _PendingChunk] = {}
         self._early: dict[tuple[int, int], CommandAck] = {}
+        self._replacing: tuple[CommandChunk, CommandAck] | None = None  # the newest that was taken
         self._newest: tuple[int, int] = (0, -1)  # stream, seq
         self._lines: list[CommandRow] = []
 
@@ -60,7 +67,7 @@ class CommandLog:
         if early is None or early.stamp < chunk.stamp:
             self._pending[key] = _PendingChunk(chunk, now)
         else:
-            self._lines += _lines(chunk, early, str(early.code))
+            self._take(chunk, early)
 
     def on_ack(self, ack: CommandAck) -> None:
         """Complete the rows of the chunk that is answered.
@@ -70,7 +77,7 @@ class CommandLog:
         key = ack.stream, ack.seq
         waiting = self._pending.pop(key, None)
         if waiting is not None:
-            self._lines += _lines(waiting.chunk, ack, str(ack.code))
+            self._take(waiting.chunk, ack)
             return
         self._early[key] = ack
         if len(self._early) > MAX_EARLY:
@@ -90,11 +97,33 @@ class CommandLog:
 
     def finish(self, now: int) -> list[CommandRow]:
         """All lines that are left, with those still waiting marked as unanswered."""
+        self._write_replacing()
         lines = self.step(now)
         for waiting in self._pending.values():
             lines += _lines(waiting.chunk, None, UNANSWERED)
         self._pending.clear()
         return lines
+
+    def _take(self, chunk: CommandChunk, ack: CommandAck) -> None:
+        """An answered chunk: one that replaces waits for the next one, which may void the end of it."""
+        if ack.code == OK and chunk.replaces:
+            self._write_replacing(chunk)
+            self._replacing = chunk, ack
+            return
+        if chunk.stream != (self._replacing[0].stream if self._replacing is not None else chunk.stream):
+            self._write_replacing()
+        self._lines += _lines(chunk, ack, str(ack.code))
+
+    def _write_replacing(self, following: CommandChunk | None = None) -> None:
+        """The knots of the newest up to that from which the `following` one of its stream goes on; all without one."""
+        if self._replacing is None:
+            return
+        (chunk, ack), self._replacing = self._replacing, None
+        lines = _lines(chunk, ack, str(ack.code))
+        is_cut = following is not None and following.stream == chunk.stream
+        end = following.time + SAME_TIME if following is not None and is_cut else math.inf
+        first = 0 if chunk.seq == 0 else 1  # the knot that it goes on from is in a row already
+        self._lines += [line for knot, line in enumerate(lines) if knot >= first and _time(chunk, knot) <= end]
 
     def _count_missing(self, chunk: CommandChunk) -> None:
         stream, seq = self._newest
@@ -131,8 +160,8 @@ def _lines(chunk: CommandChunk, ack: CommandAck | None, code: str) -> list[Comma
     return [
         CommandRow(
             chunk.name,
-            (*when, *_motion(chunk, knot), _words(chunk, knot), str(chunk.stream), str(knot), _time(chunk, knot),
-             stamp, code, round_trip, *executed),
+            (*when, *_motion(chunk, knot), _words(chunk, knot), str(chunk.stream), str(knot),
+             f"{_time(chunk, knot):.6f}", stamp, code, round_trip, *executed),
         )
         for knot in range(len(chunk.steps))
     ]  # fmt: skip
@@ -149,8 +178,10 @@ def _words(chunk: CommandChunk, knot: int) -> str:
     return struct.pack(f"<{len(words)}i", *words).hex()
 
 
-def _time(chunk: CommandChunk, knot: int) -> str:
-    return f"{chunk.time + knot * chunk.dt:.6f}"
+def _time(chunk: CommandChunk, knot: int) -> float:
+    """[s] of stream time."""
+    late = max(0, knot - (len(chunk.steps) - 1 - max(0, chunk.tail)))  # knots of its tail
+    return chunk.time + (knot - late) * chunk.dt + late * chunk.tail_dt
 
 
 def iso(stamp: int) -> str:

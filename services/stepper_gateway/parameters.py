@@ -14,10 +14,19 @@ class GatewayParameters(msgspec.Struct, frozen=True, kw_only=True):
     trajectory_lead: Annotated[
         float, Meta(ge=0.1, le=1.5, description="[s] of path the device holds, beyond half its stopping time")
     ] = 0.30
-    streaming_lead: Annotated[float, Meta(ge=0.06, le=1.5, description="[s] the same for streamed targets")] = 0.15
+    streaming_lead: Annotated[
+        float, Meta(ge=0.06, le=1.5, description="[s] the same for streamed targets, where a device cannot replace")
+    ] = 0.15
     stream_silence: Annotated[
-        float, Meta(ge=0.05, le=10.0, description="[s] without a target until streaming brakes to rest")
+        float, Meta(ge=0.05, le=10.0, description="[s] without a target until a stream ends, at rest")
     ] = 0.5
+    target_delay: Annotated[
+        float,
+        Meta(ge=0.0, le=0.3, description="[s] by which streamed targets are played late, between them and not ahead"),
+    ] = 0.04
+    catch_up: Annotated[
+        bool, Meta(description="an arm far behind streamed targets keeps their velocity; if not, it swings less")
+    ] = True
     goal_time_tolerance: Annotated[
         float, Meta(ge=0.1, le=600.0, description="[s] a goal may end late, where it does not say itself")
     ] = 2.0

@@ -138,3 +138,33 @@ def test_a_failed_move_stands_in_the_table_with_its_reason():
 @pytest.mark.parametrize(("position", "step"), [(0, 0), (127, 0), (128, 1), (-128, 0), (-129, -1), (25_700, 100)])
 def test_the_nearest_step_is_rounded_as_the_firmware_rounds(position, step):
     assert nearest_step(position) == step
+
+
+def replacing(seq: int, time: float, last: int) -> CommandChunk:
+    steps = ((0, 0), (last // 2, 0), (last, 0))
+    return CommandChunk(
+        stream=7, seq=seq, name=NAMES, dt=0.01, time=time, steps=steps, replaces=True, tail=1, tail_dt=0.03
+    )
+
+
+def test_a_replacement_that_was_taken_moves_the_end_also_to_an_earlier_time():
+    ledger = StepTotals()
+    for seq, time, last in ((0, 0.0, 256), (1, 0.5, 5120), (2, 0.01, 25_600)):
+        ledger.on_chunk(replacing(seq, time, last))
+        ledger.on_ack(CommandAck(stream=7, seq=seq))
+    ledger.on_chunk(replacing(3, 0.02, 99_999))
+    ledger.on_ack(CommandAck(stream=7, seq=3, code=22))
+    assert ledger.commanded["brazo_joint"] == 100
+    ledger.on_state(at_rest(7, 100, 0, played=0.05))
+    assert ledger.is_settled
+    assert ledger.lost_steps == 0
+
+
+def test_a_replacement_is_lost_only_where_no_later_one_was_taken():
+    ledger = StepTotals()
+    for seq in range(4):
+        ledger.on_chunk(replacing(seq, 0.01 * seq, 256))
+    ledger.on_ack(CommandAck(stream=7, seq=0))
+    assert ledger.chunks_lost == 3
+    ledger.on_ack(CommandAck(stream=7, seq=2))
+    assert ledger.chunks_lost == 1

@@ -140,3 +140,24 @@ def test_an_old_acknowledgement_does_not_answer_a_chunk_sent_after_it(chunk, ack
     log.on_chunk(chunk(0), START)
     log.on_ack(ack(0))
     assert {row["ack_code"] for row in table(log.step(START))} == {"0"}
+
+
+def replacing(chunk, seq, time):
+    """Five knots from `time` [s] on: two follow by 20 ms, two brake by 30 ms."""
+    return msgspec.structs.replace(chunk(seq), time=time, replaces=True, tail=2, tail_dt=0.03)
+
+
+def test_of_chunks_that_replace_one_another_the_knots_that_were_left_are_written(chunk, ack):
+    log = CommandLog()
+    for seq, time in ((0, 0.0), (1, 0.02), (2, 0.04)):
+        log.on_chunk(replacing(chunk, seq, time), START)
+        log.on_ack(ack(seq))
+    log.on_chunk(replacing(chunk, 3, 0.06), START)
+    log.on_ack(ack(3, code=22))  # late: nothing of it is played
+    rows = table(log.finish(START))
+    taken = [(row["seq"], row["knot"], row["stream_time_s"]) for row in rows if row["ack_code"] == "0"]
+    assert taken == [
+        ("0", "0", "0.000000"), ("0", "1", "0.020000"), ("1", "1", "0.040000"), ("2", "1", "0.060000"),
+        ("2", "2", "0.080000"), ("2", "3", "0.110000"), ("2", "4", "0.140000"),
+    ]  # fmt: skip
+    assert len([row for row in rows if row["ack_code"] == "22"]) == 5

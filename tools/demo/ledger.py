@@ -7,7 +7,8 @@ device has emitted. Nothing is taken from the goals of the demonstration.
 - lost steps: when the device stands and reports that it has played a stream to its end, the last knot sent for it,
   rounded to the nearest step, minus the device's count. Every step lost during the stream is still missing there.
   A stream that was stopped before its end has no such knot; its move has failed anyway.
-- chunks lost: chunks for which no `command_acks` ever said OK (or DUPLICATE, which is OK said twice).
+- chunks lost: chunks for which no `command_acks` ever said OK (or DUPLICATE, which is OK said twice). A chunk that
+  replaces the path's end is never sent again: it is not lost where a later one was taken in its place.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ class StepTotals:
         self.round_trips: list[float] = []  # [s] from sending a chunk to its acknowledgement
         self._sent: set[tuple[int, int]] = set()  # (stream, seq)
         self._acknowledged: set[tuple[int, int]] = set()
+        self._replacing: dict[tuple[int, int], CommandChunk] = {}  # (stream, seq), those that are not taken so far
+        self._taken: dict[int, int] = {}  # by stream, seq of the newest replacing one that was taken
         self._last_knot: dict[int, dict[str, int]] = {}  # by stream [1/256 step]
         self._ends: dict[int, float] = {}  # by stream, when its last knot is due [s]
         self._streams: list[int] = []  # in the order of their first chunk
@@ -42,12 +45,16 @@ class StepTotals:
         self._sent.add((message.stream, message.seq))
         if message.stream not in self._streams:
             self._streams.append(message.stream)
-        if message.steps:
+        if message.replaces:
+            self._replacing[(message.stream, message.seq)] = message
+            self._replace(message.stream, message.seq)
+        elif message.steps:
             self._keep_last_knot(message)
 
     def on_ack(self, message: CommandAck) -> None:
         if message.code in (OK, DUPLICATE):
             self._acknowledged.add((message.stream, message.seq))
+            self._replace(message.stream, message.seq)
             self.round_trips.append(message.round_trip)
 
     def on_state(self, message: DeviceState) -> None:
@@ -59,9 +66,19 @@ class StepTotals:
                 name: nearest_step(position) - self.executed[name] for name, position in knot.items()
             }
 
+    def _replace(self, stream: int, seq: int) -> None:
+        """A chunk that was sent and taken makes the path end elsewhere, perhaps sooner."""
+        if (stream, seq) not in self._acknowledged or (stream, seq) not in self._replacing:
+            return
+        message = self._replacing.pop((stream, seq))
+        if seq >= self._taken.get(stream, 0) and message.steps:
+            self._taken[stream] = seq
+            self._ends.pop(stream, None)
+            self._keep_last_knot(message)
+
     def _keep_last_knot(self, message: CommandChunk) -> None:
         """A chunk that is sent again does not take the place of a later one."""
-        end = message.time + (len(message.steps) - 1) * message.dt
+        end = message.time + (len(message.steps) - 1 - message.tail) * message.dt + message.tail * message.tail_dt
         if end >= self._ends.get(message.stream, 0.0):
             self._ends[message.stream] = end
             self._last_knot[message.stream] = dict(zip(message.name, message.steps[-1], strict=True))
@@ -80,7 +97,8 @@ class StepTotals:
 
     @property
     def chunks_lost(self) -> int:
-        return len(self._sent - self._acknowledged)
+        missing = self._sent - self._acknowledged
+        return sum(seq >= self._taken.get(stream, 0) or (stream, seq) not in self._replacing for stream, seq in missing)
 
     @property
     def is_settled(self) -> bool:

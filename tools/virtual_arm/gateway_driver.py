@@ -184,7 +184,8 @@ class GatewayDriver(ABC):
 
     def target(self, **positions: float) -> None:
         """Streams a target [rad] or [m] for the joints named."""
-        self.handle(TargetsInput(JointTargets(name=tuple(positions), position=tuple(positions.values()))))
+        stamp, names = self.moment.unix, tuple(positions)
+        self.handle(TargetsInput(JointTargets(stamp=stamp, name=names, position=tuple(positions.values()))))
 
     def command(self, kind: DeviceCommandKind, ticket: int = 1, **positions: float) -> None:
         """Asks for the command of that number, with positions [rad] or [m] of the joints named."""

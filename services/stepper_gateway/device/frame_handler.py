@@ -20,7 +20,7 @@ from gemelo.services.stepper_gateway.links.reports import (
     decode_sensors,
 )
 from gemelo.services.stepper_gateway.moment import Moment
-from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
+from gemelo.services.stepper_gateway.motion.path_version import PathPoint
 
 STOPPED = ("hold", "homing_stopped")
 BY_LOST_HEARTBEAT = "heartbeat"  # the detail of these
@@ -75,6 +75,7 @@ class FrameHandler:
                 self._device.session.require_present(frame, frame.t_us, arrival)
                 if frame.boot_id == self._device.session.boot_id:
                     self._controller.on_ack(frame, arrival, moment)
+                    self._components.streaming.on_ack(moment)
                     self._components.goals.on_ack()
             case Kind.SYNC_R, SyncReply():
                 self._device.session.on_sync_reply(frame, received.arrival // 1000)

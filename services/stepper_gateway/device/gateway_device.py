@@ -16,12 +16,13 @@ from gemelo.services.stepper_gateway.device.pending_commands import PendingComma
 from gemelo.services.stepper_gateway.device.readiness import not_ready_reason, outdated_reason
 from gemelo.services.stepper_gateway.device.reporting import Reporter
 from gemelo.services.stepper_gateway.device.session import DeviceSession
-from gemelo.services.stepper_gateway.links.frames import StateFrame
+from gemelo.services.stepper_gateway.links.frames import REPLACE_SINCE, StateFrame
 from gemelo.services.stepper_gateway.links.reports import StatusReport
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.outputs import Outbox
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
+QUEUE = 128  # [knots] of a device that does not say; standard: firmware/PROTOCOL.md
 SETTLING = 2.5  # messages; chosen: the one under way, the last one, and the word after it
 
 
@@ -43,6 +44,18 @@ class GatewayDevice:
     def state(self) -> StateFrame | None:
         """The latest state of the arm's joints; None before the first."""
         return self.session.state
+
+    @property
+    def queue_capacity(self) -> int:
+        """[knots] that the device can hold."""
+        status = self.session.status
+        return status.queue_capacity if status is not None and status.queue_capacity else QUEUE
+
+    @property
+    def replaces_paths(self) -> bool:
+        """True if a chunk may replace what the device has not played yet."""
+        status = self.session.status
+        return status is not None and status.protocol[1] >= REPLACE_SINCE and not status.open_loop
 
     @property
     def settling_time(self) -> float:

@@ -9,10 +9,18 @@ from gemelo.schemas.message import Vector
 from gemelo.schemas.robot import Dialect
 from gemelo.services.stepper_gateway.device.clock import ClockSync
 from gemelo.services.stepper_gateway.device.readiness import input_names, joint_name
-from gemelo.services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, StateFlag, StateFrame, code_name
+from gemelo.services.stepper_gateway.links.frames import (
+    Ack,
+    BadFrame,
+    Chunk,
+    Code,
+    StateFlag,
+    StateFrame,
+    code_name,
+)
 from gemelo.services.stepper_gateway.links.reports import ShaftReport
 from gemelo.services.stepper_gateway.moment import Moment
-from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
+from gemelo.services.stepper_gateway.motion.path_version import PathPoint
 from gemelo.services.stepper_gateway.motion.stream import SentChunk
 
 HALF_STEP = 0.5 + 1.0 / 256.0  # [steps] of whole steps beside the path: their rounding, and the path's own to 1/256
@@ -138,6 +146,9 @@ class Reporter:
             acceleration=tuple([knot.acceleration for knot in sent.knots]),
             steps=frame.positions,
             step_rate=frame.velocities,
+            replaces=frame.replace is not None,
+            tail=0 if frame.replace is None else frame.replace.tail,
+            tail_dt=0.0 if frame.replace is None else frame.replace.tail_dt_us * 1e-6,
         )
 
     def ack(self, ack: Ack, round_trip: float, stamp: int, steps: tuple[int, ...]) -> CommandAck:

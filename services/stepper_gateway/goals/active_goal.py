@@ -20,7 +20,7 @@ from gemelo.schemas.reasons import Reason, Value, because
 from gemelo.services.stepper_gateway.goals.goal_validator import MotionStart, ValidatedGoal
 from gemelo.services.stepper_gateway.links.frames import StateFrame
 from gemelo.services.stepper_gateway.moment import Moment
-from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
+from gemelo.services.stepper_gateway.motion.path_version import PathPoint
 from gemelo.services.stepper_gateway.motion.stream import Stream
 
 

@@ -19,9 +19,9 @@ from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, inval
 from gemelo.services.stepper_gateway.goals.scene_versions import PlannedIn, SceneVersions
 from gemelo.services.stepper_gateway.links.frames import StateFrame
 from gemelo.services.stepper_gateway.moment import Moment, next_beat
-from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
 from gemelo.services.stepper_gateway.motion.knot_sources import PathKnots
 from gemelo.services.stepper_gateway.motion.motion_controller import MotionController
+from gemelo.services.stepper_gateway.motion.path_version import PathPoint
 from gemelo.services.stepper_gateway.motion.paths import TimedPath
 from gemelo.services.stepper_gateway.outputs import GoalExecuting, GoalFinished, GoalProgress
 

@@ -29,8 +29,8 @@ from gemelo.services.stepper_gateway.ledger.tool_error import bounds, known_shif
 from gemelo.services.stepper_gateway.links.frames import StateFrame
 from gemelo.services.stepper_gateway.links.reports import EventReport
 from gemelo.services.stepper_gateway.moment import Moment
-from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
 from gemelo.services.stepper_gateway.motion.knots import whole_steps
+from gemelo.services.stepper_gateway.motion.path_version import PathPoint
 from gemelo.services.stepper_gateway.outputs import KeepLedger
 
 LEVEL = 0.95  # of the bounds that are told; chosen: the usual one of statistics

@@ -26,6 +26,8 @@ SLOTS = 0.004  # [s] that the device prepares ahead, and a slot for each decisio
 JITTER = 1.5  # chosen: times the longest round trip of late, that the device's last heartbeat may have taken one way
 STILL = 1.0  # [steps/s] chosen: slower joints stop within a step
 
+Ends = tuple[tuple[int, Knot], tuple[int, Knot]]  # of a segment: times [us] and knots
+
 
 class StoppingWatch:
     """Pure: given the moment, says what `StoppingDistance` says."""
@@ -37,7 +39,7 @@ class StoppingWatch:
         self._timeout = device_config(device.arm).hold_timeout_ms * 1e-3
         self._told = -1.0e9  # [s] monotonic
         self._stream_id, self._began = -1, 0.0  # and when its first knots may have come [s] monotonic
-        self._segments: dict[int, Segment] = {}  # of the path that waits, by the time [us] of their first knots
+        self._segments: dict[Ends, Segment] = {}  # of the path that waits, by their knots
         self._reached: tuple[Vector, Point] = ((), (0.0, 0.0, 0.0))  # joint values of the last knot, and its place
 
     def step(self, moment: Moment) -> None:
@@ -103,7 +105,7 @@ class StoppingWatch:
         scale = state.time_scale if state.stream == stream.id else 0.0
         is_held = state.mode == DeviceMode.HOLD
         top = scale if is_held else max(scale, state.speed)
-        stop = stop_on(path, self._limits, scale * scale, top, reaction, ends=stream.is_complete)
+        stop = stop_on(path, self._limits, scale * scale, top, reaction, ends=stream.comes_to_rest)
         if not is_held and scale < top - 0.02:  # slower than it may be: less far, but perhaps for longer
             stop = stop._replace(duration=max(stop.duration, reaction + self._longest_braking(path)))
         reaction = min(reaction, stop.duration)
@@ -112,9 +114,7 @@ class StoppingWatch:
     def _path(self, knots: list[tuple[int, Knot]]) -> list[Segment]:
         """Between the knots that wait; each is computed once, as a knot stays as it was sent."""
         known = self._segments
-        self._segments = {
-            first[0]: known.get(first[0]) or self._segment(first, second) for first, second in pairwise(knots)
-        }
+        self._segments = {ends: known.get(ends) or self._segment(*ends) for ends in pairwise(knots)}
         return list(self._segments.values())
 
     def _segment(self, first: tuple[int, Knot], second: tuple[int, Knot]) -> Segment:

@@ -1,99 +1,120 @@
-"""The path that was sent along one stream: the command at any played instant, exactly."""
+"""The path that was sent along one stream: the command at any played instant, exactly.
+
+Where chunks replace what comes behind one of its knots, it has versions. The device's word which chunk it wants next
+says which of them it has: an accepted replacement lies behind the point of every state that does not know it.
+"""
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from typing import NamedTuple
-
 from gemelo.services.stepper_gateway.motion.knots import Knot, StepKnot
+from gemelo.services.stepper_gateway.motion.path_version import PathPoint, PathVersion
 
 KEPT = 256  # knots behind the played one that are kept; chosen: 5 s, longer than a state is under way
 PRUNED_AT = 1024  # how many may gather before pruning; chosen: so pruning costs little for each knot
-
-
-class PathPoint(NamedTuple):
-    """The commanded path at one instant, in steps with their fraction."""
-
-    steps: tuple[float, ...]
-    rate: tuple[float, ...]  # [steps/s]
+LIMBO = 64  # versions that the device may still have taken; chosen: beyond what can be under way
+ALL = 1 << 62  # as the next chunk that the device wants: it has all of them; chosen: beyond every sequence number
 
 
 class CommandedPath:
     """The knots of a stream by stream time; cubic Hermite between them, as the device plays them."""
 
     def __init__(self) -> None:
-        self._times: list[int] = []  # [us]
-        self._steps: list[StepKnot] = []
-        self._knots: list[Knot] = []
-        self._braking: list[float] = []  # [s] from each knot to rest
+        self._versions: list[PathVersion] = [PathVersion(0)]
+        self._limbo: dict[int, PathVersion] = {}  # that the device has not taken, as it seems, by their chunk
 
     def append(self, time_us: int, steps: StepKnot, knot: Knot, braking: float) -> None:
         """`braking` [s] is how long the arm takes from the knot to rest."""
-        self._times.append(time_us)
-        self._steps.append(steps)
-        self._knots.append(knot)
-        self._braking.append(braking)
+        self.newest.append(time_us, steps, knot, braking)
+
+    def replace(self, version: PathVersion) -> None:
+        """From its first knot on the path is another one; a first version is the whole of it."""
+        if not self.newest.times:
+            self._versions.clear()
+        self._versions.append(version)
+
+    @property
+    def newest(self) -> PathVersion:
+        """As the device has it, if all that was sent arrives and is taken."""
+        return self._versions[-1]
 
     @property
     def end_us(self) -> int:
-        return self._times[-1] if self._times else 0
+        return self.newest.times[-1] if self.newest.times else 0
 
     @property
     def last(self) -> Knot:
-        return self._knots[-1]
+        return self.newest.knots[-1]
 
     @property
     def last_steps(self) -> StepKnot:
-        return self._steps[-1]
+        return self.newest.steps[-1]
 
     def knots_between(self, from_us: int, to_us: int) -> list[Knot]:
         """The knots from the one at or before `from_us` to the one at or before `to_us`."""
-        first = max(0, bisect_right(self._times, from_us) - 1)
-        return self._knots[first : bisect_right(self._times, to_us)]
+        parts = self._parts(from_us)
+        return [knot for version, end in parts for knot in version.knots[version.span(from_us, min(to_us, end))]]
 
     def count_between(self, from_us: int, to_us: int) -> int:
         """How many `knots_between` has."""
-        return bisect_right(self._times, to_us) - max(0, bisect_right(self._times, from_us) - 1)
+        return len(self.knots_between(from_us, to_us))
 
     def longest_braking(self, from_us: int, to_us: int) -> float:
         """[s] the longest that braking from one of `knots_between` to rest takes; 0 for none."""
-        first = max(0, bisect_right(self._times, from_us) - 1)
-        return max(self._braking[first : bisect_right(self._times, to_us)], default=0.0)
+        return max(version.longest_braking(from_us, min(to_us, end)) for version, end in self._parts(from_us))
 
     def upcoming(self, from_us: int) -> list[tuple[int, Knot]]:
         """Stream times [us] and knots, from the one at or before `from_us` to the last."""
-        first = max(0, bisect_right(self._times, from_us) - 1)
-        return list(zip(self._times[first:], self._knots[first:], strict=True))
+        found: list[tuple[int, Knot]] = []
+        for version, end in self._parts(from_us):
+            part = version.span(from_us, end)
+            found += zip(version.times[part], version.knots[part], strict=True)
+        return found
 
-    def at(self, time_us: int) -> PathPoint:
-        """The commanded path [steps] at `time_us` [us] of the stream, held at its ends."""
-        index = bisect_right(self._times, time_us) - 1
-        if index < 0:
-            return _rest(self._steps[0])
-        if index >= len(self._times) - 1:
-            return _rest(self._steps[-1])
-        span = self._times[index + 1] - self._times[index]
-        return _hermite(self._steps[index], self._steps[index + 1], (time_us - self._times[index]) / span, span * 1e-6)
+    def at(self, time_us: int, next_seq: int = ALL) -> PathPoint:
+        """The commanded path [steps] at `time_us` [us] of the stream, held at its ends, of a device that wants the
+        chunk `next_seq` next."""
+        return self._version_at(time_us, next_seq).at(time_us)
 
-    def prune(self, played_us: int) -> None:
-        """Forget what was played long ago."""
-        if len(self._times) > PRUNED_AT:
-            gone = max(0, bisect_right(self._times, played_us) - KEPT)
-            del self._times[:gone], self._steps[:gone], self._knots[:gone], self._braking[:gone]
+    def forget(self, first: int, last: int) -> None:
+        """The device has not taken these chunks, as it seems, and so takes none that goes on from their knots."""
+        gone = [version for version in self._versions[1:] if first <= version.seq <= last]
+        if gone:
+            from_us = min(version.times[0] for version in gone)
+            gone += [v for v in self._versions[1:] if v.seq > last and v.times[0] > from_us]
+        self._versions = [version for version in self._versions if version not in gone]
+        self._limbo |= {version.seq: version for version in gone}
+        while len(self._limbo) > LIMBO:
+            del self._limbo[next(iter(self._limbo))]
 
+    def revive(self, seq: int) -> None:
+        """The device has taken that chunk after all."""
+        if (version := self._limbo.pop(seq, None)) is not None:
+            self._versions = sorted((*self._versions, version), key=lambda each: each.seq)
 
-def _rest(knot: StepKnot) -> PathPoint:
-    return PathPoint(tuple(p / 256.0 for p in knot.position), (0.0,) * len(knot.position))
+    def prune(self, played_us: int, next_seq: int = ALL) -> None:
+        """Forget what was played long ago: no later state is of a version before that of this one."""
+        oldest = self._version_at(played_us, next_seq)
+        if oldest is not self._versions[0]:
+            del self._versions[: self._versions.index(oldest)]
+            self._limbo = {seq: version for seq, version in self._limbo.items() if seq > oldest.seq}
+        if len(oldest.times) > PRUNED_AT:
+            oldest.prune(played_us, KEPT)
 
+    def _version_at(self, time_us: int, next_seq: int) -> PathVersion:
+        for version in reversed(self._versions):
+            if version.seq < next_seq and version.times and version.times[0] <= time_us:
+                return version
+        return self._versions[0]
 
-def _hermite(first: StepKnot, second: StepKnot, u: float, span: float) -> PathPoint:
-    """`u` in [0, 1] of the segment, which lasts `span` seconds."""
-    h00, h10 = (1.0 + 2.0 * u) * (1.0 - u) ** 2, u * (1.0 - u) ** 2
-    h01, h11 = u * u * (3.0 - 2.0 * u), u * u * (u - 1.0)
-    d00, d10, d11 = 6.0 * u * (u - 1.0), (1.0 - u) * (1.0 - 3.0 * u), u * (3.0 * u - 2.0)
-    steps, rate = [], []
-    for p0, v0, p1, v1 in zip(first.position, first.velocity, second.position, second.velocity, strict=True):
-        m0, m1 = v0 * span, v1 * span
-        steps.append((h00 * p0 + h10 * m0 + h01 * p1 + h11 * m1) / 256.0)
-        rate.append((d00 * (p0 - p1) + d10 * m0 + d11 * m1) / span / 256.0)
-    return PathPoint(tuple(steps), tuple(rate))
+    def _parts(self, from_us: int) -> list[tuple[PathVersion, int]]:
+        """The versions that the path is made of from `from_us` [us] on, each with the last time [us] of its own."""
+        parts: list[tuple[PathVersion, int]] = []
+        end = ALL
+        for version in reversed(self._versions):
+            begin = version.times[0] if version.times else 0
+            if begin < end:
+                parts.append((version, end - 1))
+                end = begin
+            if begin <= from_us:
+                break
+        return parts[::-1]

@@ -13,9 +13,10 @@ from gemelo.services.stepper_gateway.goals.goal_validator import MotionStart
 from gemelo.services.stepper_gateway.links.frames import Ack, Chunk, StateFrame, encode
 from gemelo.services.stepper_gateway.links.link import Kind
 from gemelo.services.stepper_gateway.moment import Moment
-from gemelo.services.stepper_gateway.motion.commanded_path import PathPoint
 from gemelo.services.stepper_gateway.motion.knot_sources import KnotSource
 from gemelo.services.stepper_gateway.motion.knots import Knot, whole_steps
+from gemelo.services.stepper_gateway.motion.live_stream import LiveStream
+from gemelo.services.stepper_gateway.motion.path_version import PathPoint
 from gemelo.services.stepper_gateway.motion.stream import SentChunk, Stream
 from gemelo.services.stepper_gateway.motion.transmission import MotionTransmission
 
@@ -107,13 +108,24 @@ class MotionController:
 
     def begin(self, motion: KnotSource, position: Vector, moment: Moment) -> Stream:
         """A new stream from rest at `position` [rad] or [m]; its first chunk leaves at once."""
-        status = self._device.session.status
-        capacity = status.queue_capacity if status is not None and status.queue_capacity else 128
-        self._device.reporter.motion_begins()
-        self._stopped_us, self._awaits_stop = -1, False
-        stream = self.transmission.begin(motion, Knot.at_rest(position), self._device.session.boot_id, capacity)
+        self._begins()
+        boot_id, capacity = self._device.session.boot_id, self._device.queue_capacity
+        stream = self.transmission.begin(motion, Knot.at_rest(position), boot_id, capacity)
         self.pump(moment)
         return stream
+
+    def begin_live(self) -> LiveStream:
+        """A new stream from rest whose chunks replace one another; `replace` sends them."""
+        self._begins()
+        return self.transmission.begin_live(self._device.session.boot_id, self._device.queue_capacity)
+
+    def replace(self, stream: LiveStream, chunk: SentChunk, moment: Moment) -> None:
+        """Send one chunk of a live stream."""
+        self._send([(stream.frame(chunk, moment, self._device.session.clock), chunk)], moment)
+
+    def _begins(self) -> None:
+        self._device.reporter.motion_begins()
+        self._stopped_us, self._awaits_stop = -1, False
 
     def pump(self, moment: Moment) -> None:
         """Send what is due of the present stream."""
@@ -152,7 +164,7 @@ class MotionController:
         stream = self.stream
         if stream is None or state.stream != stream.id:
             return PathPoint(tuple(float(count) for count in state.steps), (0.0,) * len(state.steps))
-        return stream.commanded(state.play_us)
+        return stream.commanded(state)
 
     def rest_position(self) -> Vector:
         """[rad] or [m] where the arm rests: the path's own end if the device stands on it, else its step counts."""

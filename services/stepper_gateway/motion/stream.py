@@ -16,12 +16,14 @@ from gemelo.services.stepper_gateway.links.frames import (
     Chunk,
     ChunkFlag,
     Code,
+    Replacement,
     StateFrame,
     code_name,
 )
 from gemelo.services.stepper_gateway.moment import Moment
-from gemelo.services.stepper_gateway.motion.commanded_path import CommandedPath, PathPoint
+from gemelo.services.stepper_gateway.motion.commanded_path import CommandedPath
 from gemelo.services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot, braking_time
+from gemelo.services.stepper_gateway.motion.path_version import PathPoint
 
 TIME_TO_LIVE = 1_000_000  # [us] after which the device is to refuse a chunk; chosen: beyond any lead
 RETRY_MIN, RETRY_MAX = 0.06, 0.3  # [s] until a chunk is sent again; chosen: three knots, and about the lead
@@ -45,6 +47,7 @@ class SentChunk:
     steps: list[StepKnot]
     knots: list[Knot]
     time_us: int  # of its first knot along the stream
+    replace: Replacement | None = None  # set: what the device has behind its first knot is void
     sent: float = 0.0  # [s] monotonic, the last time
 
 
@@ -75,6 +78,16 @@ class Stream:
     def end_us(self) -> int:
         """Stream time of the last knot sent."""
         return self.log.end_us
+
+    @property
+    def is_open(self) -> bool:
+        """True if knots can still be added."""
+        return not (self.is_complete or self.is_abandoned)
+
+    @property
+    def comes_to_rest(self) -> bool:
+        """True if the knots that were sent end at rest."""
+        return self.is_complete
 
     @property
     def is_finished(self) -> bool:
@@ -119,6 +132,7 @@ class Stream:
             flags=chunk.flags,
             positions=tuple(step.position for step in chunk.steps),
             velocities=tuple(step.velocity for step in chunk.steps),
+            replace=chunk.replace,
         )
 
     def on_ack(self, ack: Ack, arrival: float) -> tuple[float, list[SentChunk]]:
@@ -126,8 +140,7 @@ class Stream:
 
         Raises `BadFrame` for the answer to a chunk that was never sent.
         """
-        if ack.seq >= self.next_seq or (ack.code != Code.WRONG_STREAM and ack.next_seq > self.next_seq):
-            raise BadFrame(f"an answer to chunk {max(ack.seq, ack.next_seq - 1)}, of {self.next_seq} that were sent")
+        self._require_sent(ack)
         chunk = next((c for c in self.unacked if c.seq == ack.seq), None)
         round_trip = arrival - chunk.sent if chunk is not None else 0.0
         if chunk is not None:
@@ -164,9 +177,9 @@ class Stream:
         since = max(0, clock.device_time(now) - self._play.t_us)
         return min(self.end_us, self._play.play_us + int(since * self._play.time_scale))
 
-    def commanded(self, play_us: int) -> PathPoint:
-        """The path [steps] at `play_us` [us]."""
-        return self.log.at(play_us)
+    def commanded(self, state: StateFrame) -> PathPoint:
+        """The path [steps] at the instant of `state`."""
+        return self.log.at(state.play_us)
 
     def credits(self, played_us: int) -> int:
         """Knots that may be sent."""
@@ -174,6 +187,11 @@ class Stream:
             return max(0, self._credits)
         waiting = self.log.count_between(played_us, self.end_us)
         return max(self._credits, self.capacity - waiting - 2, 0)
+
+    def _require_sent(self, ack: Ack) -> None:
+        """Raises `BadFrame` for the answer to a chunk that was never sent."""
+        if ack.seq >= self.next_seq or (ack.code != Code.WRONG_STREAM and ack.next_seq > self.next_seq):
+            raise BadFrame(f"an answer to chunk {max(ack.seq, ack.next_seq - 1)}, of {self.next_seq} that were sent")
 
     def _acknowledge(self, next_seq: int) -> None:
         self.acked = max(self.acked, min(next_seq, self.next_seq))

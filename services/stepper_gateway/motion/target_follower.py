@@ -1,15 +1,18 @@
 """Streamed joint targets: tracked while nothing else moves the arm, stopped when they fall silent.
 
 Whoever streams must go on sending (0.5 s by default), also to keep a far target: the arm does not go on to a stale one.
+A device that takes replacements follows them by these, at every target's arrival; another one by a queue of knots.
 """
 
 from __future__ import annotations
 
 from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.message import Vector
 from gemelo.schemas.reasons import Reason, because
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.live_targets import LiveTargets
 from gemelo.services.stepper_gateway.motion.motion_controller import MotionController
 from gemelo.services.stepper_gateway.motion.target_stream import TargetStream
 
@@ -22,6 +25,7 @@ class TargetFollower:
     def __init__(self, device: GatewayDevice, controller: MotionController) -> None:
         self._device, self._controller = device, controller
         self._targets = TargetStream(device.joints)
+        self._live = LiveTargets(device, controller)
         self._complained = -1.0e9  # [s] monotonic
         self._unsaid = 0
 
@@ -38,29 +42,50 @@ class TargetFollower:
             columns = self._targets.checked(targets)
         except GoalRejected as rejected:
             return self._complain(rejected.reason, moment)
-        self._targets.take(columns, self._controller.motion_start(moment).start.position)
+        if self._device.replaces_paths:
+            velocities = dict(zip(columns, targets.velocity, strict=False))
+            return self._live.take(columns, velocities, targets.stamp, moment)
+        self._targets.take(columns, self._present(moment))
         self._begin(moment)
 
     def step(self, moment: Moment) -> None:
         """Brake on silence, begin when the arm rests, notice the end."""
+        is_silent = self._targets.is_silent(moment.monotonic, self._device.parameters.stream_silence)
+        failure = self._live.step(is_silent, moment)
+        if failure is not None:
+            self._targets.interrupt()
+            self._fail(failure, moment)
+        if (complaint := self._live.take_complaint()) is not None:
+            self._complain(complaint, moment)
         stream = self._controller.stream
         if self._targets.is_active and (stream is None or not self._controller.transmission.is_open):
             self._end(None if stream is None else stream.failure, moment)
-        if self._targets.is_silent(moment.monotonic, self._device.parameters.stream_silence):
+        if is_silent:
             self._fall_silent(moment)
         self._begin(moment)
+
+    def on_ack(self, moment: Moment) -> None:
+        """The device has answered a chunk: what it has not taken is sent anew."""
+        self._live.send_due(moment)
 
     def end_for_goal(self) -> None:
         """A goal takes over from where the targets have led."""
         self._targets.end()
+        self._live.end()
 
     def interrupt(self) -> None:
         """The arm is stopped for another reason; targets count again after a silence."""
         self._targets.end(interrupted=True)
+        if self._live.is_followed:
+            self._targets.interrupt()
+            self._live.drop()
 
     @property
     def is_active(self) -> bool:
-        return self._targets.is_active
+        return self._targets.is_active or self._live.is_active
+
+    def _present(self, moment: Moment) -> Vector:
+        return self._controller.motion_start(moment).start.position
 
     def _fall_silent(self, moment: Moment) -> None:
         """Decelerate now, not behind what has been sent; a stream that rests ends with its last knot."""
@@ -79,9 +104,12 @@ class TargetFollower:
 
     def _end(self, failure: Reason | None, moment: Moment) -> None:
         if failure is not None:
-            self._complain(failure, moment)
-            self._controller.stop(moment)
+            self._fail(failure, moment)
         self._targets.end(interrupted=failure is not None)
+
+    def _fail(self, failure: Reason, moment: Moment) -> None:
+        self._complain(failure, moment)
+        self._controller.stop(moment)
 
     def _complain(self, reason: Reason, moment: Moment) -> None:
         """Once a second at most: targets come fast."""

@@ -43,6 +43,9 @@ class TargetStream:
         if len(targets.position) != len(targets.name):
             named, given = len(targets.name), len(targets.position)
             raise invalid(because("target.positions.count", named=named, given=given))
+        if len(targets.velocity) not in (0, len(targets.name)):
+            named, given = len(targets.name), len(targets.velocity)
+            raise invalid(because("target.velocities.count", named=named, given=given))
         names = [joint.name for joint in self._joints]
         columns = {names.index(name): position for name, position in zip(targets.name, targets.position, strict=True)}
         for column, position in columns.items():
@@ -61,6 +64,10 @@ class TargetStream:
         """Raises `GoalRejected` until no target has come for `silence` [s] after an interruption."""
         if self._is_interrupted:
             raise invalid(because("target.interrupted", time=silence))
+
+    def interrupt(self) -> None:
+        """What was streamed does not go on by itself."""
+        self._is_interrupted = True
 
     def take(self, columns: dict[int, float], present: Vector) -> None:
         """The newest target [rad] or [m] by column; joints that it does not name keep theirs, or stand still."""

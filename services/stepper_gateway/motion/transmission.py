@@ -8,6 +8,7 @@ from gemelo.services.stepper_gateway.links.frames import Chunk
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.motion.knot_sources import KnotSource
 from gemelo.services.stepper_gateway.motion.knots import Knot, StepEncoder
+from gemelo.services.stepper_gateway.motion.live_stream import LiveStream
 from gemelo.services.stepper_gateway.motion.stream import SentChunk, Stream
 
 LARGEST_CHUNK = 20  # [knots] chosen: 0.4 s of path, in one frame also with eight joints
@@ -29,8 +30,7 @@ class MotionTransmission:
     @property
     def is_open(self) -> bool:
         """True if knots can still be added to the stream."""
-        stream = self.stream
-        return stream is not None and not (stream.is_complete or stream.is_abandoned)
+        return self.stream is not None and self.stream.is_open
 
     @property
     def owns_motion(self) -> bool:
@@ -39,10 +39,20 @@ class MotionTransmission:
 
     def begin(self, motion: KnotSource, start: Knot, boot_id: int, capacity: int) -> Stream:
         """A new stream from rest at `start`."""
-        self.stream = Stream(self._next_id, boot_id, self._joints, self._encoder, capacity)
-        self._next_id = self._next_id % 0xFFFFFFFF + 1
+        self.stream = Stream(self._take_id(), boot_id, self._joints, self._encoder, capacity)
         self._motion, self._following, self._start = motion, None, start
         return self.stream
+
+    def begin_live(self, boot_id: int, capacity: int) -> LiveStream:
+        """A new stream whose chunks replace one another; who makes them sends them."""
+        stream = LiveStream(self._take_id(), boot_id, self._joints, self._encoder, capacity)
+        self.stream = stream
+        self._motion = self._following = self._start = None
+        return stream
+
+    def _take_id(self) -> int:
+        stream_id, self._next_id = self._next_id, self._next_id % 0xFFFFFFFF + 1
+        return stream_id
 
     def splice(self, motion: KnotSource) -> None:
         """Go on with another motion, which continues from the last knot sent."""

@@ -1,0 +1,99 @@
+"""The follower of one stream of targets on a device that replaces: a message at each target's arrival.
+
+Each is the knots that follow the reference until a while after the newest target, and a full stop behind them: a
+stream that dies needs nobody to stop the arm.
+"""
+
+from __future__ import annotations
+
+import math
+
+from gemelo.libraries.arm.model.description import Joint
+from gemelo.schemas.message import Vector
+from gemelo.services.stepper_gateway.device.clock import ClockSync
+from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.knots import Knot
+from gemelo.services.stepper_gateway.motion.live_stream import LiveStream, Splice
+from gemelo.services.stepper_gateway.motion.moving_tracker import NEAR_DT, MovingTracker, ReferenceAt, Tail
+from gemelo.services.stepper_gateway.motion.reference import Reference, SenderClock
+from gemelo.services.stepper_gateway.motion.span_check import leaving
+from gemelo.services.stepper_gateway.motion.stream import SentChunk
+
+HOLDS = 0.11  # [s] after a target's arrival until the stop begins; chosen: one target of 30 Hz may be lost, and be late
+LATE = 0.045  # [s] that a target may come late beyond one that was lost; chosen: a network's jitter
+KNOTS = 144  # of one message, of all joints together, where that is enough for its stop; standard: firmware/PROTOCOL.md
+LEAST_NEAR, MOST_NEAR = 2, 16  # [knots] chosen: less could not turn back, and an arm goes on blindly for 0.16 s at most
+APART = 0.008  # [s] between two messages; chosen: of targets that come at once the newest counts
+SAME_PLACE, SAME_SPEED = 1e-6, 1e-4  # [rad] or [m], and per second; chosen: below the wire's resolution
+
+
+class LiveFollower:
+    """The reference of the newest targets, and the messages that lead the arm along it."""
+
+    def __init__(self, joints: tuple[Joint, ...]) -> None:
+        self._joints = joints
+        self._tracker = MovingTracker(joints)
+        self._clock = SenderClock()
+        self._reference = Reference(joints)
+        self._arrival = 0.0  # [s] monotonic, of the newest target
+        self._sent = -1.0e9  # [s] monotonic, when the newest message was made
+        self.is_pending = False  # the newest target is in no message that may reach the device
+
+    @property
+    def target(self) -> Vector:
+        """[rad] or [m] the newest one."""
+        return self._reference.newest
+
+    def take(self, position: Vector, velocity: Vector, sent: float | None, arrival: float) -> None:
+        """A target, which came at `arrival` [s] monotonic; `sent` by the sender's stamp, None where it has none.
+
+        `velocity` is empty where it is to be estimated.
+        """
+        time = arrival if sent is None else self._clock.time_of(sent, arrival)
+        if self._reference.take(time, position, velocity):
+            self._arrival, self.is_pending = arrival, True
+
+    def is_due(self, now: float) -> bool:
+        """True if a message is to be made at `now` [s] monotonic."""
+        return self.is_pending and now - self._sent >= APART
+
+    def message(
+        self, stream: LiveStream, start: Knot | None, delay: float, catch_up: bool, moment: Moment, clock: ClockSync
+    ) -> SentChunk | None:
+        """The chunk to send now, the first one from `start`; None if it changes nothing, or would leave the travel.
+
+        `delay` [s] is by how much the targets are played late; `catch_up` also from far behind them.
+        """
+        now = moment.monotonic
+        splice = stream.splice(now, clock) if start is None else stream.first(start, now, clock)
+        self.is_pending, self._sent = False, now
+        near = self._near(splice, lambda at: self._reference.at(at, delay), catch_up)
+        if start is None and splice.is_standing and _is_same(splice.knot, near[-1]):
+            return None
+        tail = self._tail(near)
+        if self._leaves(splice, near, tail):
+            near = self._near(splice, lambda _: (self.target, (0.0,) * len(self._joints)), catch_up=False)
+            tail = self._tail(near)
+            if self._leaves(splice, near, tail):
+                return None
+        return stream.replace(splice, near, NEAR_DT, tail.knots, tail.dt_us)
+
+    def _near(self, splice: Splice, reference: ReferenceAt, catch_up: bool) -> list[Knot]:
+        """The knots until a stop is due if no more targets come."""
+        until = self._arrival + max(HOLDS, 2.0 * self._reference.period + LATE)
+        count = math.ceil((until - splice.begins) * 1e6 / NEAR_DT)
+        count = max(LEAST_NEAR, min(count, MOST_NEAR))
+        return self._tracker.near(splice.knot, splice.begins, count, reference, catch_up)
+
+    def _tail(self, near: list[Knot]) -> Tail:
+        return self._tracker.tail(near[-1], KNOTS // len(self._joints) - len(near))
+
+    def _leaves(self, splice: Splice, near: list[Knot], tail: Tail) -> bool:
+        spans = [NEAR_DT * 1e-6] * len(near) + [tail.dt_us * 1e-6] * len(tail.knots)
+        return leaving(self._joints, [splice.knot, *near, *tail.knots], spans) is not None
+
+
+def _is_same(first: Knot, second: Knot) -> bool:
+    """True if `second` stands where `first` does."""
+    places = zip(first.position, second.position, strict=True)
+    return all(abs(a - b) < SAME_PLACE for a, b in places) and all(abs(v) < SAME_SPEED for v in second.velocity)
