@@ -135,7 +135,8 @@ def test_the_plans_of_both_lives_of_a_planner_are_made_again(changed):
 def test_a_plan_whose_answer_was_lost_with_its_planner_is_left_out(changed):
     def alter(exchange, number):
         if number == 2:
-            exchange["answer"], exchange["failure"] = None, {"kind": "lost", "message": "planner has ended"}
+            exchange["answer"] = None
+            exchange["failure"] = {"kind": "lost", "message": "planner has ended", "why": None}
 
     comparison = replay(changed("planner", Messages("@request/plan", alter)), "planner")
     assert comparison.difference is None
