@@ -273,8 +273,8 @@ class SimulatedWorld:
 
         >>> with gemelo.simulate("rm1") as simulated, simulated.sim.node("watcher") as watcher:
         ...     states = watcher.latest(gemelo.topics.JOINT_STATES)
-        ...     watcher.wait(0.1)
-        ...     states.age() < 0.05
+        ...     watcher.wait(0.2)
+        ...     states.age() < 0.11
         True
         """
         twin = self._twin

@@ -11,7 +11,7 @@ from gemelo.libraries.runtime.bus.interface import Arrival, Bus
 from gemelo.libraries.runtime.bus.wire import Encoded, encoded, from_arrival, schema_of
 from gemelo.libraries.runtime.clock import SYSTEM, Clock
 from gemelo.libraries.runtime.loop.loop import Loop
-from gemelo.libraries.runtime.loop.task_queue import ArrivalQueue, EveryQueue, LatestQueue, UnreadQueue
+from gemelo.libraries.runtime.loop.task_queue import ArrivalQueue, EveryQueue, Gaps, LatestQueue, UnreadQueue
 from gemelo.schemas.message import BadMessage, Message
 from gemelo.schemas.system import TopicStatistics
 from gemelo.schemas.topics import ANY, Delivery, Topic
@@ -167,6 +167,7 @@ class Latest(Generic[M]):
         self.topic = topic
         self._clock = clock
         self._message: M | None = None
+        self._gaps = Gaps()
         self._arrived = 0.0  # [s] monotonic
         self._arrived_unix = 0  # [ns]
 
@@ -177,8 +178,10 @@ class Latest(Generic[M]):
         return self._message
 
     def on_message(self, message: M) -> None:
+        arrived = self._clock.monotonic()
+        self._gaps.on_arrival(arrived)
         self._message = message
-        self._arrived, self._arrived_unix = self._clock.monotonic(), self._clock.unix()
+        self._arrived, self._arrived_unix = arrived, self._clock.unix()
 
     def age(self, now: int | None = None) -> float:
         """[s] since the message came, up to `now` [ns UNIX] where given; infinite before the first."""
@@ -189,12 +192,21 @@ class Latest(Generic[M]):
 
     @property
     def is_stale(self) -> bool:
-        """Older than five periods of the topic's rate, or never heard; a latched message stays valid."""
+        """Older than five periods of the topic's rate, or never received; a latched message stays valid."""
         age = self.age()
         if self._message is not None and self.topic.delivery is Delivery.LATCHED:
             return False
-        stale_after = DEFAULT_STALE_AFTER if self.topic.rate is None else PERIODS_TO_STALE / self.topic.rate
-        return age > stale_after
+        return age > self._stale_after()
+
+    def _stale_after(self) -> float:
+        """[s]; the period at rest counts as far as the last messages came that slowly, or while there is no other."""
+        topic = self.topic
+        if topic.rate is None:
+            return DEFAULT_STALE_AFTER
+        if topic.rest_rate is None:
+            return PERIODS_TO_STALE / topic.rate
+        at_rest = 1.0 / topic.rest_rate
+        return PERIODS_TO_STALE * min(max(self._gaps.longest(at_rest), 1.0 / topic.rate), at_rest)
 
     def _look(self) -> None:
         """Takes in what has come since; here that is done as it comes."""
@@ -209,7 +221,11 @@ class LatestOnDemand(Latest[M]):
     def __init__(self, bus: Bus, loop: Loop, topic: Topic[M], warn: Warn) -> None:
         super().__init__(topic, bus.clock)
         self._queue, self._looking = UnreadQueue(bus.clock), threading.Lock()
-        self.subscription = Subscription(bus, loop, topic, self.on_message, warn, False, None, queue=self._queue)
+        self._gaps = self._queue.gaps
+        self.subscription = Subscription(bus, loop, topic, self._keep, warn, False, None, queue=self._queue)
+
+    def _keep(self, message: M) -> None:
+        self._message = message
 
     def _look(self) -> None:
         with self._looking:

@@ -37,6 +37,7 @@ class BeganInput(_Input, frozen=True):
     session: int
     parameters: GatewayParameters
     kept: LedgerRecord | None = None
+    has_rest_rate: bool = False  # of recordings before that parameter, whose core published every state
 
 
 class ParametersInput(_Input, frozen=True):

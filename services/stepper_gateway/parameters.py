@@ -7,6 +7,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from gemelo.schemas.topics import REST_RATE
+
+ALL_STATES = 50.0  # [Hz] standard: of a core that publishes each state, as all did before there was a `rest_rate`
+
 
 class GatewayParameters(msgspec.Struct, frozen=True, kw_only=True):
     """Defaults that suit MQTT on a good network."""
@@ -61,3 +65,6 @@ class GatewayParameters(msgspec.Struct, frozen=True, kw_only=True):
         float, Meta(ge=0.5, le=60.0, description="[s] a holder of control may be gone until it loses it, at rest")
     ] = 3.0
     feedback_rate: Annotated[float, Meta(ge=1.0, le=50.0, description="[Hz] of goal feedback")] = 20.0
+    rest_rate: Annotated[
+        float, Meta(ge=1.0, le=50.0, description="[Hz] of states and step errors on the bus while nothing changes")
+    ] = REST_RATE

@@ -38,6 +38,7 @@ LATEST = 0.1  # [s] that one state in a hundred may be late: a fifth of the sile
 SETTLE, WINDOW = 3.0, 8.0  # [s]
 READY = 60.0  # [s] for what is started at once
 CORES, USABLE = 16, 0.8  # of the host that is calculated, and the share of it that may be used: chosen
+AS_IN_MOTION = ("--set", f"rest_rate={RATE:g}")
 GATEWAY, DEVICE = "gemelo.services.stepper_gateway.main", "gemelo.services.virtual_esp32.main"
 
 
@@ -151,7 +152,8 @@ class ArmsOnOneRouter:
     def _start(self, module: str, run: Path, robot: Path | str = ROBOT) -> psutil.Process:
         paths = {"GEMELO_PATHS_RUN": str(run), "GEMELO_PATHS_OUT": str(run.parent / "out"), "GEMELO_ROBOT": str(robot)}
         process = subprocess.Popen(
-            [sys.executable, "-m", module], cwd=project_root(), env=os.environ | self._environment | paths,
+            [sys.executable, "-m", module, *(AS_IN_MOTION if module == GATEWAY else ())],
+            cwd=project_root(), env=os.environ | self._environment | paths,
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         self._closing.callback(process.wait)

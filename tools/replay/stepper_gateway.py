@@ -25,8 +25,9 @@ from gemelo.schemas.topics import (
     Topic,
 )
 from gemelo.services.stepper_gateway.core import GatewayCore
-from gemelo.services.stepper_gateway.inputs import BeganInput, Given, Input, Reply, digest_of, unpacked
+from gemelo.services.stepper_gateway.inputs import BeganInput, Given, Input, ParametersInput, Reply, digest_of, unpacked
 from gemelo.services.stepper_gateway.outputs import GoalFinished, GripperFinished, Output, Publish, SendFrame
+from gemelo.services.stepper_gateway.parameters import ALL_STATES, GatewayParameters
 from gemelo.tools.replay.comparison import ABSENT, Comparison
 from gemelo.tools.replay.recorded import AGAIN, Heard, NotReplayable, Recorded
 
@@ -109,6 +110,8 @@ class GatewayAgain:
         if isinstance(given.input, BeganInput):
             self._begin(given.unix, given.input)
             return
+        if isinstance(given.input, ParametersInput):
+            given = replace(given, input=ParametersInput(self._as_they_were(given.input.parameters)))
         assert self._core is not None  # the first message begins with `BeganInput`
         try:
             reply, outputs = self._core.handle(given.input, given.moment)
@@ -149,9 +152,14 @@ class GatewayAgain:
             said.end(self._last)
 
     def _begin(self, unix: int, began: BeganInput) -> None:
-        self._core = GatewayCore(self._arm, began.session, began.parameters, began.kept)
+        self._has_rest_rate = began.has_rest_rate
+        self._core = GatewayCore(self._arm, began.session, self._as_they_were(began.parameters), began.kept)
         for said in self._said.values():
             said.begin(unix)
+
+    def _as_they_were(self, parameters: GatewayParameters) -> GatewayParameters:
+        """A core of before `rest_rate` published every state."""
+        return parameters if self._has_rest_rate else replace(parameters, rest_rate=ALL_STATES)
 
     def _differ(self, at: float, given: Input, digest: int, now: str) -> None:
         was = f"others (BLAKE2 {digest:016x})" if digest else ABSENT

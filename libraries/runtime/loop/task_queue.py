@@ -17,6 +17,7 @@ from gemelo.libraries.runtime.bus.interface import Arrival
 from gemelo.libraries.runtime.clock import SYSTEM, Clock
 
 EVERY_CAPACITY = 4096  # messages
+GAPS = 3  # that are remembered; chosen: one message that came early or late changes nothing
 EVERY_BYTES = 96 * 1024 * 1024  # chosen: two of the largest messages (bus/wire.py) fit
 
 Task = Callable[[], None]
@@ -161,6 +162,24 @@ class EveryQueue:
         self._handle(arrival)
 
 
+class Gaps:
+    """The times between the last arrivals of one topic."""
+
+    def __init__(self) -> None:
+        self._gaps: deque[float] = deque(maxlen=GAPS)  # [s]
+        self._arrived: float | None = None  # [s] monotonic
+
+    def on_arrival(self, at: float) -> None:
+        """`at` [s] monotonic."""
+        if self._arrived is not None:
+            self._gaps.append(at - self._arrived)
+        self._arrived = at
+
+    def longest(self, otherwise: float) -> float:
+        """[s]; `otherwise` before the second arrival."""
+        return max(tuple(self._gaps), default=otherwise)
+
+
 class UnreadQueue:
     """The newest arrival, until somebody takes it: nobody is woken for it, and older ones are never decoded."""
 
@@ -168,12 +187,14 @@ class UnreadQueue:
         self._clock = clock
         self._lock = threading.Lock()
         self._waiting: Arrived | None = None
+        self.gaps = Gaps()
         self.dropped = 0
         self.passed_over = 0  # arrivals that nobody has looked at
 
     def on_arrival(self, arrival: Arrival) -> None:
         arrived = Arrived(arrival, self._clock.monotonic(), self._clock.unix())
         with self._lock:
+            self.gaps.on_arrival(arrived.at)
             self.passed_over += self._waiting is not None
             self._waiting = arrived
 

@@ -8,6 +8,7 @@ from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import DEVICE_SHAFT, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS
 from gemelo.services.stepper_gateway.components import Components
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
+from gemelo.services.stepper_gateway.device.state_thinner import StateThinner
 from gemelo.services.stepper_gateway.inputs import FrameInput
 from gemelo.services.stepper_gateway.links.frames import Ack, BadFrame, CommandReply, StateFrame, SyncReply, decode
 from gemelo.services.stepper_gateway.links.link import Kind
@@ -39,6 +40,7 @@ class FrameHandler:
     def __init__(self, parts: Components) -> None:
         self._components = parts
         self._device, self._controller = parts.device, parts.controller
+        self._thinner = StateThinner()
         self._position_lost: Reason | None = None  # of a board of another dialect, until its next boot is met
 
     def take(self, received: FrameInput, moment: Moment) -> None:
@@ -139,7 +141,8 @@ class FrameHandler:
             return
         controller.on_state(state, arrival)
         point = controller.commanded(state)
-        self._publish(state, point, moment)
+        if self._thinner.passes(state, point, 1.0 / device.parameters.rest_rate):
+            self._publish(state, point, moment)
         self._components.ledger.on_state(state, point, moment)
         self._components.gripper.on_state(state, moment)
         if state.mode == DeviceMode.HOLD and controller.is_followed(state) and not controller.is_held:

@@ -194,5 +194,6 @@ def slow_topics(figures: Mapping[str, Figures]) -> Iterator[SlowTopic]:
     for topic in TOPICS:
         for name, each in figures.items():
             heard = each.received().get(topic.key, 0.0)
-            if topic.rate is not None and 0.0 < heard < LATE_SHARE * topic.rate - SAMPLING / each.seconds:
-                yield SlowTopic(node=name, topic=topic.key, heard=heard, promised=topic.rate, writer=topic.writer)
+            promised = topic.rest_rate or topic.rate  # at rest or in motion: at least so many
+            if promised is not None and 0.0 < heard < LATE_SHARE * promised - SAMPLING / each.seconds:
+                yield SlowTopic(node=name, topic=topic.key, heard=heard, promised=promised, writer=topic.writer)
