@@ -27,8 +27,8 @@ from tests.table import table
 OF_THE_ISSUES = (
     "frame_lookup_us", "state_check_us", "collision_checks_per_s", "ik_ms", "ik_success", "plan_ms",
     "plan_success", "path_length_ratio", "duration_ratio", "plan_python_ms", "plan_any_ms", "plan_any_success",
-    "plan_near_success", "refusal_ms", "plan_mesh_ms", "import_s", "extra_mb", "client_env_mb", "client_import_ms",
-    "fit_excess_mm", "first_plan_s",
+    "plan_narrow_ms", "plan_near_success", "refusal_ms", "plan_mesh_ms", "import_s", "extra_mb", "client_env_mb",
+    "client_import_ms", "fit_excess_mm", "first_plan_s",
     "deadline_overrun_ms", "scene_intake_ms", "lin_ms", "jog_tick_us", "tag_pose_mm", "tag_plane_mm", "tag_flips",
     "box_mm", "image_to_pose_ms", "mount_mm", "mount_images_mm", "mount_touch_mm", "camera_cpu_percent",
     "detector_cpu_percent", "image_to_detection_ms", "pick_mm", "pick_success", "replay_speed",

@@ -49,6 +49,7 @@ FIGURES = {
     "plan_python_ms": FigureRow("planner.planning:plan_python_ms", "ms"),
     "plan_any_ms": FigureRow("planner.any_planning:plan_any_ms", "ms", takes_count=True),
     "plan_any_success": FigureRow("planner.any_planning:plan_any_success", "%", takes_count=True),
+    "plan_narrow_ms": FigureRow("planner.narrow_planning:plan_narrow_ms", "ms", takes_count=True),
     "plan_near_success": FigureRow("planner.near_planning:plan_near_success", "%", takes_count=True),
     "refusal_ms": FigureRow("planner.refusing:refusal_ms", "ms", takes_count=True),
     "plan_mesh_ms": FigureRow("planner.mesh_planning:plan_mesh_ms", "ms"),

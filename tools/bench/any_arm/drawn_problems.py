@@ -5,6 +5,7 @@ Nobody knows beforehand whether a way leads from one to the other: what counts a
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -19,7 +20,7 @@ from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.kinematics.ik import InverseKinematics
 from gemelo.services.planner.kinematics.targets import ToolTarget
 from gemelo.services.planner.request.deadline import NEVER
-from gemelo.tools.bench.any_arm.families import FAMILIES, Setting, ToolPose, settings
+from gemelo.tools.bench.any_arm.families import FAMILIES, Family, Setting, ToolPose, settings
 from gemelo.tools.bench.problems.problem_sets import ALLOWED, tool_pose
 
 Array = NDArray[np.float64]
@@ -65,16 +66,16 @@ class DrawnProblem:
 class ProblemDrawer:
     """Draws problems for one arm."""
 
-    def __init__(self, arm: ArmDescription, kinematics: Kinematics) -> None:
-        self._arm, self._kinematics = arm, kinematics
+    def __init__(self, arm: ArmDescription, kinematics: Kinematics, families: Mapping[str, Family] = FAMILIES) -> None:
+        self._arm, self._kinematics, self._families = arm, kinematics, families
         self._ik = InverseKinematics(arm, kinematics)
         lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
         self._lower, self._upper = np.maximum(lower, -REVOLUTION), np.minimum(upper, REVOLUTION)
 
     def problem(self, family: str, seed: int) -> DrawnProblem:
         """The problem of this seed: the same one in every run. Every other one asks for a pose."""
-        random = np.random.default_rng((list(FAMILIES).index(family), seed, len(self._arm.joints)))
-        for setting in settings(family, seed):
+        random = np.random.default_rng((list(self._families).index(family), seed, len(self._arm.joints)))
+        for setting in settings(family, seed, self._families):
             world = World(self._arm, self._kinematics, setting.scene)
             goal = self._end(world, setting.goal, random)
             start = None if goal is None else self._end(world, setting.start, random)
@@ -133,7 +134,13 @@ class ProblemDrawer:
         return bool((row >= self._lower).all() and (row <= self._upper).all())
 
 
-def problems(arm: ArmDescription, kinematics: Kinematics, family: str, count: int = COUNT) -> list[DrawnProblem]:
+def problems(
+    arm: ArmDescription,
+    kinematics: Kinematics,
+    family: str,
+    count: int = COUNT,
+    families: Mapping[str, Family] = FAMILIES,
+) -> list[DrawnProblem]:
     """The first `count` problems of a family."""
-    drawer = ProblemDrawer(arm, kinematics)
+    drawer = ProblemDrawer(arm, kinematics, families)
     return [drawer.problem(family, seed) for seed in range(count)]

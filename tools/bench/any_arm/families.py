@@ -7,7 +7,7 @@ by code of our own.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import msgspec
@@ -135,7 +135,8 @@ def cage(random: np.random.Generator) -> Setting:
     return Setting(scene_of(things), None, None)
 
 
-FAMILIES: dict[str, Callable[[np.random.Generator], Setting]] = {
+Family = Callable[[np.random.Generator], Setting]
+FAMILIES: dict[str, Family] = {
     "table pick": table_pick,
     "under table": under_table,
     "box": open_box,
@@ -144,11 +145,11 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Setting]] = {
 }
 
 
-def settings(family: str, seed: int) -> Iterator[Setting]:
+def settings(family: str, seed: int, families: Mapping[str, Family] = FAMILIES) -> Iterator[Setting]:
     """The settings of a problem, one after the other until one can be used; the same ones in every run."""
-    random = np.random.default_rng((list(FAMILIES).index(family), seed))
+    random = np.random.default_rng((list(families).index(family), seed))
     while True:
-        yield FAMILIES[family](random)
+        yield families[family](random)
 
 
 def board(name: str, edges: Vector, place: Vector) -> SceneObject:
@@ -185,9 +186,11 @@ def scene_of(things: list[SceneObject]) -> PlanningScene:
     return PlanningScene(version=1, objects=(board("ground", (3.0, 3.0, 0.02), (0.0, 0.0, -0.015)), *things))
 
 
-def pose(random: np.random.Generator, position: Vector | list[float], axes: tuple[Vector, ...]) -> ToolPose:
-    """The tool at `position` (3,) [m] with these axes, turned at random about its own z."""
-    angle = random.uniform(-TURN, TURN)
+def pose(
+    random: np.random.Generator, position: Vector | list[float], axes: tuple[Vector, ...], most: float = TURN
+) -> ToolPose:
+    """The tool at `position` (3,) [m] with these axes, turned at random by `most` [rad] about its own z."""
+    angle = random.uniform(-most, most)
     sine, cosine = math.sin(angle), math.cos(angle)
     spin = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     return ToolPose(np.array(position), np.array(axes).T @ spin)

@@ -1,9 +1,9 @@
-"""Two arms that do not ship, written as robot folders: kinematics from published tables, collision shapes of our own.
+"""Arms that do not ship, written as robot folders: kinematics from published tables, collision shapes of our own.
 
 `six` is a UR5 by its Denavit-Hartenberg table (Universal Robots, "DH parameters for calculations"), with cylinders,
 boxes and spheres; `six_mesh` the same with the hulls of its long links as
 meshes. `seven` is a Panda by its table after Craig (Franka Emika,
-"Robot and interface specifications"), of spheres alone.
+"Robot and interface specifications"), of spheres alone; `eight` the same on a rail.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import atexit
 import math
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 
 Point = tuple[float, float, float]
 HALF = math.pi / 2.0
+RAIL, RAIL_SPEED = 0.4, 0.5  # [m] either way, [m/s]
 SECTIONS, BALL_DIVISIONS = 40, 3  # of a mesh's cylinders and balls
 MESHED = (2, 3)  # links of which meshes are made: the upper arm and the forearm
 
@@ -43,13 +44,15 @@ class SketchSolid:
 
 @dataclass(frozen=True)
 class MovingLink:
-    """A joint about its z at `origin` [m], `twist` [rad] about x of the link before, and the link behind it."""
+    """A joint about its z at `origin` [m], `twist` [rad] about x of the link before, and the link behind it; along its
+    z where it `slides`."""
 
     origin: Point
     twist: float
-    limits: tuple[float, float]  # [rad]
-    velocity: float  # [rad/s]
+    limits: tuple[float, float]  # [rad] or [m]
+    velocity: float  # [rad/s] or [m/s]
     solids: tuple[SketchSolid, ...]
+    slides: bool = False
 
 
 @dataclass(frozen=True)
@@ -157,12 +160,26 @@ def seven_joints() -> ArmSketch:
     return ArmSketch("seven", base, links, (0.0, 0.0, 0.2104), excused, home)
 
 
+def eight_joints() -> ArmSketch:
+    """The arm of seven joints with its base on a slide along y; the rail itself has no shape."""
+    seven = seven_joints()
+    first = seven.links[0]
+    base = tuple(SketchSolid(solid.size, (solid.at[0], -solid.at[2], solid.at[1])) for solid in seven.base)
+    links = (
+        MovingLink((0.0, 0.0, 0.0), -HALF, (-RAIL, RAIL), RAIL_SPEED, base, slides=True),
+        replace(first, origin=(0.0, -first.origin[2], 0.0), twist=HALF),
+        *seven.links[1:],
+    )
+    excused = tuple((one + 1, other + 1) for one, other in seven.excused)
+    return ArmSketch("eight", (), links, seven.tool, excused, (0.0, *seven.home))
+
+
 @cache
 def generated_arm(name: str) -> ArmDescription:
-    """`six`, `six_mesh` or `seven`; its folder lasts as long as the process."""
+    """`six`, `six_mesh`, `seven` or `eight`; its folder lasts as long as the process."""
     folder = tempfile.TemporaryDirectory(prefix="gemelo_bench_")
     atexit.register(folder.cleanup)
-    sketch = seven_joints() if name == "seven" else six_joints(name)
+    sketch = {"seven": seven_joints, "eight": eight_joints}.get(name, lambda: six_joints(name))()
     return load_arm(written(sketch, Path(folder.name) / name, with_meshes=name.endswith("mesh")))
 
 
@@ -191,9 +208,9 @@ def _origin(at: Point, turn: Point) -> str:
 
 
 def _joint(number: int, link: MovingLink) -> str:
-    lower, upper = link.limits
+    (lower, upper), kind = link.limits, "prismatic" if link.slides else "revolute"
     return (
-        f'<joint name="joint_{number}" type="revolute">{_origin(link.origin, (link.twist, 0.0, 0.0))}'
+        f'<joint name="joint_{number}" type="{kind}">{_origin(link.origin, (link.twist, 0.0, 0.0))}'
         f'<parent link="link_{number - 1}"/><child link="link_{number}"/><axis xyz="0 0 1"/>'
         f'<limit lower="{lower:.9g}" upper="{upper:.9g}" effort="50" velocity="{link.velocity:.9g}"/></joint>'
     )

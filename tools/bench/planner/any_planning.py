@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -20,7 +20,7 @@ from gemelo.services.planner.core import Planner
 from gemelo.services.planner.native.paths import FreePath
 from gemelo.services.planner.verification.verify import at_times
 from gemelo.tools.bench.any_arm.drawn_problems import DrawnProblem, problems
-from gemelo.tools.bench.any_arm.families import FAMILIES
+from gemelo.tools.bench.any_arm.families import FAMILIES, Family
 from gemelo.tools.bench.any_arm.generated_arms import ARMS, generated_arm
 from gemelo.tools.bench.figures import Figure, NotMeasured, of_samples, quantile, rounded
 from gemelo.tools.bench.planner.references import CoalChecker, PlainOmpl, Reference, ReferenceResult, Roboplan
@@ -76,7 +76,7 @@ def plan_any_ms(count: int) -> Figure:
     reference: dict[str, float] = {}
     for name in REFERENCES:
         reference |= spread(name, [trial.spent_by(name) for trial in every], 0.5, 0.99)
-    ratios = {share: _ratio(every, share) for share in (0.5, 0.99)}
+    ratios = {share: ratio_to_roboplan(every, share) for share in (0.5, 0.99)}
     reference |= {f"of roboplan's, p{100 * share:.0f}": ratio for share, ratio in ratios.items()}
     for phase in PHASES:
         column = [1e3 * float(getattr(trial.response.times, phase)) for trial in every]
@@ -105,17 +105,17 @@ def plan_any_success(count: int) -> Figure:
     for name, some in by_name.items():
         possible = [trial for trial in some if trial.is_possible]
         reference[name] = 100.0 * sum(trial.is_solved for trial in possible) / max(1, len(possible))
-        reference |= spread(f"{name}: length over the best known", list(_length_ratios(possible)), 0.5, 0.9)
+        reference |= spread(f"{name}: length over the best known", list(length_ratios(possible)), 0.5, 0.9)
     named = ", ".join(f"{each.problem.arm} {each.problem.family} {each.problem.seed}" for each in failed[:NAMED])
     impossible = sum(not trial.is_possible for some in by_name.values() for trial in some)
     note = f"not solved: {named or 'none'}; {impossible} more that no planner solves"
     met = share >= SUCCESS_GOAL and not reference["contacts"]
     goal = f">= {SUCCESS_GOAL:g}, no contact"
-    return Figure(median=share, p99=share, goal=goal, met=met, reference=_rounded(reference), note=note)
+    return Figure(median=share, p99=share, goal=goal, met=met, reference=rounded_all(reference), note=note)
 
 
-def _ratio(some: Sequence[AnyTrial], share: float) -> float:
-    """Ours over roboplan's quantile."""
+def ratio_to_roboplan(some: Sequence[AnyTrial], share: float) -> float:
+    """Ours over roboplan's quantile of the CPU time, at a `share` of 0 to 1 of the problems; dimensionless."""
     ours, theirs = [trial.worked for trial in some], [trial.spent_by(ROBOPLAN) for trial in some]
     return quantile(ours, share) / quantile(theirs, share)
 
@@ -126,7 +126,8 @@ def _by_family(name: str, some: Sequence[AnyTrial]) -> dict[str, float]:
     return ours | spread(f"{name}, {ROBOPLAN}", [trial.spent_by(ROBOPLAN) for trial in some], 0.5, 0.99)
 
 
-def _length_ratios(some: Sequence[AnyTrial]) -> Iterator[float]:
+def length_ratios(some: Sequence[AnyTrial]) -> Iterator[float]:
+    """Of each path that is no mere point: its length over that of the best known; dimensionless."""
     return (trial.length / trial.best for trial in some if trial.is_solved and trial.best > SHORTEST)
 
 
@@ -140,7 +141,8 @@ def _note(by_name: dict[str, list[AnyTrial]], count: int) -> str:
     )
 
 
-def _rounded(reference: dict[str, float]) -> dict[str, float]:
+def rounded_all(reference: dict[str, float]) -> dict[str, float]:
+    """The values, in their units, each to four significant digits; dimensionless where they are ratios."""
     return {name: rounded(value) for name, value in reference.items()}
 
 
@@ -154,11 +156,11 @@ def every_trial(count: int) -> dict[str, list[AnyTrial]]:
     }
 
 
-def trials_of(planner: Planner, count: int) -> dict[str, list[AnyTrial]]:
+def trials_of(planner: Planner, count: int, families: Mapping[str, Family] = FAMILIES) -> dict[str, list[AnyTrial]]:
     """The first `count` problems of each family for one arm."""
     planner.prepare()
     gc.freeze()  # as the planner's workers do
-    by_family = {family: problems(planner.arm, planner.kinematics, family, count) for family in FAMILIES}
+    by_family = {family: problems(planner.arm, planner.kinematics, family, count, families) for family in families}
     for some in by_family.values():
         for problem in some[:WARMING]:
             planned(planner, problem)

@@ -435,6 +435,22 @@ nb::ndarray<nb::numpy, float> centres(const World& world, const Kernel& kernel, 
     return array_of(std::move(result), {rows.shape(0), spheres, size_t{3}});
 }
 
+// The number of the first of the nearest of the rows (n, dof) to each of the points (m, dof), for the tests of trees.
+nb::ndarray<nb::numpy, int64_t> nearest_rows(const Rows& rows, const Row& weights, const Rows& points) {
+    const size_t dof = weights.size();
+    require(dof >= 1 && dof <= kMaxDof && rows.shape(0) > 0, "there must be rows of 1 to 16 joint values");
+    require_columns(rows.shape(1), dof, "rows");
+    require_columns(points.shape(1), dof, "points");
+    const Space space{Joints(dof), Joints(dof), {weights.data(), weights.data() + dof}};
+    SearchTree tree(space);
+    for (size_t row = 0; row < rows.shape(0); ++row) tree.add(rows.data() + row * dof, 0);
+    std::vector<int64_t> found;
+    for (size_t point = 0; point < points.shape(0); ++point) {
+        found.push_back(static_cast<int64_t>(tree.nearest(points.data() + point * dof).index));
+    }
+    return array_of(std::move(found), {points.shape(0)});
+}
+
 }  // namespace
 }  // namespace gemelo
 
@@ -505,4 +521,5 @@ NB_MODULE(_motion, module) {
                "seconds"_a, "cancel"_a.none(), "enough"_a);
     add_trajectories(module);
     module.def("centres", &centres, "world"_a, "kernel"_a, "rows"_a);
+    module.def("nearest_rows", &nearest_rows, "rows"_a, "weights"_a, "points"_a);
 }

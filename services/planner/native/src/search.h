@@ -1,79 +1,19 @@
 // RRT-Connect (Kuffner and LaValle 2000): two trees that grow towards one another, from the start and from the goals.
+// Where a node could not be left, it is only asked about what is near it (dynamic domain; Yershova et al. 2005).
 #pragma once
 
 #include "motion_validator.h"
 #include "random.h"
+#include "search_tree.h"
 
 namespace gemelo {
-
-struct Space {
-    Joints lower, upper;
-    Joints weights;  // [1/rad] or [1/m]: what a unit of each joint costs; distances are weighted Euclidean
-
-    double distance(const double* a, const double* b) const {
-        double sum = 0.0;
-        for (size_t i = 0; i < weights.size(); ++i) {
-            const double path = weights[i] * (a[i] - b[i]);
-            sum += path * path;
-        }
-        return std::sqrt(sum);
-    }
-};
-
-// Configurations, and from which one each was reached.
-class SearchTree {
-  public:
-    explicit SearchTree(const Space& space) : space_(space), dof_(space.lower.size()) {}
-
-    size_t size() const { return parents_.size(); }
-    const double* row(size_t index) const { return rows_.data() + index * dof_; }
-
-    size_t add(const double* joints, size_t parent) {
-        const Joints copy(joints, joints + dof_);  // `joints` may be a row of this very tree
-        rows_.insert(rows_.end(), copy.begin(), copy.end());
-        parents_.push_back(parent);
-        return parents_.size() - 1;
-    }
-
-    size_t nearest(const double* joints) const {
-        size_t best = 0;
-        double least = std::numeric_limits<double>::infinity();
-        for (size_t index = 0; index < size(); ++index) {
-            double sum = 0.0;
-            for (size_t i = 0; i < dof_; ++i) {
-                const double path = space_.weights[i] * (joints[i] - rows_[index * dof_ + i]);
-                sum += path * path;
-            }
-            if (sum < least) {
-                least = sum;
-                best = index;
-            }
-        }
-        return best;
-    }
-
-    // From `index` to its root.
-    std::vector<Joints> path_to_root(size_t index) const {
-        std::vector<Joints> path;
-        for (;; index = parents_[index]) {
-            path.emplace_back(row(index), row(index) + dof_);
-            if (parents_[index] == index) return path;
-        }
-    }
-
-  private:
-    const Space& space_;
-    size_t dof_;
-    std::vector<double> rows_;
-    std::vector<size_t> parents_;
-};
 
 class Search {
   public:
     Search(const Space& space, MotionValidator& validator, Random& random, const StopCondition& stop)
         : space_(space), validator_(validator), random_(random), stop_(stop) {
         diagonal_ = space_.distance(space_.lower.data(), space_.upper.data());
-        range_ = 0.25 * diagonal_;
+        range_ = kRange * diagonal_;
     }
 
     size_t iterations() const { return iterations_; }
@@ -102,12 +42,16 @@ class Search {
         SearchTree from_start(space_), from_goals(space_);
         from_start.add(start.data(), 0);
         for (const Joints& goal : goals) from_goals.add(goal.data(), from_goals.size());
+        const float domain = static_cast<float>(kDomain * diagonal_ * kDomain * diagonal_);
         SearchTree *grows = &from_start, *meets = &from_goals;
         Joints sample(start.size());
-        for (iterations_ = 1; !stop_() && validator_.checks() < most_checks; ++iterations_) {
+        for (iterations_ = 1; validator_.checks() < most_checks && !is_over(); ++iterations_) {
             if (!draw(start, goals, longest, sample)) break;
+            const SearchTree::Nearest from = grows->nearest(sample.data());
+            if (from.squared > domain && grows->is_blocked(from.index)) continue;
             const size_t before = grows->size();
-            extend(*grows, grows->nearest(sample.data()), sample.data());
+            extend(*grows, from.index, sample.data());
+            if (grows->size() == before) grows->block(from.index);
             if (grows->size() > before && connect(*grows, *meets)) {
                 const bool is_turned = grows == &from_goals;
                 return is_turned ? joined(*meets, *grows) : joined(*grows, *meets);
@@ -116,6 +60,9 @@ class Search {
         }
         return {};
     }
+
+    // The checks ask too: most samples are dropped, in less time than the question takes.
+    bool is_over() const { return iterations_ % kAsked == 0 && stop_(); }
 
     // Somewhere between the bounds, by which a path shorter than `longest` may lead; false where so many draws have
     // found nothing. Where no path is known, short ones are looked for first: the longer the search lasts, the farther
@@ -171,6 +118,9 @@ class Search {
     // Measured: how long the paths are that are looked for first, by the distance to the nearest goal and the diagonal
     // of all that the joints can do, and by how much longer with every sample.
     static constexpr double kNear = 1.1, kWider = 0.01, kGrowth = 1.01;
+    // Measured, of the diagonal: how far a tree grows at once, and how far from a blocked node samples are taken.
+    static constexpr double kRange = 0.08, kDomain = 0.2;
+    static constexpr size_t kAsked = 8;  // chosen: from question to question, in samples
 
     // One step of at most `range_` from a node towards `target`; true when it got there.
     bool extend(SearchTree& tree, size_t from, const double* target) {
@@ -188,7 +138,7 @@ class Search {
     // From the other tree towards the newest node of the one that grew, until there or blocked.
     bool connect(const SearchTree& grown, SearchTree& other) {
         const Joints target(grown.row(grown.size() - 1), grown.row(grown.size() - 1) + space_.lower.size());
-        size_t from = other.nearest(target.data());
+        size_t from = other.nearest(target.data()).index;
         for (;;) {
             const size_t before = other.size();
             if (extend(other, from, target.data())) return true;
