@@ -19,7 +19,15 @@ struct Span {
     uint32_t dt_us;
 };
 
-// Fills code, value and limit; joint and knot are the caller's.
-Verdict check_span(const Span& span, const JointLimits& limits);
+// What a joint's limits leave of a span of one dt, times powers of dt: nothing is divided to keep to them.
+struct SpanBounds {
+    int64_t velocity;      // times dt
+    int64_t acceleration;  // times dt^2 / 2
+};
+
+SpanBounds bounds_of(const JointLimits& limits, uint32_t dt_us);
+
+// Fills code, value and limit; joint and knot are the caller's. `bounds` are of the same limits and dt.
+Verdict check_span(const Span& span, const JointLimits& limits, const SpanBounds& bounds);
 
 }  // namespace gemelo

@@ -24,14 +24,15 @@ class Ceiling {
     }
 
     // The ceiling at `from`, when it is `next_q26` at `to`.
-    uint32_t before(const Knot& from, const Knot& to, uint32_t next_q26);
+    uint32_t before(const Knot& from, const Knot& to, uint32_t next_q26) const;
 
   private:
-    void set_dt(uint32_t dt_us);
+    void set_dt(uint32_t dt_us) const;
 
     const DeviceConfig* config_ = nullptr;
-    uint32_t dt_us_ = 0;
-    int64_t swing_q8_[kMaxJoints];  // 2 dt A, Q8 steps/s
+    // Of the last dt, as most knots have the same.
+    mutable uint32_t dt_us_ = 0;
+    mutable int64_t swing_q8_[kMaxJoints];  // 2 dt A, Q8 steps/s
 };
 
 }  // namespace gemelo

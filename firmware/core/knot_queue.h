@@ -31,7 +31,10 @@ class KnotQueue {
     const Knot& operator[](uint16_t i) const { return ring_[(first_ + i) % kMaxKnots]; }
     const Knot& newest() const { return (*this)[static_cast<uint16_t>(size_ - 1)]; }
 
-    void push(const Knot& knot) { ring_[(first_ + size_++) % kMaxKnots] = knot; }
+    // Keeps the oldest ones.
+    void truncate(uint16_t size) { size_ = size; }
+    // Whose fields are what they were.
+    Knot& push() { return ring_[(first_ + size_++) % kMaxKnots]; }
     void pop() {
         first_ = static_cast<uint16_t>((first_ + 1) % kMaxKnots);
         --size_;

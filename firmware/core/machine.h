@@ -95,6 +95,8 @@ class Machine {
     void receive_chunk(const Frame& frame, const Arrival& arrival);
     Verdict judge(const Chunk& chunk, const Arrival& arrival) const;
     Verdict judge_place(const Chunk& chunk) const;
+    Verdict judge_replacement(const Chunk& chunk) const;
+    uint32_t ceiling_of(const Chunk& chunk) const;
     bool is_duplicate(const Chunk& chunk) const;
     void take_chunk(const Chunk& chunk);
     void open_stream(const Chunk& chunk);

@@ -24,14 +24,15 @@ void Path::start(const Knot& knot, uint32_t scale_q30) {
     scale_.set(scale_q30);
 }
 
-void Path::append(const Knot& knot) {
-    Knot fresh = knot;
+Knot& Path::append() {
+    Knot& fresh = queue_.push();
     fresh.ceiling_q26 = kUnknownCeiling;
-    queue_.push(fresh);
+    return fresh;
 }
 
-void Path::accept(bool ends) {
-    ends_ = ends;
+void Path::accept(Ending ending, uint64_t tail_us) {
+    ending_ = ending;
+    tail_us_ = tail_us < kLongestTailUs ? tail_us : kLongestTailUs;
     queued_us_ = 0;
     for (uint16_t i = 0; i < queue_.size(); ++i) queued_us_ += queue_[i].dt_us;
     refresh_ceilings();
@@ -45,7 +46,8 @@ void Path::flush() {
     elapsed_ = 0;
     queued_us_ = 0;
     is_active_ = false;
-    ends_ = false;
+    ending_ = Ending::Open;
+    tail_us_ = 0;
     scale_.set(0);
 }
 
@@ -59,11 +61,55 @@ void Path::load() {
     }
 }
 
+// The knot that the path has ended on is passed, though the stream's end is said two slots later.
+int32_t Path::find(uint64_t at_us) const {
+    const bool has_ended = ending_ == Ending::Last && queue_.is_empty();
+    if (at_us == from_us_ && elapsed_ == 0 && !has_ended) return kHere;
+    if (at_us <= play_us()) return kPassed;
+    uint64_t time_us = from_us_;
+    for (uint16_t i = 0; i < queue_.size(); ++i) {
+        time_us += queue_[i].dt_us;
+        if (time_us == at_us) return i;
+    }
+    return kNowhere;
+}
+
+uint16_t Path::space_behind(int32_t place) const {
+    return static_cast<uint16_t>(queue_.space() + queue_.size() - (place + 1));
+}
+
+uint32_t Path::played_q26() const {
+    const uint64_t s_q30 = scale_.value();
+    return static_cast<uint32_t>((s_q30 * s_q30) >> 34);
+}
+
+// Backwards from the place; once a knot's ceiling does not fall, what is before it stands as it is.
+uint32_t Path::ceiling_with(int32_t place, uint32_t ceiling_q26) const {
+    uint32_t next_q26 = ceiling_q26;
+    for (int32_t i = place; i >= 0; --i) {
+        if (ceiling_q26 >= knot(i).ceiling_q26) return kFullCeiling;
+        next_q26 = ceiling_q26;
+        ceiling_q26 = ceiling_.before(knot(i - 1), knot(i), ceiling_q26);
+    }
+    return ceiling_q26 < next_q26 ? ceiling_q26 : next_q26;
+}
+
+// Forgets what is behind the place; accept() loads what comes there instead.
+void Path::cut(int32_t place) {
+    queue_.truncate(static_cast<uint16_t>(place + 1));
+    if (place == kHere) segment_.dt_us = 0;
+}
+
+bool Path::is_braking() const {
+    const uint64_t left_us = remaining_us();
+    return left_us != 0 && left_us <= tail_us_ && scale_.value() > kFullScale / 2;
+}
+
 // Backwards from the newest knot; once a knot's ceiling comes out as it was, the older ones stand as they are.
 void Path::refresh_ceilings() {
     if (queue_.is_empty()) return;
     uint16_t i = static_cast<uint16_t>(queue_.size() - 1);
-    queue_[i].ceiling_q26 = ends_ ? kFullCeiling : 0;
+    queue_[i].ceiling_q26 = ending_ == Ending::Open ? 0 : kFullCeiling;
     while (true) {
         Knot& from = i == 0 ? from_ : queue_[static_cast<uint16_t>(i - 1)];
         const uint32_t ceiling = ceiling_.before(from, queue_[i], queue_[i].ceiling_q26);
@@ -129,9 +175,9 @@ void Path::advance(uint32_t bound_q30, Point* point) {
     }
     const bool is_at_last = is_active_ && segment_.dt_us == 0;
     if (is_at_last) scale_.set(0);
-    point->is_end = is_at_last && ends_;
-    point->is_starved = is_at_last && !ends_;
-    point->play_us = from_us_ + (elapsed_ >> kTimeBits);
+    point->is_end = is_at_last && ending_ == Ending::Last;
+    point->is_starved = is_at_last && ending_ == Ending::Open;
+    point->play_us = play_us();
     if (!is_active_) return;
     const uint32_t u_q24 = segment_.dt_us == 0 ? 0 : segment_.share(elapsed_, kUnitBits);
     for (uint8_t j = 0; j < joints_; ++j) {

@@ -6,7 +6,8 @@
 namespace gemelo {
 
 constexpr uint8_t kMagic = 0x67;
-constexpr uint8_t kProtocolVersion = 1;
+constexpr uint8_t kProtocolVersion = 1;  // standard: PROTOCOL.md, of every frame
+constexpr uint8_t kNewestProtocol = 2;   // standard: the same, with REPLACE
 
 enum class FrameType : uint8_t {
     Traj = 1,
@@ -54,6 +55,9 @@ enum class Code : uint8_t {
     NoHoming,
     BadArgument,
     AccelerationLimit,
+    Late,       // the knot that a replacement goes on from has been passed
+    OtherKnot,  // there is none, or another one: a replacement before was lost or refused
+    NoStop,     // the arm could not stop on the new path
 };
 
 enum class Mode : uint8_t { Boot, Unreferenced, Homing, Idle, Run, Hold, Fault, EStop };
@@ -86,6 +90,7 @@ enum class Command : uint8_t {
 
 constexpr uint16_t kFlagFirst = 1;
 constexpr uint16_t kFlagLast = 2;
+constexpr uint16_t kFlagReplace = 4;
 constexpr uint8_t kNoJoint = 255;
 constexpr uint32_t kMinDtUs = 1000;    // standard: a slot
 constexpr uint32_t kMaxDtUs = 250000;  // chosen

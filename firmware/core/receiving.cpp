@@ -11,6 +11,11 @@ constexpr uint64_t kSilenceUs = 60000000;
 // Chosen: forty heartbeats, so that a gateway that starts anew costs no subscription.
 constexpr uint64_t kSubscribeAgainUs = 4000000;
 
+// For no joint.
+Verdict refuse(Code code, uint32_t value = 0, uint32_t limit = 0) {
+    return Verdict{code, kNoJoint, 0, static_cast<int32_t>(value), static_cast<int32_t>(limit)};
+}
+
 }  // namespace
 
 void Machine::receive(const Arrival& arrival, uint64_t now_us) {
@@ -53,9 +58,6 @@ void Machine::receive_chunk(const Frame& frame, const Arrival& arrival) {
 }
 
 Verdict Machine::judge(const Chunk& chunk, const Arrival& arrival) const {
-    const auto refuse = [](Code code, uint32_t value = 0, uint32_t limit = 0) {
-        return Verdict{code, kNoJoint, 0, static_cast<int32_t>(value), static_cast<int32_t>(limit)};
-    };
     if (arrival.is_retained) return refuse(Code::Retained);
     if (chunk.boot_id() != identity_.boot_id) return refuse(Code::WrongBoot);
     if (chunk.joints() != rules_.joints) return refuse(Code::BadJoints, chunk.joints(), rules_.joints);
@@ -64,6 +66,7 @@ Verdict Machine::judge(const Chunk& chunk, const Arrival& arrival) const {
     if (now_us_ > chunk.expires_us()) return refuse(Code::Expired);
     const Verdict place = judge_place(chunk);
     if (!place.is_ok()) return place;
+    if (chunk.is_replacement() && !chunk.is_first()) return judge_replacement(chunk);
     if (chunk.knots() > path_.space()) return refuse(Code::NoSpace, chunk.knots(), path_.space());
     Knot before = path_.newest();
     if (chunk.is_first()) {
@@ -78,36 +81,68 @@ bool Machine::is_duplicate(const Chunk& chunk) const {
 
 // Checks that this chunk is the expected one.
 Verdict Machine::judge_place(const Chunk& chunk) const {
-    const Verdict not_ready{Code::NotReady, kNoJoint, 0, static_cast<int32_t>(mode_), 0};
-    const Verdict wrong_stream{Code::WrongStream, kNoJoint, 0, 0, 0};
-    const auto gap = [&chunk](uint32_t next_seq) {
-        return Verdict{Code::Gap, kNoJoint, 0, static_cast<int32_t>(chunk.seq()), static_cast<int32_t>(next_seq)};
-    };
+    const Verdict not_ready = refuse(Code::NotReady, static_cast<uint32_t>(mode_));
+    const Verdict wrong_stream = refuse(Code::WrongStream);
     if (mode_ != Mode::Idle && mode_ != Mode::Run && mode_ != Mode::Hold) return not_ready;
     if (is_stopping_) return not_ready;
     if (chunk.stream() == 0 || streams_.is_past(chunk.stream())) return wrong_stream;
     const bool is_playing = path_.is_active() && chunk.stream() == streams_.stream();
     if (is_playing) {
-        if (path_.ends() || chunk.is_first()) return wrong_stream;
-        return chunk.seq() == streams_.next_seq() ? Verdict{} : gap(streams_.next_seq());
+        if (chunk.is_first()) return wrong_stream;
+        if (chunk.is_replacement()) return Verdict{};
+        if (path_.ending() != Ending::Open) return wrong_stream;
+        return chunk.seq() == streams_.next_seq() ? Verdict{} : refuse(Code::Gap, chunk.seq(), streams_.next_seq());
     }
     if (chunk.stream() == streams_.stream()) return wrong_stream;
     if (chunk.is_first() && chunk.seq() == 0) {
         if (mode_ != Mode::Idle) return not_ready;
-        return takes_motion() ? Verdict{} : Verdict{Code::NotArmed, kNoJoint, 0, 0, 0};
+        return takes_motion() ? Verdict{} : refuse(Code::NotArmed);
     }
-    return mode_ == Mode::Idle && chunk.seq() != 0 && !chunk.is_first() ? gap(0) : wrong_stream;
+    return mode_ == Mode::Idle && chunk.seq() != 0 && !chunk.is_first() ? refuse(Code::Gap, chunk.seq()) : wrong_stream;
+}
+
+// Checks that it goes on from a knot of the path that has not been passed, and that the arm can stop on it.
+Verdict Machine::judge_replacement(const Chunk& chunk) const {
+    const int32_t place = path_.find(chunk.from_us());
+    if (place == Path::kPassed)
+        return refuse(Code::Late, static_cast<uint32_t>(chunk.from_us()), static_cast<uint32_t>(path_.play_us()));
+    if (place == Path::kNowhere || !chunk.begins_with(path_.knot(place)))
+        return refuse(Code::OtherKnot, chunk.seq(), streams_.next_seq());
+    const uint16_t knots = static_cast<uint16_t>(chunk.knots() - 1), space = path_.space_behind(place);
+    if (knots > space) return refuse(Code::NoSpace, knots, space);
+    const Verdict verdict = check_knots(chunk, rules_, path_.knot(place));
+    if (!verdict.is_ok()) return verdict;
+    const uint32_t ceiling_q26 = path_.ceiling_with(place, ceiling_of(chunk));
+    return ceiling_q26 < path_.played_q26() ? refuse(Code::NoStop, ceiling_q26, path_.played_q26()) : Verdict{};
+}
+
+// At knot 0.
+uint32_t Machine::ceiling_of(const Chunk& chunk) const {
+    Knot pair[2];
+    uint16_t k = static_cast<uint16_t>(chunk.knots() - 1);
+    chunk.read_knot(k, &pair[k % 2]);
+    uint32_t ceiling_q26 = chunk.ends_at_rest() ? kFullCeiling : 0;
+    for (; k > 0; --k) {
+        Knot& from = pair[(k - 1) % 2];
+        chunk.read_knot(static_cast<uint16_t>(k - 1), &from);
+        ceiling_q26 = path_.ceiling_before(from, pair[k % 2], ceiling_q26);
+    }
+    return ceiling_q26;
 }
 
 void Machine::take_chunk(const Chunk& chunk) {
-    if (chunk.is_first()) open_stream(chunk);
-    Knot knot{};
-    for (uint16_t k = chunk.is_first() ? 1 : 0; k < chunk.knots(); ++k) {
-        chunk.read_knot(k, &knot);
-        path_.append(knot);
+    if (chunk.is_first()) {
+        open_stream(chunk);
+    } else if (chunk.is_replacement()) {
+        path_.cut(path_.find(chunk.from_us()));
     }
-    path_.accept(chunk.is_last());
-    streams_.advance();
+    for (uint16_t k = chunk.begin(); k < chunk.knots(); ++k) chunk.read_knot(k, &path_.append());
+    const bool rests = chunk.is_replacement() && chunk.ends_at_rest();
+    path_.accept(chunk.is_last() ? Ending::Last
+                 : rests         ? Ending::Rest
+                                 : Ending::Open,
+                 rests ? static_cast<uint64_t>(chunk.tail()) * chunk.tail_dt_us() : 0);
+    streams_.take(chunk.seq());
 }
 
 void Machine::open_stream(const Chunk& chunk) {

@@ -110,7 +110,7 @@ void Reporter::status(const StatusReport& report) const {
     json.field("online", true);
     json.field("device", report.device);
     json.field("firmware", kFirmwareVersion);
-    json.field("protocol", kProtocolVersion, kProtocolVersion);
+    json.field("protocol", kProtocolVersion, kNewestProtocol);
     json.field("boot_id", static_cast<uint64_t>(report.boot_id));
     json.field("reset_cause", report.reset_cause);
     json.field("joints", static_cast<uint64_t>(report.config->joints));

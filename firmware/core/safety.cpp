@@ -87,7 +87,7 @@ uint8_t Machine::find_limit_ahead(const Point& before, const Point& next) const 
 void Machine::watch_heartbeat() {
     const uint64_t timeout_us = static_cast<uint64_t>(config_->hold_timeout_ms) * 1000;
     if (now_us_ <= alive_us_ + timeout_us) return;
-    if (mode_ == Mode::Run && !is_following_) hold("heartbeat");
+    if (mode_ == Mode::Run && !is_following_ && !path_.is_braking()) hold("heartbeat");
     if (mode_ == Mode::Homing) stop_homing("heartbeat");
 }
 

@@ -16,7 +16,7 @@ class StreamLog {
         stream_ = stream;
         next_seq_ = 0;
     }
-    void advance() { ++next_seq_; }
+    void take(uint32_t seq) { next_seq_ = seq + 1; }
     bool is_past(uint32_t stream) const {
         for (uint32_t past : past_)
             if (past == stream) return true;

@@ -61,7 +61,7 @@ TEST(Status, SaysWhoTheDeviceIs) {
     Wired wired(open_field(), {0, 0}, true);
     EXPECT_EQ(
         wired.statuses.back(),
-        "{\"online\": true, \"device\": \"wired\", \"firmware\": \"1.0.0\", \"protocol\": [1, 1], "
+        "{\"online\": true, \"device\": \"wired\", \"firmware\": \"1.0.0\", \"protocol\": [1, 2], "
         "\"boot_id\": 305419896, \"reset_cause\": \"power_on\", \"joints\": 2, \"tick_hz\": 50000, "
         "\"queue_capacity\": 128, \"referenced\": true, \"armed\": true, \"config_crc32\": 0, \"virtual\": false}");
 }

@@ -9,6 +9,10 @@ namespace {
 
 constexpr JointLimits kLimits{-100 * 256, 100 * 256, 100000 * 256, 1 << 30};
 
+Verdict check_span(const Span& span, const JointLimits& limits) {
+    return gemelo::check_span(span, limits, bounds_of(limits, span.dt_us));
+}
+
 }  // namespace
 
 TEST(Bounds, ACurveThatSwingsBeyondALimitBetweenGoodKnotsIsRefusedWithTheLimitThatItMeets) {

@@ -56,6 +56,10 @@ Bytes seal(Bytes bytes) {
     return bytes;
 }
 
+uint32_t ChunkSpec::dt_to(size_t k) const {
+    return replacing && k + replacing->tail >= rows.size() ? replacing->tail_dt_us : dt_us;
+}
+
 Bytes build(const ChunkSpec& chunk) {
     Bytes bytes =
         header(gemelo::FrameType::Traj, chunk.rows.empty() ? 2 : chunk.rows[0].position.size(), chunk.boot_id);
@@ -64,7 +68,13 @@ Bytes build(const ChunkSpec& chunk) {
     add_u64(bytes, chunk.expires_us);
     add_u32(bytes, chunk.dt_us);
     add_u16(bytes, static_cast<uint16_t>(chunk.rows.size()));
-    add_u16(bytes, static_cast<uint16_t>((chunk.first ? 1 : 0) | (chunk.last ? 2 : 0)));
+    add_u16(bytes, static_cast<uint16_t>((chunk.first ? 1 : 0) | (chunk.last ? 2 : 0) | (chunk.replacing ? 4 : 0)));
+    if (chunk.replacing) {
+        add_u64(bytes, chunk.replacing->from_us);
+        add_u32(bytes, chunk.replacing->tail_dt_us);
+        add_u16(bytes, chunk.replacing->tail);
+        add_u16(bytes, 0);
+    }
     for (const Row& row : chunk.rows) {
         for (int32_t value : row.position) add_u32(bytes, static_cast<uint32_t>(value));
         for (int32_t value : row.velocity) add_u32(bytes, static_cast<uint32_t>(value));

@@ -4,6 +4,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <optional>
 #include <vector>
 
 #include "protocol.h"
@@ -21,6 +22,13 @@ struct Row {
     std::vector<int32_t> velocity;
 };
 
+// What REPLACE adds.
+struct Replacing {
+    uint64_t from_us = 0;
+    uint16_t tail = 0;
+    uint32_t tail_dt_us = 20000;
+};
+
 struct ChunkSpec {
     uint32_t stream = 7;
     uint32_t seq = 0;
@@ -30,6 +38,10 @@ struct ChunkSpec {
     uint32_t dt_us = 20000;
     uint64_t expires_us = kNever;
     uint32_t boot_id = kBoot;
+    std::optional<Replacing> replacing = std::nullopt;
+
+    // From knot k - 1 to knot k.
+    uint32_t dt_to(size_t k) const;
 };
 
 Bytes build(const ChunkSpec& chunk);

@@ -86,7 +86,7 @@ TEST(KnotQueue, GivesBackInOrderAcrossItsSeam) {
     for (int round = 0; round < 50; ++round) {
         while (queue.space() > 0) {
             knot.dt_us = in++;
-            queue.push(knot);
+            queue.push() = knot;
         }
         for (int i = 0; i < 37; ++i) {
             ASSERT_EQ(queue[0].dt_us, out++);

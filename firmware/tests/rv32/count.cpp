@@ -1,4 +1,5 @@
-// Instructions of Stepper::tick() and Machine::slot(): their distribution in a plain move, and the most in any play.
+// Instructions of Stepper::tick() and Machine::slot(): their distribution in a plain move, and the most in any play; of
+// Machine::receive() those of any play.
 // The clock is QEMU's -icount shift=0, in which minstret counts exactly what was executed.
 #include "script.h"
 #include "tally.h"
@@ -22,7 +23,7 @@ bool is_exact() {
     return instructions() - between == between - before + 100;
 }
 
-Tally ticks, slots;
+Tally ticks, slots, receives;
 
 class Counter final : public Watch {
   public:
@@ -42,6 +43,12 @@ class Counter final : public Watch {
         slots.add(instructions() - before - overhead_);
         // Counted from the slot after: standing still would flatter.
         ticks.is_open = slots.is_open = is_plain && machine.is_moving();
+    }
+
+    void receive(Machine& machine, const Arrival& arrival, uint64_t now_us) override {
+        const uint32_t before = instructions();
+        machine.receive(arrival, now_us);
+        receives.add(instructions() - before - overhead_);
     }
 
     bool is_plain = false;
@@ -64,6 +71,8 @@ void print(const char* name, uint8_t joints, const Tally& tally) {
 void count(uint8_t joints) {
     ticks.clear();
     slots.clear();
+    receives.clear();
+    receives.is_open = true;
     Counter counter;
     Player player(joints, counter);
     player.play(Move{1, joints, kZero, kThere}, kEventful);
@@ -73,6 +82,7 @@ void count(uint8_t joints) {
     play_safety(player, joints);
     print("tick", joints, ticks);
     print("slot", joints, slots);
+    print("receive", joints, receives);
 }
 
 }  // namespace

@@ -112,6 +112,8 @@ void Player::act(const Move& move, Deed deed) {
             return send(move.chunk(static_cast<uint16_t>(next_knot_ - kChunkKnots), seq_ - 1));
         case Deed::SkipChunk:
             return send(move.chunk(static_cast<uint16_t>(next_knot_ + kChunkKnots), seq_ + 1));
+        case Deed::Replace:
+            return replace(move);
         case Deed::Home:
             return send(command(Command::Home, ++commands_));
         case Deed::Reset:
@@ -139,10 +141,21 @@ void Player::act(const Move& move, Deed deed) {
     }
 }
 
-void Player::feed(const Move& move) {
+uint64_t Player::played_us(const Move& move) const {
     const Point& present = machine_.present();
-    const uint64_t played_us = present.stream == move.stream ? present.play_us : 0;
-    while (next_knot_ <= kLastKnot && next_knot_ * kDtUs < played_us + kLeadUs) {
+    return present.stream == move.stream ? present.play_us : 0;
+}
+
+// From the second knot ahead.
+void Player::replace(const Move& move) {
+    const uint16_t first = static_cast<uint16_t>(played_us(move) / kDtUs + 2);
+    send(move.replacement(first, seq_++));
+    next_knot_ = static_cast<uint16_t>(first + kReplacingKnots + 1);
+}
+
+void Player::feed(const Move& move) {
+    const uint64_t until_us = played_us(move) + kLeadUs;
+    while (next_knot_ <= kLastKnot && next_knot_ * kDtUs < until_us) {
         send(move.chunk(next_knot_, seq_++));
         next_knot_ = static_cast<uint16_t>(next_knot_ + kChunkKnots);
     }
@@ -180,4 +193,6 @@ Levels Player::read_pins() const {
     return Levels{static_cast<uint32_t>(levels), static_cast<uint32_t>(levels >> 32)};
 }
 
-void Player::send(const Wire& wire) { machine_.receive(Arrival{wire.bytes, wire.size, false, now_us_}, now_us_); }
+void Player::send(const Wire& wire) {
+    watch_.receive(machine_, Arrival{wire.bytes, wire.size, false, now_us_}, now_us_);
+}

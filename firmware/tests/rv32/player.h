@@ -12,6 +12,7 @@ enum class Deed : uint8_t {
     Feed,
     RepeatChunk,
     SkipChunk,
+    Replace,
     Home,
     Reset,
     Arm,
@@ -34,6 +35,9 @@ class Watch {
   public:
     virtual void tick(gemelo::Machine& machine, const gemelo::Levels& levels) { machine.stepper().tick(levels); }
     virtual void slot(gemelo::Machine& machine, uint64_t now_us) { machine.slot(now_us); }
+    virtual void receive(gemelo::Machine& machine, const gemelo::Arrival& arrival, uint64_t now_us) {
+        machine.receive(arrival, now_us);
+    }
     virtual void hear(gemelo::Output, const uint8_t*, size_t) {}
     // A millisecond is over.
     virtual void look(gemelo::Machine&, uint32_t) {}
@@ -54,6 +58,8 @@ class Player {
     static void said(void* self, gemelo::Output output, const uint8_t* bytes, size_t size);
     void act(const Move& move, Deed deed);
     void feed(const Move& move);
+    void replace(const Move& move);
+    uint64_t played_us(const Move& move) const;
     void run_ms();
     void turn_shafts();
     gemelo::Levels read_pins() const;

@@ -43,6 +43,11 @@ void add_u64(Wire* wire, uint64_t value) {
     wire->size += 8;
 }
 
+uint16_t knots_from(uint16_t first, uint16_t most) {
+    const int left = kLastKnot + 1 - first;
+    return left < most ? static_cast<uint16_t>(left) : most;
+}
+
 Wire sealed(Wire wire) {
     wire.size = seal_frame(wire.bytes, wire.size);
     return wire;
@@ -50,22 +55,39 @@ Wire sealed(Wire wire) {
 
 }  // namespace
 
-Wire Move::chunk(uint16_t first, uint32_t seq) const {
-    const int left = kLastKnot + 1 - first;
-    const uint16_t knots = left < kChunkKnots ? static_cast<uint16_t>(left) : kChunkKnots;
+Wire Move::begin(uint16_t first, uint16_t knots, uint32_t seq, uint16_t flags) const {
     Wire wire = header(FrameType::Traj, joints, kBoot);
     add_u32(&wire, stream);
     add_u32(&wire, seq);
     add_u64(&wire, UINT64_MAX);
     add_u32(&wire, kDtUs);
     add_u16(&wire, knots);
-    add_u16(&wire, static_cast<uint16_t>((first == 0 ? kFlagFirst : 0) | (knots == left ? kFlagLast : 0)));
+    const int last = first + knots > kLastKnot ? kFlagLast : 0;
+    add_u16(&wire, static_cast<uint16_t>(flags | (first == 0 ? kFlagFirst : 0) | last));
+    return wire;
+}
+
+Wire Move::end(Wire wire, uint16_t first, uint16_t knots) const {
     for (int64_t i = first; i < first + knots; ++i) {
         for (uint8_t j = 0; j < joints; ++j)
             add_u32(&wire, static_cast<uint32_t>(position_q8(from[j], distance[j], i)));
         for (uint8_t j = 0; j < joints; ++j) add_u32(&wire, static_cast<uint32_t>(velocity_q8(distance[j], i)));
     }
     return sealed(wire);
+}
+
+Wire Move::chunk(uint16_t first, uint32_t seq) const {
+    const uint16_t knots = knots_from(first, kChunkKnots);
+    return end(begin(first, knots, seq, 0), first, knots);
+}
+
+Wire Move::replacement(uint16_t first, uint32_t seq) const {
+    const uint16_t knots = knots_from(first, kReplacingKnots + 1);
+    Wire wire = begin(first, knots, seq, kFlagReplace);
+    add_u64(&wire, first * kDtUs);
+    add_u32(&wire, kDtUs);
+    add_u32(&wire, 1);  // the tail, and 0
+    return end(wire, first, knots);
 }
 
 Wire command(Command command, uint32_t id, uint16_t argument) {

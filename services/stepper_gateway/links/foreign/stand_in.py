@@ -30,6 +30,7 @@ from gemelo.services.stepper_gateway.links.link import Kind
 
 STALL = 0.1  # [s] a later caller was stopped by the operating system, and catches nothing up; chosen: five knots
 LAST_SLOTS = 2000  # [us] that run after a stall; chosen: two slots show that the device stood still
+PROTOCOL = (1, 1)  # chosen: what has been sent to a board of another dialect is not replaced any more
 OF_THE_BOARD = (Kind.SENSORS, Kind.SHAFT)  # the core has neither; where the board has sensors, it says so itself
 
 Report = tuple[Kind, bytes]
@@ -154,7 +155,7 @@ class StandIn:
         match kind:
             case Kind.STATUS:
                 status = msgspec.json.decode(payload, type=dict[str, object])
-                status |= {"firmware": self._name, "open_loop": True, "virtual": False}
+                status |= {"firmware": self._name, "protocol": PROTOCOL, "open_loop": True, "virtual": False}
                 return kind, msgspec.json.encode(status)
             case Kind.STATE:
                 state = decode(payload)
