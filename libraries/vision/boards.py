@@ -11,14 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.errors import NotMeasured
 from gemelo.libraries.vision.rigid import Array
 from gemelo.libraries.vision.tag_pose import square
 from gemelo.libraries.vision.tags import FAMILIES, GreyImage, doubled, find_tags, tag_modules
 from gemelo.schemas.cell import TagFamily
+from gemelo.schemas.reasons import Reason, because
 
 BOARD_FAMILY = TagFamily.ARUCO_5X5_100  # of the markers between the chessboard's squares
 EVEN = 0.87  # of its clearest edge's contrast the faintest edge of a tag has, or it is partly hidden
-CORNERS = ("upper left", "upper right", "lower right", "lower left")  # of a tag, in the order of `square`
+CORNERS = ("upper left", "upper right", "lower right", "lower left")  # of a tag, as `square`, and `word.quarter`
 FEWEST_CORNERS = 8  # of a chessboard make a shot
 Square = tuple[float, float, float]  # left, lower edge, size [m] of what is black
 
@@ -112,10 +114,10 @@ class TagBoard:
         """(n, 3) [m] the corners of all its tags."""
         return np.vstack([square(self.tag) + centre for centre in self.centres().values()])
 
-    def corner_name(self, index: int) -> str:
+    def corner_name(self, index: int) -> Reason:
         """What the corner is called that is the so manieth of `points`, on the upright page."""
         number = list(self.centres())[index // len(CORNERS)]
-        return f"the {CORNERS[index % len(CORNERS)]} corner of tag {number}"
+        return because("measure.corner", corner=CORNERS[index % len(CORNERS)], tag=number)
 
     def squares(self) -> list[Square]:
         """All that is black, from the lower left corner of the board."""
@@ -154,10 +156,9 @@ class Scale:
     def __post_init__(self) -> None:
         share = self.measured / self.nominal
         if not 0.8 < share < 1.25:
-            raise ValueError(
-                f"the bar of {1000 * self.nominal:g} mm was measured as {1000 * self.measured:g} mm: between "
-                f"{800 * self.nominal:g} and {1250 * self.nominal:g} mm is believed; print again at 100 %, in mm"
-            )
+            nominal, measured = 1000 * self.nominal, 1000 * self.measured
+            limits = {"least": 0.8 * nominal, "most": 1.25 * nominal}
+            raise NotMeasured(because("measure.bar", nominal=nominal, measured=measured, **limits))
 
     def of(self, length: float) -> float:
         """[m] what `length` of the page is on the paper."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from gemelo.libraries.vision.boards import ChessBoard, TagBoard
 from gemelo.libraries.vision.tags import FAMILIES, GreyImage
+from gemelo.schemas.reasons import Reason, because
 
 # Of each kind of tag the smallest dictionary first: its tags are in the larger ones too. Those with few bits find tags
 # where there are none, so they count from FEWEST_OF_WEAK on.
@@ -26,23 +27,28 @@ FEWEST_CORNERS = 12  # the modules of a tag are a chessboard of 3 x 3
 CIRCLES = ((4, 11), (11, 4), (4, 5), (7, 6), (5, 4), (6, 7))  # grids of circles in tutorials
 
 
-def other_board(image: GreyImage, wanted: ChessBoard | TagBoard) -> str:
-    """What is seen that is not `wanted`, as "a chessboard without tags (7 x 5 inner corners)"; empty for nothing."""
+def other_board(image: GreyImage, wanted: ChessBoard | TagBoard) -> Reason | None:
+    """What is seen that is not `wanted`, as a chessboard without tags, and what to print; None for nothing."""
+    seen = _seen(image, wanted)
+    return None if seen is None else because("measure.other_board", seen, command=command_of(wanted))
+
+
+def command_of(wanted: ChessBoard | TagBoard) -> str:
+    """What prints the board that is wanted."""
+    return f"gemelo camera print {'chess' if isinstance(wanted, ChessBoard) else 'tags'}"
+
+
+def _seen(image: GreyImage, wanted: ChessBoard | TagBoard) -> Reason | None:
     name, ids = _tags(image)
     if name:
-        return f"tags of {name}, {_ids(ids)}{_meant(name, ids, wanted)}"
+        return _meant(_tags_seen(name, ids), name, ids, wanted)
     if (corners := _chessboard(image)) is not None:
-        return f"a chessboard without tags ({corners[0]} x {corners[1]} inner corners)"
+        return because("measure.seen.chess", columns=corners[0], rows=corners[1])
     if cv2.QRCodeDetector().detectAndDecode(image)[0]:
-        return "a QR code"
+        return because("measure.seen.qr")
     if any(cv2.findCirclesGrid(image, size, flags=_grid(size))[0] for size in CIRCLES):
-        return "a grid of circles"
-    return ""
-
-
-def remedy(wanted: ChessBoard | TagBoard) -> str:
-    """How the board is printed that is wanted."""
-    return f"print `gemelo camera print {'chess' if isinstance(wanted, ChessBoard) else 'tags'}`"
+        return because("measure.seen.circles")
+    return None
 
 
 def _tags(image: GreyImage) -> tuple[str, list[int]]:
@@ -75,21 +81,29 @@ def _grid(size: tuple[int, int]) -> int:
     return cv2.CALIB_CB_ASYMMETRIC_GRID if 11 in size else cv2.CALIB_CB_SYMMETRIC_GRID
 
 
-def _ids(ids: list[int]) -> str:
-    more = f" and {len(ids) - MOST_NAMED} more" if len(ids) > MOST_NAMED else ""
-    return f"numbers {', '.join(map(str, ids[:MOST_NAMED]))}{more}" if len(ids) > 1 else f"number {ids[0]}"
+def _tags_seen(name: str, ids: list[int]) -> Reason:
+    if len(ids) == 1:
+        return because("measure.seen.tag", family=name, number=ids[0])
+    return because("measure.seen.tags", family=name, numbers=_numbers(ids))
 
 
-def _meant(name: str, ids: list[int], wanted: ChessBoard | TagBoard) -> str:
+def _numbers(ids: list[int]) -> str:
+    """The first of them, and by +3 how many more there are."""
+    more = f", +{len(ids) - MOST_NAMED}" if len(ids) > MOST_NAMED else ""
+    return f"{', '.join(map(str, ids[:MOST_NAMED]))}{more}"
+
+
+def _meant(tags: Reason, name: str, ids: list[int], wanted: ChessBoard | TagBoard) -> Reason:
     """A word on a board of ours for another command, and on one of the wanted kind with other numbers."""
     if isinstance(wanted, ChessBoard):
-        return ", as `gemelo camera print tags` has it" if _is_of_tags(name, ids) else ""
+        own = because("measure.seen.tags.own", tags, command="gemelo camera print tags")
+        return own if _is_of_tags(name, ids) else tags
     if name == "DICT_5X5_50" or name == "DICT_5X5_100":
-        return ", as `gemelo camera print chess` has it"
+        return because("measure.seen.tags.own", tags, command="gemelo camera print chess")
     if getattr(cv2.aruco, name) == FAMILIES[wanted.family][0]:
-        first = wanted.first
-        return f", where the board has {first} to {first + wanted.columns * wanted.rows - 1}"
-    return ""
+        last = wanted.first + wanted.columns * wanted.rows - 1
+        return because("measure.seen.tags.others", tags, first=wanted.first, last=last)
+    return tags
 
 
 def _is_of_tags(name: str, ids: list[int]) -> bool:

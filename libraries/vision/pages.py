@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gemelo.libraries.vision.boards import Square
+from gemelo.libraries.vision.errors import NotMeasured
+from gemelo.schemas.reasons import Reason, because, remedy
 
 POINT = 0.0254 / 72.0  # [m] the unit of a page
 PAGES = {"a4": (0.210, 0.297), "letter": (0.2159, 0.2794), "a3": (0.297, 0.420)}  # [m] width and height, upright
@@ -16,15 +18,12 @@ BELOW = 0.02  # [m] under the board, for the bar and the text
 def page_of(squares: Sequence[Square], size: tuple[float, float], title: str, page: str = "a4") -> bytes:
     """One page with the black `squares` of a board of `size` [m], a bar of 100 mm, and a `title` in ASCII.
 
-    The page lies where the board is wider than high. ValueError where the board does not fit.
+    The page lies where the board is wider than high. NotMeasured where the board does not fit.
     """
     width, height = PAGES[page] if size[0] <= size[1] else PAGES[page][::-1]
     room = width - 2.0 * EDGE, height - 2.0 * EDGE - BELOW
     if size[0] > room[0] or size[1] > room[1]:
-        raise ValueError(
-            f"the board is {1e3 * size[0]:.0f} x {1e3 * size[1]:.0f} mm, and {page} has room for "
-            f"{1e3 * room[0]:.0f} x {1e3 * room[1]:.0f} mm: make it smaller, or print on {_larger(page)}"
-        )
+        raise NotMeasured(_too_small(size, room, page))
     left, lower = (width - size[0]) / 2.0, EDGE + BELOW + (room[1] - size[1]) / 2.0
     drawn = [_rectangle(left + x, lower + y, edge, edge) for x, y, edge in squares]
     drawn += [_rectangle(EDGE, EDGE + 0.006, BAR, 0.0008)]
@@ -34,9 +33,14 @@ def page_of(squares: Sequence[Square], size: tuple[float, float], title: str, pa
     return _document("\n".join(drawn), (width, height))
 
 
-def _larger(page: str) -> str:
-    larger = [name for name, size in PAGES.items() if size > PAGES[page]]
-    return " or ".join(larger) or "a plotter"
+def _too_small(size: tuple[float, float], room: tuple[float, float], page: str) -> Reason:
+    larger = tuple(name for name, edges in PAGES.items() if edges > PAGES[page])
+    mend = remedy("print_on", pages=larger) if larger else remedy("print_on_plotter")
+    (width, height), (room_width, room_height) = (1e3 * size[0], 1e3 * size[1]), (1e3 * room[0], 1e3 * room[1])
+    return because(
+        "measure.page", mend,
+        page=page, width=width, height=height, room_width=room_width, room_height=room_height,
+    )  # fmt: skip
 
 
 def _rectangle(x: float, y: float, width: float, height: float) -> str:

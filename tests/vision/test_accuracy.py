@@ -19,6 +19,12 @@ def turned(points: np.ndarray, angle: float) -> np.ndarray:
     return angle * np.column_stack([-points[:, 1], points[:, 0]])
 
 
+CODES = {
+    Cause.NONE: "well", Cause.MOUNT: "mount", Cause.SCALE: "scale", Cause.ZERO: "zero", Cause.ARM: "arm",
+    Cause.UNKNOWN: "unknown",
+}  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("offsets", "cause"),
     [
@@ -34,7 +40,8 @@ def turned(points: np.ndarray, angle: float) -> np.ndarray:
 def test_each_cause_has_its_pattern(offsets, cause):
     found = judge(TAGS, offsets, BUDGET)
     assert found.cause is cause, found
-    assert f"{1e3 * found.worst:.1f} mm off" in found.sentence
+    assert found.why.code == f"measure.pointing.{CODES[cause]}"
+    assert found.why.values["off"] == pytest.approx(1e3 * found.worst)
 
 
 def test_one_tag_says_how_much_and_not_why():

@@ -7,7 +7,9 @@ import pytest
 
 from gemelo.libraries.vision.boards import ChessBoard, Sighting, picture
 from gemelo.libraries.vision.calibration.lens import fit_lens, tilts
+from gemelo.libraries.vision.errors import NotMeasured
 from gemelo.libraries.vision.rigid import Array, apply, rigid, turn
+from gemelo.schemas.reasons import because
 from gemelo.tools.bench.vision.images import Surface, render
 from tests.vision.tag_views import BARREL
 
@@ -51,8 +53,8 @@ def test_shots_without_tilt_fit_as_well_and_are_refused_by_the_focal_length() ->
     flat, tilted = (fit_lens(shots(15, np.radians(angle)), 640, 480) for angle in (4.0, 35.0))
     assert flat.rms < 1.1 * tilted.rms  # gating on it would accept both
     assert not flat.is_accepted
-    assert "the focal length is known to" in flat.faults[0]
-    assert "tilt the board with" in flat.faults[0]
+    assert flat.faults[0].code == "measure.lens.focal"
+    assert [cause.code for cause in flat.faults[0].causes] == ["measure.advice.tilt"]
     assert flat.focal_sigma > 5.0 * tilted.focal_sigma
 
 
@@ -67,9 +69,9 @@ def test_a_shot_that_is_off_is_named_and_left_out() -> None:
 def test_what_is_missing_is_said() -> None:
     pile = [Sighting(shot.points, shot.pixels * 0.4 + (10.0, 10.0)) for shot in shots(12, np.radians(5.0))]
     fit = fit_lens(pile, 640, 480)
-    assert sum("tilt the board with its" in line for line in fit.advice) >= 2
-    (corner,) = (line for line in fit.advice if "hold the board into the" in line)
-    assert "upper left" not in corner
+    assert [each.code for each in fit.advice].count("measure.advice.tilt") >= 2
+    (corner,) = (each for each in fit.advice if each.code == "measure.advice.cover")
+    assert corner.values["quarter"] != "upper left"
 
 
 def test_a_tilt_has_the_sign_that_the_advice_names() -> None:
@@ -84,8 +86,9 @@ def test_a_tilt_has_the_sign_that_the_advice_names() -> None:
 
 
 def test_too_few_shots_are_counted() -> None:
-    with pytest.raises(ValueError, match="3 shots show enough of the board, at least 8 are needed"):
+    with pytest.raises(NotMeasured) as refused:
         fit_lens(shots(3, 0.5), 640, 480)
+    assert refused.value.reason == because("measure.shots.few", count=3, least=8)
 
 
 def test_the_board_in_an_image_is_where_it_is() -> None:

@@ -15,7 +15,9 @@ from gemelo.libraries.vision.calibration.mount import fit_mount
 from gemelo.libraries.vision.calibration.reprojection import Carrier
 from gemelo.libraries.vision.calibration.touches import fit_touches, spread_points
 from gemelo.libraries.vision.camera_model import of_field_of_view
+from gemelo.libraries.vision.errors import NotMeasured
 from gemelo.libraries.vision.rigid import apply, inverse, rigid
+from gemelo.schemas.reasons import because
 from gemelo.tools.bench.vision.mounting import (
     MountingTrial,
     closed_form,
@@ -72,10 +74,9 @@ def test_what_an_arm_that_cannot_tilt_leaves_open_is_refused_by_name(rm1: ArmDes
     trial = level_trial(rm1, MODEL, ONE, 15, np.random.default_rng(0))
     fit = fit_mount(trial.views, MODEL, Carrier.BOARD)
     assert not fit.is_accepted
-    assert fit.undetermined == (
-        "the camera's height and the board's height on the link cannot be told apart: "
-        "measure the board's height and give it with --tag-height",
-    )
+    height = because("measure.advice.height")
+    parts = {"parts": ("camera height",), "last": "board on link height"}
+    assert fit.undetermined == (because("measure.undetermined.several", height, **parts),)
 
 
 def test_with_the_height_given_it_is_determined(rm1: ArmDescription) -> None:
@@ -91,7 +92,7 @@ def test_poses_that_never_turn_are_refused(rm1: ArmDescription) -> None:
     again = _seen_again(trial, [view.base_from_link for view in level])
     fit = fit_mount(again.views, MODEL, Carrier.BOARD)
     assert not fit.is_accepted
-    assert "take poses that are tilted" in " ".join(fit.undetermined)
+    assert because("measure.advice.poses") in [each.causes[0] for each in fit.undetermined]
 
 
 def _unturned(pose: np.ndarray) -> np.ndarray:
@@ -125,7 +126,7 @@ def test_a_pose_whose_tag_was_seen_two_pixels_off_is_named_and_left_out() -> Non
 
 def test_too_few_poses_are_counted() -> None:
     trial = six_joint_trial(MODEL, Carrier.CAMERA, NINE, 3, np.random.default_rng(4))
-    with pytest.raises(ValueError, match="3 poses show the board, at least 5 are needed"):
+    with pytest.raises(NotMeasured, match="3 poses show the board, at least 5 are needed"):
         fit_mount(trial.views, MODEL, Carrier.CAMERA)
 
 

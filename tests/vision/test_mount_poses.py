@@ -21,6 +21,7 @@ from gemelo.libraries.vision.calibration.shots import one_of, without_hidden
 from gemelo.libraries.vision.camera_model import of_field_of_view
 from gemelo.libraries.vision.rigid import Array, from_transform, inverse, rigid, turn
 from gemelo.libraries.vision.tag_pose import square
+from gemelo.schemas.reasons import because
 from gemelo.tools.bench.vision.mount_images import (
     Setup,
     Sight,
@@ -124,10 +125,9 @@ def test_an_arm_that_cannot_tilt_is_told_before_it_moves_what_is_to_be_measured(
         replace(found.belief, height=None), link_pose(arm, sight.setup.link), limits_of(arm),
         np.array(sight.setup.start), lambda joints: True, 10,
     )  # fmt: skip
-    assert chosen.undetermined == (
-        "the camera's height and the board's height on the link cannot be told apart: "
-        "measure the board's height and give it with --tag-height",
-    )
+    height = because("measure.advice.height")
+    parts = {"parts": ("camera height",), "last": "board on link height"}
+    assert chosen.undetermined == (because("measure.undetermined.several", height, **parts),)
     fit = fit_mount(found.views, sight.model, Carrier.BOARD)
     assert fit.undetermined == chosen.undetermined
     assert fit.held_out == np.inf
@@ -155,14 +155,14 @@ def test_arms_of_too_few_axes_are_refused_by_name(link_at: LinkAt, start: tuple[
     chosen = choose_poses(belief, link_at, limits, np.array(start), lambda joints: True, 10)
     assert len(chosen.joints) >= 8
     assert len(chosen.undetermined) == count
-    said = " ".join(chosen.undetermined)
-    assert "cannot be told apart" in said
+    assert {each.code for each in chosen.undetermined} == {"measure.undetermined.several"}
+    advice = {each.causes[0].code for each in chosen.undetermined}
     if link_at is table_of_four:
-        assert "--tag-height" in said
+        assert advice == {"measure.advice.height"}
         known = choose_poses(replace(belief, height=0.03), link_at, limits, np.array(start), lambda joints: True, 10)
         assert known.undetermined == ()
     else:
-        assert "tilted by 30 degrees about two axes" in said
+        assert "measure.advice.poses" in advice
 
 
 @pytest.mark.parametrize("way", list(WAYS))
@@ -173,9 +173,8 @@ def test_tags_of_another_size_than_said_are_named(way: str) -> None:
     ]
     fit = fit_mount(smaller, sight.model, sight.setup.carrier, found.belief.height)
     assert not fit.is_accepted
-    assert fit.faults[0].startswith(("the tags are 5.", "the tags are 4."))
-    assert "% larger than is said of them" in fit.faults[0]
-    assert "--bar" in fit.faults[0]
+    assert fit.faults[0].code == "measure.scale.larger"
+    assert fit.faults[0].values["percent"] == pytest.approx(5.0, abs=0.999)
     assert tool_error(fit.parent_from_camera, sight.truth, sight.setup.carrier) > 4.0  # why it is refused
 
 

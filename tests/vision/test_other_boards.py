@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from gemelo.libraries.vision.boards import picture
-from gemelo.libraries.vision.other_boards import other_board, remedy
+from gemelo.libraries.vision.other_boards import command_of, other_board
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.camera.camera_boards import CHESS_BOARD, TAG_BOARD
 
 PAPER = 255
@@ -52,20 +53,25 @@ def charuco(dictionary: str, columns: int = 7, rows: int = 5) -> np.ndarray:
 )
 def test_what_is_seen_is_named(image, said, board):
     found = other_board(image, board)
-    assert found.startswith(said)
-    assert bool(found) == bool(said)
+    assert (found is not None) == bool(said)
+    assert str(found.causes[0] if found is not None else "").startswith(said)
 
 
 def test_the_board_of_the_other_command_is_said_to_be_that():
     chess = picture(CHESS_BOARD.squares(), CHESS_BOARD.size, 0.02, 3000.0)
     of_tags = picture(TAG_BOARD.squares(), TAG_BOARD.size, 0.02, 5000.0)
-    assert other_board(chess, TAG_BOARD).endswith("as `gemelo camera print chess` has it")
-    assert other_board(of_tags, CHESS_BOARD).endswith("as `gemelo camera print tags` has it")
-    assert remedy(CHESS_BOARD) == "print `gemelo camera print chess`"
-    assert remedy(TAG_BOARD) == "print `gemelo camera print tags`"
+    for image, wanted, shown in ((chess, TAG_BOARD, "chess"), (of_tags, CHESS_BOARD, "tags")):
+        found = other_board(image, wanted)
+        assert found is not None
+        assert (found.code, found.values) == ("measure.other_board", {"command": command_of(wanted)})
+        assert found.causes[0].code == "measure.seen.tags.own"
+        assert found.causes[0].values == {"command": f"gemelo camera print {shown}"}
+    assert command_of(CHESS_BOARD) == "gemelo camera print chess"
+    assert command_of(TAG_BOARD) == "gemelo camera print tags"
 
 
 def test_tags_of_the_right_kind_with_other_numbers_are_said_with_those_that_are_wanted():
-    assert other_board(tags("DICT_APRILTAG_36h11", 0, 1), TAG_BOARD) == (
-        "tags of DICT_APRILTAG_36h11, numbers 0, 1, where the board has 200 to 208"
-    )
+    seen = because("measure.seen.tags", family="DICT_APRILTAG_36h11", numbers="0, 1")
+    others = because("measure.seen.tags.others", seen, first=200, last=208)
+    found = other_board(tags("DICT_APRILTAG_36h11", 0, 1), TAG_BOARD)
+    assert found == because("measure.other_board", others, command="gemelo camera print tags")

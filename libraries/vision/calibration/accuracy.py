@@ -14,6 +14,7 @@ from enum import StrEnum
 import numpy as np
 
 from gemelo.libraries.vision.rigid import Array
+from gemelo.schemas.reasons import Reason, because
 
 FEWEST_TO_TELL = 2  # tags: one shows how large the error is, not where it comes from
 SURE = 2.0  # standard deviations that an error may have
@@ -55,7 +56,7 @@ class Accuracy:
     turn: float  # [m] RMS that a turn of the camera explains
     scale: float  # [m] RMS that a scale explains
     rest: float  # [m] RMS that nothing of these explains
-    sentence: str
+    why: Reason  # the cause, with how much of the error it is
 
 
 def judge(points: Array, offsets: Array, budget: Budget) -> Accuracy:
@@ -65,7 +66,7 @@ def judge(points: Array, offsets: Array, budget: Budget) -> Accuracy:
     worst = float(sizes.max())
     shift, turn, scale, rest = _parts(points, offsets)
     cause = _cause(points, offsets, budget, (shift, turn, scale, rest))
-    return Accuracy(cause, worst, shift, turn, scale, rest, _sentence(cause, worst, budget, (shift, turn, scale, rest)))
+    return Accuracy(cause, worst, shift, turn, scale, rest, _why(cause, worst, budget, (shift, turn, scale, rest)))
 
 
 def _parts(points: Array, offsets: Array) -> tuple[float, float, float, float]:
@@ -114,22 +115,19 @@ def _turn(points: Array, offsets: Array) -> tuple[float, float]:
     return angle**2 * spread, angle
 
 
-def _sentence(cause: Cause, worst: float, budget: Budget, parts: Sequence[float]) -> str:
+def _why(cause: Cause, worst: float, budget: Budget, parts: Sequence[float]) -> Reason:
     shift, turn, scale, rest = (1e3 * each for each in parts)
-    off = f"up to {1e3 * worst:.1f} mm off"
+    off = 1e3 * worst
     match cause:
         case Cause.NONE:
-            return f"{off}: no more than camera, mount and arm are good for together (+-{1e3 * budget.total:.1f} mm)"
+            return because("measure.pointing.well", off=off, total=1e3 * budget.total)
         case Cause.MOUNT:
-            return (
-                f"{off}, {shift:.1f} mm of it everywhere alike and {turn:.1f} mm as a turn: the camera stands elsewhere"
-            )
+            return because("measure.pointing.mount", off=off, shift=shift, turn=turn)
         case Cause.SCALE:
-            return f"{off}, {scale:.1f} mm of it growing with the distance: the lens, or a print of another scale"
+            return because("measure.pointing.scale", off=off, scale=scale)
         case Cause.ZERO:
-            return f"{off}, as a turn about the base: the first joint's zero"
+            return because("measure.pointing.zero", off=off)
         case Cause.ARM:
-            return f"{off}, {rest:.1f} mm of it different from tag to tag: the arm, or what it has lost"
+            return because("measure.pointing.arm", off=off, rest=rest)
         case _:
-            said = f"alike {shift:.1f}, turned {turn:.1f}, spread {scale:.1f}, different {rest:.1f} mm"
-            return f"{off}, and not of one cause alone ({said})"
+            return because("measure.pointing.unknown", off=off, shift=shift, turn=turn, scale=scale, rest=rest)

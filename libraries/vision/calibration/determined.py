@@ -14,6 +14,7 @@ from gemelo.libraries.vision.calibration.reprojection import (
     view_slopes,
 )
 from gemelo.libraries.vision.rigid import Array
+from gemelo.schemas.reasons import Reason, because
 
 LENGTH = 0.2  # [m] at which a turn counts as much as a step
 SCALE = np.tile([1.0 / LENGTH] * 3 + [1.0] * 3, 2)
@@ -37,32 +38,25 @@ def prior_information(problem: Reprojection) -> Array:
     return np.asarray(slopes.T @ slopes)
 
 
-def determined(problem: Reprojection, state: CalibrationState) -> tuple[float, tuple[str, ...]]:
-    """[m] of the least determined direction of camera and board, and a sentence for each that is not determined."""
+def determined(problem: Reprojection, state: CalibrationState) -> tuple[float, tuple[Reason, ...]]:
+    """[m] of the least determined direction of camera and board, and for each that is not determined what it is."""
     views = [information(problem, state, index) for index in range(len(problem.views))]
     strengths, directions = np.linalg.eigh(np.sum(views, axis=0) + prior_information(problem))
     sigmas = 1.0 / np.sqrt(np.maximum(strengths, 1e-18))
     loose = [direction for sigma, direction in zip(sigmas, directions.T, strict=True) if sigma > LARGEST_SIGMA]
-    return float(sigmas.max()), tuple(_sentence(problem.carrier, direction) for direction in loose)
+    return float(sigmas.max()), tuple(_undetermined(problem.carrier, direction) for direction in loose)
 
 
-def _sentence(carrier: Carrier, direction: Array) -> str:
-    """What a direction of the unknowns that nothing determines is, and what to do."""
-    where = "on the link" if carrier is Carrier.BOARD else "in the base"
-    camera = ("turn about x", "turn about y", "turn about z", "x", "y", "height")
-    names = [f"the camera's {name}" for name in camera] + [f"the board's {name} {where}" for name in camera]
+def _undetermined(carrier: Carrier, direction: Array) -> Reason:
+    """What a direction of the unknowns that nothing determines is, by `word.place`, and what to do."""
+    board = "board on link" if carrier is Carrier.BOARD else "board in base"
+    unknowns = ("turn about x", "turn about y", "turn about z", "x", "y", "height")
+    names = [f"{whose} {name}" for whose in ("camera", board) for name in unknowns]
     assert len(names) == KNOWN
     strongest = np.abs(direction).max()
     part = [name for name, share in zip(names, direction, strict=True) if abs(share) > LEAST_SHARE * strongest]
-    said = (
-        f"{', '.join(part[:-1])} and {part[-1]} cannot be told apart"
-        if len(part) > 1
-        else f"{part[0]} cannot be determined"
-    )
-    heights = {"the camera's height", f"the board's height {where}"}
-    remedy = (
-        "measure the board's height and give it with --tag-height"
-        if heights == set(part)
-        else "take poses that are tilted by 30 degrees about two axes, or touch points of a printed board"
-    )
-    return f"{said}: {remedy}"
+    is_height = {"camera height", f"{board} height"} == set(part)
+    mend = because("measure.advice.height" if is_height else "measure.advice.poses")
+    if len(part) > 1:
+        return because("measure.undetermined.several", mend, parts=tuple(part[:-1]), last=part[-1])
+    return because("measure.undetermined", mend, part=part[0])

@@ -14,7 +14,9 @@ import numpy as np
 
 from gemelo.libraries.vision.boards import Sighting
 from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.errors import NotMeasured
 from gemelo.libraries.vision.rigid import Array, from_opencv
+from gemelo.schemas.reasons import Reason, because
 
 FEWEST_SHOTS = 8
 LARGEST_FOCAL_SIGMA = 0.004  # of the focal length
@@ -24,7 +26,7 @@ WANTED_COVERAGE = 0.6  # of the cells of the image
 CELLS = 4  # to each side of the image
 OUTLIER_AT = 4.0  # times the median error of the other shots
 LEAST_OUTLIER = 0.6  # [px]
-SIDES = ("its left edge away", "its right edge away", "its upper edge away", "its lower edge away")
+SIDES = ("left", "right", "upper", "lower")  # edges of the board that are tilted away: `word.edge`
 
 
 @dataclass(frozen=True)
@@ -37,8 +39,8 @@ class LensFit:
     held_out: float  # [px] median error of shots that took no part
     errors: tuple[float, ...]  # [px] RMS of each shot
     outliers: tuple[int, ...]  # shots that do not agree with the others, counted from 0
-    advice: tuple[str, ...]  # what shots are missing
-    faults: tuple[str, ...]  # why it is not accepted
+    advice: tuple[Reason, ...]  # what shots are missing
+    faults: tuple[Reason, ...]  # why it is not accepted
 
     @property
     def is_accepted(self) -> bool:
@@ -47,9 +49,9 @@ class LensFit:
 
 
 def fit_lens(shots: Sequence[Sighting], width: int, height: int) -> LensFit:
-    """The lens of images of `width` x `height` [px]; ValueError for fewer shots than are needed to try."""
+    """The lens of images of `width` x `height` [px]; NotMeasured for fewer shots than are needed to try."""
     if len(shots) < FEWEST_SHOTS:
-        raise ValueError(f"{len(shots)} shots show enough of the board, at least {FEWEST_SHOTS} are needed")
+        raise NotMeasured(because("measure.shots.few", count=len(shots), least=FEWEST_SHOTS))
     kept = list(range(len(shots)))
     matrix, distortion, sigma, rms, errors, poses = _solve(shots, width, height)
     outliers = _outliers(errors)
@@ -111,13 +113,12 @@ def tilts(camera_from_board: Sequence[Array]) -> Array:
     return np.asarray(np.arctan2(-normals[:, :2], -normals[:, 2:]))
 
 
-def tilt_advice(camera_from_board: Sequence[Array]) -> tuple[str, ...]:
+def tilt_advice(camera_from_board: Sequence[Array]) -> tuple[Reason, ...]:
     """Which tilts no shot has, each camera_from_board (4, 4)."""
     found = tilts(camera_from_board)
     reached = (found[:, 0].max(), -found[:, 0].min(), found[:, 1].max(), -found[:, 1].min())
     return tuple(
-        f"tilt the board with {side}: by {np.degrees(most):.0f} degrees so far, "
-        f"{np.degrees(WANTED_TILT):.0f} are wanted"
+        because("measure.advice.tilt", side=side, so_far=float(np.degrees(most)), wanted=float(np.degrees(WANTED_TILT)))
         for side, most in zip(SIDES, reached, strict=True)
         if most < WANTED_TILT
     )
@@ -133,7 +134,7 @@ def coverage(shots: Sequence[Sighting], width: int, height: int) -> Array:
     return seen
 
 
-def coverage_advice(shots: Sequence[Sighting], width: int, height: int) -> tuple[str, ...]:
+def coverage_advice(shots: Sequence[Sighting], width: int, height: int) -> tuple[Reason, ...]:
     """Where in the image no shot has a point, if that is much of it."""
     seen = coverage(shots, width, height)
     if seen.mean() >= WANTED_COVERAGE:
@@ -146,21 +147,16 @@ def coverage_advice(shots: Sequence[Sighting], width: int, height: int) -> tuple
         for c in (0, 1)
     }
     emptiest = min(quarters, key=lambda name: float(quarters[name]))
-    return (f"hold the board into the {emptiest} of the image: {100 * seen.mean():.0f} % of it is covered so far",)
+    return (because("measure.advice.cover", quarter=emptiest, covered=float(seen.mean())),)
 
 
-def _faults(matrix: Array, sigma: float, held_out: float, advice: Sequence[str]) -> tuple[str, ...]:
+def _faults(matrix: Array, sigma: float, held_out: float, advice: Sequence[Reason]) -> tuple[Reason, ...]:
     focal = float(matrix[0, 0])
     faults = []
     if not sigma <= LARGEST_FOCAL_SIGMA * focal:
-        remedy = advice[0] if advice else "take more shots, nearer to the board"
-        faults.append(
-            f"the focal length is known to +-{sigma:.1f} px of {focal:.0f}, at most "
-            f"{LARGEST_FOCAL_SIGMA * focal:.1f} are accepted, whatever the fit's error is: {remedy}"
-        )
+        mend = advice[0] if advice else because("measure.advice.nearer")
+        most = LARGEST_FOCAL_SIGMA * focal
+        faults.append(because("measure.lens.focal", mend, sigma=sigma, focal=focal, most=most))
     if not held_out <= LARGEST_HELD_OUT:
-        faults.append(
-            f"shots that took no part are off by {held_out:.2f} px, at most {LARGEST_HELD_OUT} are accepted: is the "
-            "board flat, and was the focus fixed?"
-        )
+        faults.append(because("measure.lens.held_out", off=held_out, most=LARGEST_HELD_OUT))
     return tuple(faults)

@@ -30,7 +30,9 @@ from gemelo.libraries.vision.calibration.reprojection import (
     view_slopes,
 )
 from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.errors import NotMeasured
 from gemelo.libraries.vision.rigid import Array, from_opencv, inverse, rigid
+from gemelo.schemas.reasons import Reason, because
 
 FEWEST_POSES = 5
 SUSPECT_AT, OUTLIER_AT = 2.5, 4.0  # times the median error: a view to try without, one that does not agree
@@ -52,13 +54,13 @@ class MountFit:
     errors: tuple[float, ...]  # [m] at the board, of each view
     outliers: tuple[int, ...]  # views that do not agree with the others, counted from 0
     sigma: float  # [m] standard deviation of the least determined direction
-    undetermined: tuple[str, ...]  # what these views cannot tell: a sentence each
-    wrong_scale: str = ""  # a sentence where the board is surely larger or smaller than was said
+    undetermined: tuple[Reason, ...]  # what these views cannot tell
+    wrong_scale: Reason | None = None  # where the board is surely larger or smaller than was said
 
     @property
-    def faults(self) -> tuple[str, ...]:
-        """Why it may not be used: a sentence each."""
-        return (*self.undetermined, *([self.wrong_scale] if self.wrong_scale else []))
+    def faults(self) -> tuple[Reason, ...]:
+        """Why it may not be used."""
+        return self.undetermined if self.wrong_scale is None else (*self.undetermined, self.wrong_scale)
 
     @property
     def is_accepted(self) -> bool:
@@ -69,10 +71,12 @@ class MountFit:
 def fit_mount(
     views: Sequence[BoardView], model: CameraModel, carrier: Carrier, height: float | None = None
 ) -> MountFit:
-    """The camera's place from `views`; ValueError where they are too few to try. `height` [m] is the board's along z of
-    what carries it, which an arm that cannot tilt needs."""
+    """The camera's place from `views`; NotMeasured where they are too few to try.
+
+    `height` [m] is the board's along z of what carries it, which an arm that cannot tilt needs.
+    """
     if len(views) < FEWEST_POSES:
-        raise ValueError(f"{len(views)} poses show the board, at least {FEWEST_POSES} are needed")
+        raise NotMeasured(because("measure.poses.few", count=len(views), least=FEWEST_POSES))
     problem = problem_of(views, model, carrier, height)
     state, chosen, errors = _agreeing(problem, _best(problem))
     outliers = tuple(index for index in range(len(views)) if index not in chosen)
@@ -81,7 +85,7 @@ def fit_mount(
     return MountFit(
         state.camera, state.board, np.inf if undetermined else _held_out(used, state),
         tuple(float(error) for error in errors), outliers, sigma, undetermined,
-        "" if undetermined else wrong_scale(used, state),
+        None if undetermined else wrong_scale(used, state),
     )  # fmt: skip
 
 
@@ -168,17 +172,13 @@ def _held_out(problem: Reprojection, state: CalibrationState) -> float:
     return float(np.median(found))
 
 
-def wrong_scale(problem: Reprojection, state: CalibrationState) -> str:
-    """A sentence where the board is surely larger or smaller than is said; empty where it is not."""
+def wrong_scale(problem: Reprojection, state: CalibrationState) -> Reason | None:
+    """Where the board is surely larger or smaller than is said; None where it is not."""
     scale, sigma = fitted_scale(problem, state)
     if abs(scale - 1.0) < max(LEAST_OFF, SURE * sigma):
-        return ""
-    size = "larger" if scale > 1.0 else "smaller"
-    return (
-        f"the tags are {100.0 * abs(scale - 1.0):.1f} % {size} than is said of them (+-{100.0 * sigma:.1f}), or the "
-        "lens's focal length is wrong by as much: measure the print's bar and give it with --bar (of a tag of "
-        "cell.toml: its edge, as size), then `gemelo camera calibrate`"
-    )
+        return None
+    code = "measure.scale.larger" if scale > 1.0 else "measure.scale.smaller"
+    return because(code, percent=100.0 * abs(scale - 1.0), sigma=100.0 * sigma)
 
 
 def fitted_scale(problem: Reprojection, state: CalibrationState) -> tuple[float, float]:

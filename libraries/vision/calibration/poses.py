@@ -20,6 +20,7 @@ from gemelo.libraries.vision.calibration.reprojection import BoardView, Carrier,
 from gemelo.libraries.vision.calibration.touches import board_in_camera
 from gemelo.libraries.vision.camera_model import CameraModel
 from gemelo.libraries.vision.rigid import Array, apply, inverse, rigid, turn, turn_vector
+from gemelo.schemas.reasons import Reason
 
 DRAWN = 160  # poses of the board
 MOST_TILT = np.radians(40.0)  # of the board from facing the camera
@@ -97,7 +98,7 @@ class Chosen:
 
     joints: tuple[Array, ...]  # (n,) [rad] or [m] each
     camera_from_board: tuple[Array, ...]  # what is expected in each
-    undetermined: tuple[str, ...]  # what even all of them cannot tell: a sentence each
+    undetermined: tuple[Reason, ...]  # what even all of them cannot tell
 
     @property
     def turns(self) -> Array:

@@ -10,8 +10,10 @@ import numpy as np
 from gemelo.libraries.vision.boards import Sighting
 from gemelo.libraries.vision.calibration.touches import board_in_camera
 from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.errors import NotMeasured
 from gemelo.libraries.vision.rigid import Array
 from gemelo.libraries.vision.tag_pose import residuals
+from gemelo.schemas.reasons import because
 
 STEADY = 0.7  # [px] that a point may be elsewhere in another image
 BLURRED = 0.2  # [px] standard deviation of a corner in an image that is out of focus or smeared
@@ -20,25 +22,26 @@ FEWEST_TO_DROP = 3  # tags, of which one may be left out
 
 
 def one_of(found: Sequence[Sighting | None], fewest: int) -> Sighting:
-    """The mean of `found`; ValueError where one of them shows fewer than `fewest` points, is blurred, or differs."""
+    """The mean of `found`; NotMeasured where one of them shows fewer than `fewest` points, is blurred, or differs."""
     seen = [each for each in found if each is not None]
     least = min((len(each.points) for each in found if each is not None), default=0) if len(seen) == len(found) else 0
     if least < fewest:
         uneven = {number for each in seen for number in each.uneven}
-        hidden = f" (of tag {', '.join(map(str, sorted(uneven)))} an edge is hidden or darker)" if uneven else ""
-        raise ValueError(f"{least // 4} tags are seen, at least {fewest // 4} are needed{hidden}")
+        why = because("measure.tags.few", seen=least // 4, least=fewest // 4)
+        tags = ", ".join(map(str, sorted(uneven)))
+        raise NotMeasured(because("measure.tags.hidden", why, tags=tags) if uneven else why)
     worst = max(each.sigma for each in seen)
     if worst > BLURRED:
-        raise ValueError(f"the image is blurred: its corners are known to +-{worst:.2f} px, at most {BLURRED:g}")
+        raise NotMeasured(because("measure.blurred", sigma=float(worst), most=BLURRED))
     places = [dict(zip(map(_key, each.points), each.pixels, strict=True)) for each in seen]
     common = [index for index, point in enumerate(seen[0].points) if all(_key(point) in place for place in places)]
     if len(common) < fewest:
-        raise ValueError("the images of it show different tags: something passes before it")
+        raise NotMeasured(because("measure.tags.differ"))
     points = seen[0].points[common]
     pixels = np.array([[place[_key(point)] for point in points] for place in places])
     moved = float(np.linalg.norm(pixels - pixels[0], axis=2).mean(axis=1).max())
     if moved > STEADY:
-        raise ValueError(f"the board moves in the image, by {moved:.1f} px from one to the next")
+        raise NotMeasured(because("measure.moves", moved=moved))
     doubled = tuple(sorted({number for each in seen for number in each.doubled}))
     sigma = float(np.mean([each.sigma for each in seen]))  # most of it is the same in every image
     return Sighting(points, pixels.mean(axis=0), sigma, doubled)
@@ -51,7 +54,7 @@ def _key(point: Array) -> tuple[float, ...]:
 def without_hidden(sighting: Sighting, model: CameraModel) -> Sighting:
     """The sighting without tags whose corners do not lie where the others put them: something hides one of their edges.
 
-    ValueError where the corners of a single tag are those of no square.
+    NotMeasured where the corners of a single tag are those of no square.
     """
     kept = sighting
     while True:
@@ -61,10 +64,7 @@ def without_hidden(sighting: Sighting, model: CameraModel) -> Sighting:
         if corners[worst] <= limit:
             return kept
         if len(corners) <= FEWEST_TO_DROP:
-            raise ValueError(
-                f"the tag's corners are {corners[worst]:.2f} px beside those of a square (at most {limit:.2f}): "
-                "something hides one of its edges"
-            )
+            raise NotMeasured(because("measure.tag.no_square", off=float(corners[worst]), most=float(limit)))
         rest = np.delete(np.arange(len(kept.points)), slice(4 * worst, 4 * worst + 4))
         kept = replace(kept, points=kept.points[rest], pixels=kept.pixels[rest])
 

@@ -10,7 +10,9 @@ import numpy as np
 
 from gemelo.libraries.vision.boards import Sighting
 from gemelo.libraries.vision.camera_model import CameraModel
+from gemelo.libraries.vision.errors import NotMeasured
 from gemelo.libraries.vision.rigid import Array, apply, from_opencv, inverse, rigid
+from gemelo.schemas.reasons import because
 
 FEWEST_TOUCHES = 4
 TOUCH_SIGMA = 0.0005  # [m] of a touch that a person has aimed
@@ -31,7 +33,7 @@ class TouchFit:
 
 def fit_touches(board: Array, touched: Array, sighting: Sighting, model: CameraModel) -> TouchFit:
     """The camera's pose in the base from points `board` (n, 3) [m] of a board that lies flat, where the tool `touched`
-    them (n, 3) [m] in the base, and one image of it. ValueError where the touches do not determine it."""
+    them (n, 3) [m] in the base, and one image of it. NotMeasured where the touches do not determine it."""
     refuse_touches(board)
     kept = np.ones(len(board), dtype=bool)
     left_out = _left_out(board, touched)
@@ -48,17 +50,14 @@ def fit_touches(board: Array, touched: Array, sighting: Sighting, model: CameraM
 
 
 def refuse_touches(board: Array) -> None:
-    """ValueError where points `board` (n, 3) [m] cannot determine the board, however well they are touched."""
+    """NotMeasured where points `board` (n, 3) [m] cannot determine the board, however well they are touched."""
     if len(board) < FEWEST_TOUCHES:
-        raise ValueError(f"{len(board)} points are touched, at least {FEWEST_TOUCHES} are needed")
+        raise NotMeasured(because("measure.touches.few", count=len(board), least=FEWEST_TOUCHES))
     spread = float(np.sqrt(np.sum((board[:, :2] - board[:, :2].mean(axis=0)) ** 2)))
     turn_sigma = TOUCH_SIGMA / max(spread, 1e-9)
     if turn_sigma > LARGEST_TURN_SIGMA:
-        raise ValueError(
-            f"the board's turn about the vertical cannot be determined from these {len(board)} points: they lie too "
-            f"near to one another, and it would be known to +-{np.degrees(turn_sigma):.1f} degrees, at most "
-            f"{np.degrees(LARGEST_TURN_SIGMA):.1f} are accepted; touch points near the board's corners"
-        )
+        degrees = {"sigma": float(np.degrees(turn_sigma)), "most": float(np.degrees(LARGEST_TURN_SIGMA))}
+        raise NotMeasured(because("measure.touches.near", count=len(board), **degrees))
 
 
 def flat_registration(board: Array, touched: Array) -> Array:

@@ -227,7 +227,7 @@ def mount_images(setup: Setup) -> tuple[list[float], list[float]]:
         taken = take(sight, setup.height if setup.arm.name == "rm1" else None, seed=seed)
         fit = fit_mount(taken.views, sight.model, carrier, taken.belief.height)
         if fit.faults:
-            raise NotMeasured("; ".join(fit.faults))
+            raise NotMeasured("; ".join(map(str, fit.faults)))
         ours.append(tool_error(fit.parent_from_camera, sight.truth, carrier))
         trial = MountingTrial(list(taken.views), sight.truth, setup.carrier_from_board)
         found = closed_form(trial, sight.model, carrier, cv2.CALIB_HAND_EYE_PARK)

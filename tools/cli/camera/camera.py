@@ -16,10 +16,11 @@ from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.schemas.camera import CameraCondition, CameraImage, CameraInfo, CameraStatus
 from gemelo.schemas.cell import CameraRecord
 from gemelo.schemas.detections import Detections
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.topics import camera_detections, camera_image, camera_info, camera_status
 from gemelo.tools.cli.camera.cells import cell_of
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, require_folder, unknown, usage
-from gemelo.tools.cli.common.language import reason_or
+from gemelo.tools.cli.common.language import columns, reason_or, sentence, word
 from gemelo.tools.cli.common.output import print_coloured
 from gemelo.tools.cli.common.session import CommandSession, connect, load_robot
 from gemelo.tools.cli.common.text_table import table
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 PATIENCE = 2.0  # [s] for the first messages
 DEVICES, BY_ID, NAMES = Path("/dev"), Path("/dev/v4l/by-id"), Path("/sys/class/video4linux")
-NO_CELL = "the twin has no cell file: write one (urdf/rm1/cell.toml is a sample) and name it as cell = in {}"
+NO_CELL = because("camera.no_cell", file="deploy/local.toml")
 OUTLINE = (120, 255, 120)  # blue, green, red
 
 
@@ -91,7 +92,7 @@ def run_view(options: Options) -> ExitCode:
     robot = load_robot()
     cell = cell_of(robot)
     if not cell.cameras:
-        raise usage(NO_CELL.format("deploy/local.toml") if cell.path == Path() else f"{cell.path}: no [[camera]]")
+        raise usage(NO_CELL if cell.path == Path() else because("camera.cell.no_camera", file=str(cell.path)))
     name = options.camera or cell.cameras[0].name
     if name not in cell.camera_names:
         raise unknown("camera", name, cell.camera_names)
@@ -117,11 +118,11 @@ def plugged() -> list[Plugged]:
 
 def listing(cell: Cell, devices: list[Plugged], seen: dict[str, CameraReport]) -> str:
     """What is plugged in, then what the cell file asks for."""
-    here = table(("plugged in", "name"), [(each.device, each.name) for each in devices])
-    parts = [here if devices else "no camera is plugged in (/dev/video*)"]
+    here = table(columns("plugged in", "name"), [(each.device, each.name) for each in devices])
+    parts = [here if devices else sentence(because("camera.none_plugged"))]
     if cell.path == Path():
-        return "\n\n".join([*parts, NO_CELL.format("deploy/local.toml")])
-    headings = ("camera", "source", "size [px]", "asked [Hz]", "gets [Hz]", "lens", "place", "condition")
+        return "\n\n".join([*parts, sentence(NO_CELL)])
+    headings = columns("camera", "source", "size [px]", "asked [Hz]", "gets [Hz]", "lens", "place", "condition")
     rows = [_row(camera, seen.get(camera.name, CameraReport())) for camera in cell.cameras]
     statuses = [each.status for each in seen.values() if each.status is not None]
     said = [reason_or(status.why, status.text) for status in statuses if status.text]
@@ -175,18 +176,19 @@ def _show(seen: CameraReport, name: str, save: str) -> None:
     elif sys.stdout.isatty():
         columns, rows = shutil.get_terminal_size()
         print_coloured(on_terminal(picture, columns, rows - 3))
-    found = ", ".join(f"{each.name} ± {each.sigma * 1e3:.2f} mm" for each in seen.found.items) if seen.found else ""
+    found = [f"{each.name} ± {each.sigma * 1e3:.2f} mm" for each in seen.found.items] if seen.found else []
     rate = f", {seen.status.fps:.0f} Hz" if seen.status is not None else ""
     where = f" -> {save}" if save else ""
     print(f"{name}: {image.width} x {image.height}, {len(image.data) / 1e3:.0f} kB{rate}{where}")
-    print(f"found: {found or 'nothing'}")
+    print(sentence(because("camera.found", names=", ".join(found)) if found else because("camera.found.nothing")))
 
 
-def _why_no_image(seen: CameraReport, name: str) -> str:
+def _why_no_image(seen: CameraReport, name: str) -> Reason:
     if seen.status is None:
-        return f'camera "{name}" says nothing: is the process `camera` running? its log is out/logs/camera.log'
-    status_text = reason_or(seen.status.why, seen.status.text)
-    return status_text or f'camera "{name}" is {seen.status.condition}, and gives no image within {PATIENCE:g} s'
+        return because("camera.silent.log", camera=name)
+    if seen.status.text:
+        return seen.status.why or plain(seen.status.text)
+    return because("camera.no_image.condition", camera=name, condition=seen.status.condition.value, time=PATIENCE)
 
 
 def _seen_of(robot: Robot, cell: Cell) -> dict[str, CameraReport]:
@@ -233,9 +235,9 @@ def _row(camera: CameraRecord, seen: CameraReport) -> tuple[str, ...]:
         f"{camera.size[0]} x {camera.size[1]}",
         f"{camera.fps:g}",
         f"{status.fps:.0f}" if status is not None and is_streaming else "-",
-        "-" if info is None else "calibrated" if info.is_calibrated else "assumed",
-        "-" if info is None else "measured" if info.is_mounted else "assumed",
-        status.condition if status is not None else "not heard",
+        "-" if info is None else word("camera", "calibrated" if info.is_calibrated else "assumed"),
+        "-" if info is None else word("camera", "measured" if info.is_mounted else "assumed"),
+        word("camera", status.condition if status is not None else "not heard"),
     )
 
 

@@ -6,12 +6,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from gemelo.libraries.vision.boards import ChessBoard, Scale, TagBoard
+from gemelo.libraries.vision.errors import NotMeasured
 from gemelo.libraries.vision.pages import PAGES, page_of
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import ExitCode, require_folder, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.units import LENGTH, parse_quantity
 from gemelo.tools.cli.parser import Options, Parser
 
 CHESS, TAGS = "chess", "tags"
+TITLE = "for {}; keep it flat"  # on the page, whose font has ASCII alone
 FIRST_TAG = 200  # of the board with tags: above those that a cell has on things and places
 CHESS_BOARD, TAG_BOARD = ChessBoard(), TagBoard(first=FIRST_TAG)
 
@@ -36,12 +40,13 @@ def run_print(options: Options) -> ExitCode:
     path = Path(options.to or f"board_{options.board}.pdf")
     require_folder(path.parent, f"--to {path}")
     try:
-        path.write_bytes(page_of(board.squares(), board.size, f"for {use}; keep it flat", options.page))
-    except (OSError, ValueError) as error:
-        raise usage(f"{path}: {error}") from error
+        path.write_bytes(page_of(board.squares(), board.size, TITLE.format(use), options.page))
+    except NotMeasured as error:
+        raise usage(because("camera.print.page", error.reason, file=str(path))) from error
+    except OSError as error:
+        raise usage(because("cli.file.unwritable", file=str(path), error=str(error.strerror or error))) from error
     width, height = (1e3 * edge for edge in board.size)
-    print(f"{path}: {width:.0f} x {height:.0f} mm. Print it at 100 %, measure the bar, glue it onto something flat;")
-    print(f"then {use} CAMERA --bar <what you measured>")
+    print(sentence(because("camera.print.done", file=str(path), width=width, height=height, command=use)))
     return ExitCode.OK
 
 
@@ -60,5 +65,5 @@ def tag_board(bar: str) -> TagBoard:
 def _scale(bar: str) -> Scale:
     try:
         return Scale(parse_quantity(bar, LENGTH, "--bar"))
-    except ValueError as error:
-        raise usage(f"--bar: {error}") from error
+    except NotMeasured as error:
+        raise usage(because("camera.bar", error.reason)) from error

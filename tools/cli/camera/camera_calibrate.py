@@ -11,12 +11,15 @@ import numpy as np
 
 from gemelo.libraries.vision.boards import ChessBoard, Sighting
 from gemelo.libraries.vision.calibration.lens import FEWEST_SHOTS, LensFit, fit_lens
-from gemelo.libraries.vision.other_boards import other_board, remedy
+from gemelo.libraries.vision.errors import NotMeasured
+from gemelo.libraries.vision.other_boards import other_board
 from gemelo.libraries.vision.tags import GreyImage
 from gemelo.schemas.cell import Calibration
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.camera.camera_boards import bar_option, chess_board
 from gemelo.tools.cli.camera.camera_images import from_bus, from_folder, subject
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect, load_robot
 from gemelo.tools.cli.parser import Options, Parser, positive_integer
 
@@ -44,13 +47,13 @@ def run(options: Options) -> ExitCode:
             shots = found_in(images, board)
         else:
             session = stack.enter_context(connect(load_robot()))
-            print("hold the board into the image, flat, at different places, tilted by 30 degrees (Ctrl-C: enough)")
+            print(sentence(because("camera.calibrate.hold")))
             shots = take(from_bus(session, camera.name), board, width, height, options.shots)
     fit = _fit(shots, width, height)
     for index in fit.outliers:
-        print(f"shot {index + 1} does not agree with the others ({fit.errors[index]:.2f} px), and was left out")
+        print(sentence(because("camera.calibrate.left_out", shot=index + 1, off=fit.errors[index])))
     if not fit.is_accepted:
-        raise CommandError("the lens is not known well enough, and nothing was written: " + "; ".join(fit.faults))
+        raise CommandError(because("camera.calibrate.unknown", *fit.faults))
     lens = Calibration(
         size=(width, height),
         intrinsics=tuple(float(value) for value in fit.model.matrix.ravel()),
@@ -58,8 +61,8 @@ def run(options: Options) -> ExitCode:
         held_out=fit.held_out, focal_sigma=fit.focal_sigma, date=datetime.now(UTC).strftime("%Y-%m-%d"),
     )  # fmt: skip
     path = camera.write(calibration=lens)
-    print(f"{camera.name}: {_said(fit)}, from {len(shots)} shots")
-    print(f"written to {path}")
+    print(sentence(because("camera.calibrate.done", _figures(fit), camera=camera.name, count=len(shots))))
+    print(sentence(because("camera.written", file=str(path))))
     return ExitCode.OK
 
 
@@ -80,14 +83,14 @@ class Strangers:
 
     def __init__(self, board: ChessBoard) -> None:
         self._board = board
-        self._said: set[str] = set()
+        self._printed: list[Reason] = []
 
     def look(self, image: GreyImage) -> None:
         """Takes some tenths of a second."""
         other = other_board(image, self._board)
-        if other and other not in self._said:
-            self._said.add(other)
-            print(f"the image shows {other}, and not the board of this command: {remedy(self._board)}", flush=True)
+        if other is not None and other not in self._printed:
+            self._printed.append(other)
+            print(sentence(other), flush=True)
 
 
 def take(images: Iterator[GreyImage], board: ChessBoard, width: int, height: int, most: int) -> list[Sighting]:
@@ -107,10 +110,11 @@ def take(images: Iterator[GreyImage], board: ChessBoard, width: int, height: int
                 continue
             kept.append(found)
             if len(kept) < FEWEST_SHOTS:
-                print(f"shot {len(kept)}", flush=True)
+                print(sentence(because("camera.calibrate.shot", shot=len(kept))), flush=True)
                 continue
             fit = fit_lens(kept, width, height)
-            print(f"shot {len(kept)}: {_said(fit)}; {fit.advice[0] if fit.advice else 'enough'}", flush=True)
+            advice = fit.advice[0] if fit.advice else because("camera.calibrate.enough")
+            print(sentence(because("camera.calibrate.shot.fit", _figures(fit), advice, shot=len(kept))), flush=True)
             if len(kept) >= most or (fit.is_accepted and not fit.advice):
                 break
     except KeyboardInterrupt:
@@ -121,8 +125,8 @@ def take(images: Iterator[GreyImage], board: ChessBoard, width: int, height: int
 def _fit(shots: list[Sighting], width: int, height: int) -> LensFit:
     try:
         return fit_lens(shots, width, height)
-    except ValueError as error:
-        raise CommandError(f"{error}; nothing was written") from error
+    except NotMeasured as error:
+        raise CommandError(because("camera.nothing_written", error.reason)) from error
 
 
 def _apart(first: Sighting, second: Sighting) -> float:
@@ -136,8 +140,6 @@ def _apart(first: Sighting, second: Sighting) -> float:
     return float(np.mean(both)) if both else float("inf")
 
 
-def _said(fit: LensFit) -> str:
-    focal = fit.model.matrix[0, 0]
-    return (
-        f"focal length {focal:.1f} +-{fit.focal_sigma:.1f} px, shots that took no part are off by {fit.held_out:.2f} px"
-    )
+def _figures(fit: LensFit) -> Reason:
+    focal = float(fit.model.matrix[0, 0])
+    return because("camera.calibrate.figures", focal=focal, sigma=fit.focal_sigma, off=fit.held_out)

@@ -11,9 +11,11 @@ import numpy as np
 import gemelo
 from gemelo.api.targets import FULL
 from gemelo.libraries.vision.calibration.accuracy import Accuracy, Budget, Cause, judge
+from gemelo.schemas.reasons import because, plain
 from gemelo.tools.cli.camera.camera_images import Subject, subject
 from gemelo.tools.cli.camera.camera_tip import ask_offset, step_floor, tip_length, tip_option
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.units import LENGTH, parse_quantity
 from gemelo.tools.cli.parser import Options, Parser, positive_integer
@@ -24,12 +26,11 @@ if TYPE_CHECKING:
 ABOVE = "10mm"
 MOST_TAGS = 6
 REMEDIES = {
-    Cause.NONE: "",
-    Cause.UNKNOWN: "check more tags, far apart: what they have in common says more",
-    Cause.MOUNT: "`gemelo camera mount`, and that nobody moves the camera",
-    Cause.SCALE: "measure the print's bar and the tags' edges (`size` in cell.toml), then `gemelo camera calibrate`",
-    Cause.ZERO: "`gemelo verify`, then its reference or home position in robot.toml",
-    Cause.ARM: "`gemelo verify`; play in the gears; the length of what points (`--tip`)",
+    Cause.UNKNOWN: "camera.check.more_tags",
+    Cause.MOUNT: "camera.check.mount",
+    Cause.SCALE: "camera.check.scale",
+    Cause.ZERO: "camera.check.zero",
+    Cause.ARM: "camera.check.arm",
 }
 DOWN = (0.0, 0.0, -1.0)
 
@@ -55,7 +56,7 @@ def run(options: Options) -> ExitCode:
     camera = subject(options.camera)
     above = parse_quantity(options.above, LENGTH, "--above")
     if above < 0.004:
-        raise usage(f"--above {options.above} is less than 4 mm: a tip that near may touch")
+        raise usage(because("camera.check.near", above=str(options.above)))
     robot = load_robot()
     tip = tip_length(options.tip, robot)
     with connect_arm(robot) as arm:
@@ -72,17 +73,19 @@ def _pointings(arm: Arm, camera: Subject, height: float, most: int) -> Iterator[
     with _in_scene(arm, camera.name) as seen:
         tags = [each for each in seen if each.kind == "tag" and not each.trouble][:most]
         if not tags:
-            trouble = next((f": {each.name}: {each.trouble}" for each in seen if each.trouble), "")
-            raise CommandError(f'camera "{camera.name}" sees no tag of the cell file that it can locate{trouble}')
+            trouble = next((each for each in seen if each.trouble), None)
+            if trouble is None:
+                raise CommandError(because("camera.check.no_tag", camera=camera.name))
+            why = because("camera.check.trouble", plain(trouble.trouble), name=trouble.name)
+            raise CommandError(because("camera.check.no_tag.why", why, camera=camera.name))
         for each in tags:
             x, y, z = each.pose.position
             if len(arm.joint_names) < FULL:
                 arm.move(position=(x, y, z + height))
             else:
                 arm.move(position=(x, y, z + height), along=DOWN)
-            question = f"how far beside the middle of {each.name} is the tip, along x and y of the base?"
-            said = ask_offset(f"{question} `1.5mm -0.4mm`; Enter: not at all")
-            yield TagPointing(each, said, step_floor(arm))
+            beside = ask_offset(because("camera.check.ask", name=each.name))
+            yield TagPointing(each, beside, step_floor(arm))
 
 
 @contextmanager
@@ -100,17 +103,22 @@ def report(camera: Subject, pointings: list[TagPointing]) -> Accuracy:
     """Prints each pointing, what was to be expected, and the cause with its remedy."""
     for each in pointings:
         x, y = (1e3 * value for value in each.offset)
-        print(f"{each.seen.name}: {x:+.1f} {y:+.1f} mm, step floor +-{1e3 * each.floor:.2f} mm")
+        print(sentence(because("camera.check.pointed", name=each.seen.name, x=x, y=y, floor=1e3 * each.floor)))
     mount = camera.measured.mount
     budget = Budget(
         camera=max(each.seen.sigma for each in pointings),
         mount=mount.held_out if mount is not None else 0.0,
         arm=max(each.floor for each in pointings),
     )
-    measured = f"+-{1e3 * budget.mount:.2f} mm" if mount is not None else "never measured"
-    print(f"expected: camera +-{1e3 * budget.camera:.2f} mm, mount {measured}, arm +-{1e3 * budget.arm:.2f} mm")
+    parts = {"camera": 1e3 * budget.camera, "arm": 1e3 * budget.arm}
+    if mount is None:
+        print(sentence(because("camera.check.expected.unmeasured", **parts)))
+    else:
+        print(sentence(because("camera.check.expected", mount=1e3 * budget.mount, **parts)))
     points = np.array([each.seen.pose.position[:2] for each in pointings])
     found = judge(points, np.array([each.offset for each in pointings]), budget)
-    remedy = REMEDIES[found.cause]
-    print(found.sentence + (f": {remedy}" if remedy else ""))
+    if found.cause in REMEDIES:
+        print(sentence(because("camera.check.found", found.why, because(REMEDIES[found.cause]))))
+    else:
+        print(sentence(found.why))
     return found

@@ -19,6 +19,7 @@ from gemelo.libraries.vision.rigid import Array, to_transform
 from gemelo.libraries.vision.tags import GreyImage
 from gemelo.schemas.camera import CameraImage, CameraInfo
 from gemelo.schemas.cell import CameraRecord, MeasuredCamera, Mount
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import JOINT_STATES, camera_image, camera_info
 from gemelo.tools.cli.camera.cells import cell_of
 from gemelo.tools.cli.common.errors import CommandError, require_folder, unknown, usage
@@ -32,7 +33,6 @@ SLOWEST = 0.5  # [s] from image to image
 AT_REST = 1e-3  # [rad/s] or [m/s]
 SETTLING = 200_000_000  # [ns] in which what an arm carries comes to rest after it
 MOST_HEARD = 30  # images that are kept
-SILENT = 'nothing is heard of camera "{}": is the process `camera` running? `gemelo camera list`'
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp")
 
 
@@ -75,9 +75,9 @@ def subject(name: str) -> Subject:
     robot = load_robot()
     cell = cell_of(robot)
     if not cell.cameras:
-        raise usage("there is no camera: the deployment's cell file (urdf/rm1/cell.toml is a sample) has no [[camera]]")
+        raise usage(because("camera.none"))
     if not robot.deployment.cell:
-        raise usage(f"{cell.path} is not on this machine: measure its cameras there, where camera.toml is written")
+        raise usage(because("camera.elsewhere", file=str(cell.path)))
     chosen = name or cell.cameras[0].name
     if chosen not in cell.camera_names:
         raise unknown("camera", chosen, cell.camera_names)
@@ -99,14 +99,14 @@ class Eye:
         """What is known of its lens and place; raises `CommandError` where nobody tells it."""
         self._arm.wait_for(lambda: self._info.message is not None, PATIENCE)
         if self._info.message is None:
-            raise CommandError(SILENT.format(self._name))
+            raise CommandError(because("camera.silent", camera=self._name))
         return self._info.message
 
     def images(self, count: int) -> list[GreyImage]:
         """The next `count` images that were taken after the arm came to rest; raises `CommandError` where none come."""
         arm = self._arm
         if not arm.wait_for(lambda: all(abs(speed) < AT_REST for speed in arm.velocities.values()), PATIENCE):
-            raise CommandError("the arm does not come to rest: images of it are blurred; nothing was written")
+            raise CommandError(because("camera.no_rest"))
         arm.wait_for(lambda: self._state.message is not None, PATIENCE)
         state = self._state.message
         since = (state.stamp if state is not None else arm.node.now()) + SETTLING
@@ -116,11 +116,10 @@ class Eye:
             seen.update((each.stamp, each) for each in list(self._heard) if each.stamp > since)
             return len(seen) >= count
 
-        if not arm.wait_for(are_enough, PATIENCE + count * SLOWEST):
-            raise CommandError(
-                f'{len(seen)} images of camera "{self._name}" within {PATIENCE + count * SLOWEST:g} s, {count} are '
-                "wanted: `gemelo camera list`; do the clocks of the hosts agree?"
-            )
+        patience = PATIENCE + count * SLOWEST
+        if not arm.wait_for(are_enough, patience):
+            few = because("camera.few_images", count=len(seen), camera=self._name, time=patience, wanted=count)
+            raise CommandError(few)
         taken = [seen[stamp] for stamp in sorted(seen)[:count]]
         decoded = [cv2.imdecode(np.frombuffer(each.data, np.uint8), cv2.IMREAD_GRAYSCALE) for each in taken]
         return [np.asarray(image, dtype=np.uint8) for image in decoded if image is not None]
@@ -135,14 +134,15 @@ def from_folder(path: Path, size: tuple[int, int]) -> Iterator[GreyImage]:
     require_folder(path, f"--images {path}")
     files = sorted(each for each in path.glob("*") if each.suffix.lower() in SUFFIXES)
     if not files:
-        raise usage(f"--images {path}: there is no image in that folder ({', '.join(SUFFIXES)})")
+        raise usage(because("camera.no_images", folder=str(path), suffixes=SUFFIXES))
     for file in files:
         image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
         if image is None:
-            raise usage(f"{file} is no image")
+            raise usage(because("camera.no_image_file", file=str(file)))
         if image.shape != size[::-1]:
             found = f"{image.shape[1]} x {image.shape[0]}"
-            raise usage(f"{file} has {found} pixels, and the camera {size[0]} x {size[1]}: take it at that size")
+            wanted = f"{size[0]} x {size[1]}"
+            raise usage(because("camera.other_size", file=str(file), size=found, wanted=wanted))
         yield np.asarray(image, dtype=np.uint8)
 
 
@@ -156,7 +156,7 @@ def from_bus(session: CommandSession, name: str) -> Iterator[GreyImage]:
             while not newest and session.node.monotonic() < deadline:
                 session.node.wait(0.02)
             if not newest:
-                raise CommandError(f'no image of camera "{name}" within {PATIENCE:g} s: `gemelo camera list`')
+                raise CommandError(because("camera.no_image", camera=name, time=PATIENCE))
             message, newest[:] = newest[-1], []
             image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_GRAYSCALE)
             if image is not None:
@@ -174,5 +174,5 @@ def info_of(session: CommandSession, name: str) -> CameraInfo:
         session.node.wait(0.02)
     subscription.close()
     if not heard:
-        raise CommandError(SILENT.format(name))
+        raise CommandError(because("camera.silent", camera=name))
     return heard[-1]

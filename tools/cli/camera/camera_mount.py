@@ -17,13 +17,16 @@ from gemelo.libraries.vision.boards import Sighting
 from gemelo.libraries.vision.calibration.shots import one_of
 from gemelo.libraries.vision.calibration.touches import FEWEST_TOUCHES, TouchFit, fit_touches, spread_points
 from gemelo.libraries.vision.camera_model import CameraModel, model_of
-from gemelo.libraries.vision.other_boards import other_board, remedy
+from gemelo.libraries.vision.errors import NotMeasured
+from gemelo.libraries.vision.other_boards import other_board
 from gemelo.libraries.vision.rigid import Array
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.camera import camera_poses
 from gemelo.tools.cli.camera.camera_boards import bar_option, tag_board
 from gemelo.tools.cli.camera.camera_images import from_bus, info_of, subject
 from gemelo.tools.cli.camera.camera_tip import ask_offset, step_floor, tip_length, tip_option
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect, connect_arm, load_robot
 from gemelo.tools.cli.parser import Options, Parser, positive_integer
 
@@ -55,70 +58,62 @@ def run(options: Options) -> ExitCode:
         return camera_poses.run(options, camera)
     points = board.points()
     if not FEWEST_TOUCHES <= options.points <= len(points):
-        raise usage(f"--points {options.points} is not {FEWEST_TOUCHES} to {len(points)}")
+        raise usage(because("camera.mount.points", count=options.points, least=FEWEST_TOUCHES, most=len(points)))
     robot = load_robot()
     tip = tip_length(options.tip, robot)
     chosen = spread_points(list(points), options.points)
     names = [board.corner_name(index) for index in chosen]
-    print("lay the board flat where the camera sees it, within the arm's reach, and do not move it any more;")
-    print("upper and lower are as you read the page")
+    print(sentence(because("camera.mount.lay")))
     with connect_arm(robot) as arm:
         touched = np.array([_touch(arm, name, tip) for name in names])
-    _ask("now lead the arm out of the image")
+    _ask_out_of_the_way()
     with connect(robot) as session:
         model = model_of(info_of(session, camera.name))
         images = [image for _, image in zip(range(IMAGES), from_bus(session, camera.name), strict=False)]
         found = [board.find(image, model) for image in images]
-        if not any(found) and (other := other_board(images[-1], board) if images else ""):
-            raise CommandError(f"the image shows {other}, and not the board of this command: {remedy(board)}")
+        if not any(found) and images and (other := other_board(images[-1], board)) is not None:
+            raise CommandError(other)
     fit = _fit(points[chosen], touched, found, model)
     for index in fit.outliers:
-        off = 1e3 * fit.errors[index]
-        print(f"the touch of {names[index]} does not agree with the others ({off:.1f} mm), and was left out")
+        print(sentence(because("camera.mount.left_out", names[index], off=1e3 * fit.errors[index])))
     if fit.held_out > LARGEST_HELD_OUT:
-        raise CommandError(
-            f"touches are {1e3 * fit.held_out:.1f} mm from where the others put them (at most "
-            f"{1e3 * LARGEST_HELD_OUT:g}), and nothing was written: touch the corners again"
-        )
+        raise CommandError(because("camera.mount.off", off=1e3 * fit.held_out, most=1e3 * LARGEST_HELD_OUT))
     path = camera.write_mount(robot.description.base_frame, fit.base_from_camera, fit.held_out)
     x, y, z = (1e3 * value for value in fit.base_from_camera[:3, 3])
-    print(f"{camera.name} stands at {x:.0f} {y:.0f} {z:.0f} mm; touches left out are {1e3 * fit.held_out:.2f} mm off")
-    print(f"written to {path}")
+    print(sentence(because("camera.mount.done", camera=camera.name, x=x, y=y, z=z, off=1e3 * fit.held_out)))
+    print(sentence(because("camera.written", file=str(path))))
     return ExitCode.OK
 
 
-def _touch(arm: Arm, corner: str, tip: float) -> tuple[float, float, float]:
+def _touch(arm: Arm, corner: Reason, tip: float) -> tuple[float, float, float]:
     """Where [m] the corner is, by where the tip was when the person said that it touches."""
-    print(f"bring the tip onto {corner} (`gemelo jog`, or the page)")
-    beside = ask_offset(
-        "Enter when it is there; or, where the arm's steps end beside it, how far the tip is beside it along "
-        "x and y of the base: `1.5mm -0.4mm`"
-    )
+    print(sentence(because("camera.mount.bring", corner)))
+    beside = ask_offset(because("camera.mount.ask"))
     try:
         pose, floor = arm.pose(), step_floor(arm)
     except gemelo.Error as error:
         raise CommandError(error) from error
     x, y, z = compose((pose.position, pose.orientation), ((0.0, 0.0, tip), (0.0, 0.0, 0.0, 1.0)))[0]
     point = x - beside[0], y - beside[1], z
-    coarse = f"; the arm's steps end up to {1e3 * floor:.1f} mm beside" if floor > COARSE and not any(beside) else ""
-    print(f"  {1e3 * point[0]:.1f} {1e3 * point[1]:.1f} {1e3 * point[2]:.1f} mm{coarse}")
+    print(f"  {1e3 * point[0]:.1f} {1e3 * point[1]:.1f} {1e3 * point[2]:.1f} mm")
+    if floor > COARSE and not any(beside):
+        print(f"  {sentence(because('camera.mount.coarse', floor=1e3 * floor))}")
     return point
 
 
-def _ask(text: str) -> None:
-    print(f"{text}, then Enter", flush=True)
+def _ask_out_of_the_way() -> None:
+    print(sentence(because("camera.mount.out_of_image")), flush=True)
     if not sys.stdin.readline():
-        raise CommandError("there is nobody to touch the board: this command asks a person; nothing was written")
+        raise CommandError(because("camera.nobody_to_touch"))
 
 
 def _fit(points: Array, touched: Array, found: Sequence[Sighting | None], model: CameraModel) -> TouchFit:
     enough = [each for each in found if each is not None and len(each.points) >= 4 * ENOUGH_TAGS]
     if not enough:
         seen = max((len(each.points) // 4 for each in found if each is not None), default=0)
-        raise CommandError(
-            f"the camera sees {seen} tags of the board, at least {ENOUGH_TAGS} are needed; nothing was written"
-        )
+        few = because("measure.tags.few", seen=seen, least=ENOUGH_TAGS)
+        raise CommandError(because("camera.nothing_written", few))
     try:
         return fit_touches(points, touched, one_of(enough, 4 * ENOUGH_TAGS), model)
-    except ValueError as error:
-        raise CommandError(f"{error}; nothing was written") from error
+    except NotMeasured as error:
+        raise CommandError(because("camera.nothing_written", error.reason)) from error

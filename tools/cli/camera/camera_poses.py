@@ -22,14 +22,16 @@ from gemelo.libraries.vision.calibration.poses import Belief, Chosen, choose_pos
 from gemelo.libraries.vision.calibration.reprojection import BoardView, Carrier
 from gemelo.libraries.vision.calibration.shots import one_of, without_hidden
 from gemelo.libraries.vision.camera_model import model_of
-from gemelo.libraries.vision.other_boards import other_board, remedy
+from gemelo.libraries.vision.errors import NotMeasured
+from gemelo.libraries.vision.other_boards import other_board
 from gemelo.libraries.vision.rigid import Array, from_transform, rigid, to_transform
 from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.reasons import because
 from gemelo.tools.cli.bus.request_text import joints_text
 from gemelo.tools.cli.camera.camera_boards import tag_board
 from gemelo.tools.cli.camera.camera_images import Eye, Subject
-from gemelo.tools.cli.common.errors import CommandError, ExitCode, text_of, unknown, usage
+from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.terminal import confirm
 from gemelo.tools.cli.common.units import LENGTH, parse_quantity
@@ -83,9 +85,9 @@ def add_options(parser: Parser) -> None:
 def task_of(options: Options, camera: Subject, arm: ArmDescription) -> Task:
     """What the options and cell.toml ask for; raises `CommandError`."""
     if not FEWEST_POSES <= options.poses <= MOST_POSES:
-        raise usage(f"--poses {options.poses} is not {FEWEST_POSES} to {MOST_POSES}")
+        raise usage(because("camera.poses.count", count=options.poses, least=FEWEST_POSES, most=MOST_POSES))
     if camera.record.parent and options.on:
-        raise usage(f'camera "{camera.name}" rides on {camera.record.parent}: lay the board down, without --on')
+        raise usage(because("camera.poses.rides", camera=camera.name, link=camera.record.parent))
     link = options.on or camera.record.parent
     if link not in arm.model.link_names:
         raise unknown("link", link, arm.model.link_names)
@@ -114,11 +116,9 @@ def run(options: Options, camera: Subject) -> ExitCode:
         fit = measure(arm, Eye(arm, camera.name), task, options.yes)
     path = camera.write_mount(task.parent(arm.base_frame), fit.parent_from_camera, fit.held_out)
     x, y, z = (1e3 * value for value in fit.parent_from_camera[:3, 3])
-    print(
-        f"{camera.name} is at {x:.1f} {y:.1f} {z:.1f} mm in {task.parent(arm.base_frame)}; poses that took no part are "
-        f"{1e3 * fit.held_out:.2f} mm off, and what is known least has a standard deviation of {1e3 * fit.sigma:.1f} mm"
-    )
-    print(f"written to {path}")
+    at = {"camera": camera.name, "x": x, "y": y, "z": z, "frame": task.parent(arm.base_frame)}
+    print(sentence(because("camera.poses.done", off=1e3 * fit.held_out, sigma=1e3 * fit.sigma, **at)))
+    print(sentence(because("camera.written", file=str(path))))
     return ExitCode.OK
 
 
@@ -128,11 +128,8 @@ def measure(arm: Arm, eye: Eye, task: Task, is_agreed: bool) -> MountFit:
     link_at = link_pose(arm.description, task.link)
     try:
         first = BoardView(link_at(start), _look(eye, task))
-    except ValueError as error:
-        raise CommandError(
-            f"{error} where the arm stands now: bring it to where {task.camera.name} sees them (`gemelo jog`, or the "
-            "page), and say this again; nothing was written"
-        ) from error
+    except NotMeasured as error:
+        raise CommandError(because("camera.poses.not_here", error.reason, camera=task.camera.name)) from error
     belief = belief_of(eye.info, task, arm.base_frame).seeing(first.base_from_link, first.sighting)
     with _carrying(arm, task, belief):
         belief, chosen = _choose(arm, task, belief, start)
@@ -147,10 +144,7 @@ def belief_of(info: CameraInfo, task: Task, base_frame: str) -> Belief:
     """What is believed of the camera until now; the board is not known yet."""
     parent = task.parent(base_frame)
     if info.parent != parent:
-        raise CommandError(
-            f'camera "{info.name}" is told to be carried by {info.parent}, and cell.toml says {parent}: take its '
-            "[camera.mount] out of camera.toml, and start `camera` again"
-        )
+        raise CommandError(because("camera.poses.parent", camera=info.name, parent=info.parent, wanted=parent))
     camera = from_transform(info.parent_from_camera)
     return Belief(model_of(info), task.carrier, camera, np.eye(4), task.board.points(), task.height)
 
@@ -173,16 +167,14 @@ def _choose(arm: Arm, task: Task, belief: Belief, start: Array) -> tuple[Belief,
     chosen = choose(belief)
     if chosen.undetermined and belief.height is None and task.fallback is not None:
         belief = replace(belief, height=task.fallback)
-        print(f"the height of the tags is taken as {1e3 * task.fallback:.1f} mm, as cell.toml says")
+        print(sentence(because("camera.poses.height", height=1e3 * task.fallback)))
         chosen = choose(belief)
     if len(chosen.joints) + 1 < FEWEST_POSES:
-        raise CommandError(
-            f"the arm can show the tags to {task.camera.name} in {len(chosen.joints)} poses beside this one, at least "
-            f"{FEWEST_POSES - 1} are needed: bring it to where the tags are in the middle of the image, and take away "
-            "what stands in its way; nothing has moved, nothing was written"
-        )
+        count = len(chosen.joints)
+        few = because("camera.poses.few", camera=task.camera.name, count=count, least=FEWEST_POSES - 1)
+        raise CommandError(because("camera.nothing_moved", few))
     if chosen.undetermined:
-        raise CommandError(f"{'; '.join(chosen.undetermined)}; nothing has moved, nothing was written")
+        raise CommandError(because("camera.nothing_moved", *chosen.undetermined))
     return belief, chosen
 
 
@@ -191,9 +183,10 @@ def _show(arm: Arm, task: Task, chosen: Chosen) -> None:
         print(f"{number:3}: {joints_text(arm.joint_names, joints.tolist(), arm.description)}")
     nearest, farthest = (1e3 * value for value in chosen.distances)
     turns = ", ".join(f"{np.degrees(value):.0f}" for value in chosen.turns)
-    print(f"{len(chosen.joints)} poses: the tags {nearest:.0f} to {farthest:.0f} mm away, turned by {turns} deg (RMS)")
+    count = len(chosen.joints)
+    print(sentence(because("camera.poses.chosen", count=count, nearest=nearest, farthest=farthest, turns=turns)))
     if task.carrier is Carrier.CAMERA:
-        print("plans do not know of the camera on the arm unless the scene has it (`gemelo scene`)")
+        print(sentence(because("camera.poses.not_in_scene")))
 
 
 @contextmanager
@@ -215,7 +208,7 @@ def _carrying(arm: Arm, task: Task, belief: Belief) -> Iterator[None]:
         except gemelo.Refused as error:
             arm.scene.remove(MOUNT_BOARD)
             is_there = False
-            print(f"plans do not keep clear of the tags on the arm, since these would touch already: {error.reason}")
+            print(sentence(because("camera.poses.touching", error.reason)))
         yield
     finally:
         if is_there:
@@ -244,24 +237,24 @@ def drive(arm: Arm, eye: Eye, task: Task, poses: Sequence[Array]) -> tuple[list[
             arm.move(joints=_named(arm, joints), speed=SPEED)
             sighting = _look(eye, task)
         except gemelo.Refused as refused:
-            print(f"pose {number} is left out: {text_of(refused)}", flush=True)
+            print(sentence(because("camera.poses.left_out", refused.message, pose=number)), flush=True)
             continue
-        except ValueError as error:
-            print(f"pose {number} is left out: {error}", flush=True)
+        except NotMeasured as error:
+            print(sentence(because("camera.poses.left_out", error.reason, pose=number)), flush=True)
             continue
-        print(f"pose {number}: {len(sighting.points) // 4} tags", flush=True)
+        print(sentence(because("camera.poses.seen", pose=number, count=len(sighting.points) // 4)), flush=True)
         views.append(BoardView(link_at(_standing(arm)), sighting))
         numbers.append(number)
     return views, numbers
 
 
 def _look(eye: Eye, task: Task) -> Sighting:
-    """The board as it is seen from here; ValueError where it is not."""
+    """The board as it is seen from here; NotMeasured where it is not."""
     model = model_of(eye.info)
     images = list(eye.images(IMAGES))
     found = [task.board.find(image, model) for image in images]
-    if not any(found) and (other := other_board(images[-1], task.board) if images else ""):
-        raise ValueError(f"the image shows {other}, and not the board of this command ({remedy(task.board)}),")
+    if not any(found) and images and (other := other_board(images[-1], task.board)) is not None:
+        raise NotMeasured(other)
     seen = one_of(found, task.fewest)
     return without_hidden(seen, model)
 
@@ -270,20 +263,18 @@ def solved(views: list[BoardView], numbers: Sequence[int], belief: Belief) -> Mo
     """The camera's place from views of the poses `numbers`, 0 being the first one; raises `CommandError`."""
     try:
         fit = fit_mount(views, belief.model, belief.carrier, belief.height)
-    except ValueError as error:
-        raise CommandError(f"{error}; nothing was written") from error
+    except NotMeasured as error:
+        raise CommandError(because("camera.nothing_written", error.reason)) from error
     for index in fit.outliers:
-        where = f"pose {numbers[index]}" if numbers[index] else "the first image"
         off = 1e3 * fit.errors[index]
-        print(f"{where} does not agree with the others ({off:.1f} mm), and was left out: was something touched?")
+        if numbers[index]:
+            print(sentence(because("camera.poses.disagrees", pose=numbers[index], off=off)))
+        else:
+            print(sentence(because("camera.poses.disagrees.first", off=off)))
     if fit.faults:
-        raise CommandError(f"{'; '.join(fit.faults)}; nothing was written")
+        raise CommandError(because("camera.nothing_written", *fit.faults))
     if fit.held_out > LARGEST_HELD_OUT:
-        raise CommandError(
-            f"poses are {1e3 * fit.held_out:.1f} mm from where the others put them (at most "
-            f"{1e3 * LARGEST_HELD_OUT:g}), and nothing was written: the board or the camera is loose or was touched, "
-            "or the arm has lost steps (`gemelo verify`)"
-        )
+        raise CommandError(because("camera.poses.off", off=1e3 * fit.held_out, most=1e3 * LARGEST_HELD_OUT))
     return fit
 
 

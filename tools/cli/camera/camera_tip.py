@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import gemelo
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.common.errors import CommandError
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.units import LENGTH, parse_quantity
 from gemelo.tools.cli.parser import Parser
 
@@ -30,20 +32,23 @@ def tip_length(text: str, robot: gemelo.Robot) -> float:
     return gripper.jaw[2] if gripper is not None and gripper.jaw is not None else 0.0
 
 
-def ask_offset(question: str) -> tuple[float, float]:
+def ask_offset(question: Reason) -> tuple[float, float]:
     """[m] x and y of the base, as a person says them; Enter alone is none. Raises `CommandError` if nobody is there."""
     while True:
-        print(question, flush=True)
+        print(sentence(question), flush=True)
         line = sys.stdin.readline()
         if not line:
-            raise CommandError("there is nobody to look: this command asks a person; nothing was written")
+            raise CommandError(because("camera.nobody_to_look"))
         words = line.split()
         if not words:
             return 0.0, 0.0
         try:
-            x, y = (parse_quantity(word, LENGTH, "it") for word in words)
-        except (CommandError, ValueError) as error:
-            print(f"two lengths are wanted, as 1.5mm -0.4mm ({error})")
+            x, y = (parse_quantity(word, LENGTH) for word in words)
+        except CommandError as error:
+            print(sentence(because("camera.two_lengths.not_one", error.reason)))
+            continue
+        except ValueError:  # one word, or more than two
+            print(sentence(because("camera.two_lengths")))
             continue
         return x, y
 

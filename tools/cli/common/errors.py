@@ -31,8 +31,11 @@ class CommandError(Exception):
 
     def __init__(self, cause: Reason | BaseException | str, code: ExitCode = ExitCode.FAILED) -> None:
         """`cause`: why, as data; another's error, with its reason where it has one; or a sentence."""
+        from gemelo.schemas.reasons import plain  # 30 ms, where something is refused
+
         super().__init__(cause if isinstance(cause, str) else text_of(cause))
-        self.reason = None if isinstance(cause, str) else reason_of(cause)
+        found = None if isinstance(cause, str) else reason_of(cause)
+        self.reason = plain(str(self)) if found is None else found
         self.code = code
 
 
