@@ -12,6 +12,7 @@ from mcap.reader import make_reader
 
 from gemelo.libraries.recordings.mcap_file import CLOCKS
 from gemelo.libraries.recordings.reader import UNREADABLE, Damage, RecordingReader
+from gemelo.schemas.reasons import Reason, because
 
 
 class TopicContents(msgspec.Struct, frozen=True, kw_only=True):
@@ -43,6 +44,7 @@ class Contents(msgspec.Struct, frozen=True, kw_only=True):
     versions: dict[str, str]
     clocks: dict[str, WriterClock] = {}  # by the node that wrote
     damage: str = ""  # why it ends early; empty: it is whole
+    damage_why: Reason | None = None  # `damage` as data
 
 
 @dataclass(frozen=True)
@@ -67,10 +69,11 @@ def contents_of(path: Path) -> Contents:
         for number, channel in reader.channels.items()
         if "derived" not in channel.metadata and counted.counts.get(number)
     ]
+    why = _why(reader.damage)
     return Contents(
         file=str(path), size=path.stat().st_size, start=counted.start, duration=duration,
         messages=sum(each.count for each in topics), topics=tuple(sorted(topics, key=lambda each: each.topic)),
-        versions=reader.metadata.get("gemelo", {}), clocks=_clocks(reader), damage=_sentence(reader.damage),
+        versions=reader.metadata.get("gemelo", {}), clocks=_clocks(reader), damage=str(why or ""), damage_why=why,
     )  # fmt: skip
 
 
@@ -82,11 +85,9 @@ def _clocks(reader: RecordingReader) -> dict[str, WriterClock]:
     return found
 
 
-def _sentence(damage: Damage) -> str:
-    """Empty where the file is whole."""
-    if not damage.is_any:
-        return ""
-    return f"{damage.problem}; `gemelo bag repair` writes what is readable anew"
+def _why(damage: Damage) -> Reason | None:
+    """None where the file is whole."""
+    return None if damage.problem is None else because("recording.damaged", damage.problem)
 
 
 def _from_index(reader: RecordingReader) -> _Counted | None:

@@ -11,12 +11,14 @@ from gemelo.libraries.recordings.reader import RecordingReader
 from gemelo.libraries.recordings.rerun_file import write_rerun
 from gemelo.libraries.recordings.series import Series, series_of
 from gemelo.libraries.runtime.process.own_files import own_file, own_folder
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import because, remedy
 
 Written = tuple[Path, int]  # a file, and its rows
 
 
-class NothingToExport(ValueError):
-    """Patterns that match no topic of a recording; the sentence names those that it has."""
+class NothingToExport(ReasonedError, ValueError):
+    """Patterns that match no topic of a recording; the reason names those that it has."""
 
 
 def export(file: Path, form: str, patterns: Sequence[str], output: Path | None) -> Iterator[Written]:
@@ -37,7 +39,8 @@ def chosen(topics: Sequence[str], patterns: Sequence[str]) -> set[str]:
     """The topics that match one of `patterns`, all where there is none; raises `NothingToExport` for one of no use."""
     for pattern in patterns:
         if not any(fnmatchcase(topic, pattern) for topic in topics):
-            raise NothingToExport(f'no topic matches "{pattern}": there is {", ".join(topics) or "none"}')
+            hint = remedy("there_is", names=", ".join(topics)) if topics else remedy("there_is_none")
+            raise NothingToExport(because("recording.no_topic", hint, pattern=pattern))
     return {topic for topic in topics if not patterns or any(fnmatchcase(topic, pattern) for pattern in patterns)}
 
 

@@ -5,47 +5,46 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from gemelo.schemas.reasons import Reason, because, remedy
+
 PROFILE = "gemelo"  # of the header of our own recordings
 METADATA = "gemelo"  # the name of their metadata record of versions
 MOST_NAMED = 3  # topics
-ROS2 = "`ros2 bag play` plays it, and Foxglove or PlotJuggler shows it"
-ROS1 = "`rosbags-convert` makes a ROS 2 recording of it, and Foxglove shows it"
-OTHER = "Foxglove shows it, and the program that wrote it reads it"
-KINDS = {  # by the encoding of its messages: what it is, and what to do
-    "cdr": ("a recording of ROS 2 (CDR messages)", ROS2),
-    "ros1": ("a recording of ROS 1", ROS1),
-    "json": ("a recording of another program, in JSON", OTHER),
-    "protobuf": ("a recording of another program, in protobuf", OTHER),
-    "flatbuffer": ("a recording of another program, in FlatBuffers", OTHER),
-    "cbor": ("a recording of another program, in CBOR", OTHER),
-    "msgpack": ("a recording of another program, in MessagePack", OTHER),
-}
-BEGINNINGS = {  # of files that are no MCAP
-    b"#ROSBAG": ("a recording of ROS 1 (rosbag)", ROS1),
-    b"SQLite ": ("a recording of ROS 2 in SQLite (rosbag2)", "`ros2 bag convert` makes an MCAP of it, " + ROS2),
-    b"\x89MCAP0": ("an MCAP of another version than 0 of the format", OTHER),
+ROS2, ROS1, OTHER = remedy("play_with_ros2"), remedy("convert_rosbags"), remedy("show_in_foxglove")
+KINDS = {"cdr": ROS2, "ros1": ROS1}  # by the encoding of its messages, what to do
+ENCODINGS = (*KINDS, "json", "protobuf", "flatbuffer", "cbor", "msgpack")  # as `word.recording` names them
+BEGINNINGS = {  # of files that are no MCAP: what it is by `word.recording`, and what to do
+    b"#ROSBAG": ("rosbag", ROS1),
+    b"SQLite ": ("rosbag2", remedy("convert_rosbag2")),
+    b"\x89MCAP0": ("mcap", OTHER),
 }
 
 
-def sentence_of(encodings: set[str], topics: Sequence[str]) -> str:
+def reason_of(path: Path, encodings: set[str], topics: Sequence[str]) -> Reason:
     """What a recording is whose messages have these encodings, and what to do with it."""
-    known = next((each for each in KINDS if each in encodings), "")
-    unknown = f'a recording of another program, its messages "{min(encodings)}"'
-    kind, remedy = KINDS.get(known, (unknown, OTHER))
-    more = f", with {' and '.join(sorted(encodings - {known}))} messages too" if known and len(encodings) > 1 else ""
+    known = next((each for each in ENCODINGS if each in encodings), "")
     named = ", ".join(topics[:MOST_NAMED]) + (" ..." if len(topics) > MOST_NAMED else "")
-    return f"is {kind}{more}, of {named}, and none of gemelo: {remedy}"
+    mend, file = KINDS.get(known, OTHER), str(path)
+    if not known:
+        return because("recording.foreign.unknown", mend, file=file, encoding=min(encodings), topics=named)
+    if others := tuple(sorted(encodings - {known})):
+        return because("recording.foreign.more", mend, file=file, kind=known, others=others, topics=named)
+    return because("recording.foreign", mend, file=file, kind=known, topics=named)
 
 
-def kind_of(path: Path) -> str:
-    """What a file is that is no MCAP, with what to do, or a folder of rosbag2; empty where it is not known."""
+def kind_of(path: Path) -> Reason | None:
+    """What a file is that is no MCAP, with what to do, or a folder of rosbag2; None where it is not known."""
     if (path / "metadata.yaml").is_file():
         inside = sorted(each.name for each in path.glob("*.mcap")) or sorted(each.name for each in path.glob("*.db3*"))
-        said = f" with {', '.join(inside[:MOST_NAMED])}" if inside else ""
-        return f"is the folder of a ROS 2 recording (rosbag2){said}: {ROS2}"
+        if inside:
+            return because("recording.rosbag2.files", ROS2, file=str(path), files=tuple(inside[:MOST_NAMED]))
+        return because("recording.rosbag2", ROS2, file=str(path))
     try:
         with path.open("rb") as file:
             begin = file.read(16)
     except OSError:
-        return ""
-    return next((f"is {kind}: {remedy}" for first, (kind, remedy) in BEGINNINGS.items() if begin.startswith(first)), "")
+        return None
+    for first, (kind, mend) in BEGINNINGS.items():
+        if begin.startswith(first):
+            return because("recording.other_form", mend, file=str(path), kind=kind)
+    return None

@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 
 from gemelo.libraries.recordings.reader import BadRecording, RecordingReader
+from gemelo.schemas.reasons import because
 
 INCIDENT = "incident"  # the name of the metadata record
 BLACK_BOX = "black box: "  # the logger's line about a new one begins with it
@@ -74,7 +75,7 @@ def read_incident(path: Path) -> Incident:
     """What a black box tells of itself; raises `BadRecording` where the file is none."""
     incident = incident_in(RecordingReader(path))
     if incident is None:
-        raise BadRecording(f'"{path}" is a recording, but no black box: `gemelo bag info` says what is in it')
+        raise BadRecording(because("recording.no_black_box", file=str(path)))
     return incident
 
 

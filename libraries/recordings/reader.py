@@ -19,7 +19,9 @@ from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from gemelo.libraries.recordings.foreign import METADATA, PROFILE, kind_of, sentence_of
+from gemelo.libraries.recordings.foreign import METADATA, PROFILE, kind_of, reason_of
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import Reason, Remedy, because, remedy
 
 S = TypeVar("S", bound=msgspec.Struct)
 
@@ -30,8 +32,8 @@ NO_SCHEMA = Schema(id=0, name="", encoding="", data=b"")
 LARGEST_RECORD = 256 * 1024 * 1024  # [B] a length above it is of a damaged file
 
 
-class BadRecording(ValueError):
-    """A file that is no recording; one sentence with the file, what it is, and what would do."""
+class BadRecording(ReasonedError, ValueError):
+    """A file that is no recording; the reason has the file, what it is, and what would do."""
 
 
 @dataclass(frozen=True)
@@ -50,16 +52,16 @@ class Row:
 
 @dataclass
 class Damage:
-    """What of a file cannot be read; all zero and empty where it is whole."""
+    """What of a file cannot be read; all zero and None where it is whole."""
 
-    problem: str = ""  # at the first place
+    problem: Reason | None = None  # at the first place
     chunks: int = 0  # complete ones that do not agree with their CRC
     at: int = 0  # [B] where the complete records end
     lost: int = 0  # [B] behind that
 
     @property
     def is_any(self) -> bool:
-        return bool(self.problem)
+        return self.problem is not None
 
 
 @dataclass
@@ -95,8 +97,8 @@ class RecordingReader:
         """Raises `BadRecording` with what a recording of another program is, and what to do with it."""
         encodings = {row.channel.message_encoding for row in islice(self.rows(), LOOKED_AT)}
         if encodings and self.profile != PROFILE and METADATA not in self.metadata:
-            said = sentence_of(encodings, sorted({each.topic for each in self.channels.values()}))
-            raise BadRecording(f'"{self.path}" {said}; `gemelo bag info {self.path}` lists it')
+            topics = sorted({each.topic for each in self.channels.values()})
+            raise BadRecording(reason_of(self.path, encodings, topics))
 
     def read_metadata(self) -> dict[str, dict[str, str]]:
         """Versions, deployment and the robot's files: those that come before the first hundred messages at least."""
@@ -111,7 +113,7 @@ class RecordingReader:
         try:
             return msgspec.json.decode(text, type=kind) if text else None
         except msgspec.DecodeError as error:
-            raise BadRecording(f'"{self.path}": its {name} cannot be read ({error})') from error
+            raise BadRecording(because("recording.record", file=str(self.path), name=name, error=str(error))) from error
 
     def _records(self, file: IO[bytes]) -> Iterator[Any]:
         """Complete records; those of chunks one by one."""
@@ -123,8 +125,8 @@ class RecordingReader:
                 record = next(records, None)
             except UNREADABLE as error:
                 self.damage.lost = size - self.damage.at
-                where = "in the middle of a record" if self.damage.lost else "before its index"
-                self._damaged(f"it ends {where} ({type(error).__name__})")
+                code = "recording.ends.in_record" if self.damage.lost else "recording.ends.before_index"
+                self._damaged(because(code, error=type(error).__name__))
                 return
             if record is None:
                 return
@@ -132,7 +134,7 @@ class RecordingReader:
             if isinstance(record, DataEnd):  # what follows is the index, which repeats
                 file.seek(-len(MAGIC), SEEK_END)
                 if file.read() != MAGIC:
-                    self._damaged("it ends in the middle of its index")
+                    self._damaged(because("recording.ends.in_index"))
                 return
 
     def _unpacked(self, record: Any) -> Iterator[Any]:
@@ -147,7 +149,7 @@ class RecordingReader:
                 case Metadata():
                     self.metadata[each.name] = dict(each.metadata)
                 case Message() if each.channel_id not in self.channels:
-                    self._damaged(f"a message is of channel {each.channel_id}, which is not described")
+                    self._damaged(because("recording.channel", channel=each.channel_id))
                     continue
             if isinstance(each, Channel | Schema | Metadata | Message | Attachment):
                 yield each
@@ -157,37 +159,32 @@ class RecordingReader:
             return list(breakup_chunk(chunk, validate_crc=True))
         except Exception as error:  # zstd, lz4, struct and CRC have errors of their own
             self.damage.chunks += 1
-            self._damaged(f"a chunk is damaged ({type(error).__name__})")
+            self._damaged(because("recording.chunk", error=type(error).__name__))
             return []
 
-    def _damaged(self, problem: str) -> None:
+    def _damaged(self, problem: Reason) -> None:
         self.damage.problem = self.damage.problem or problem
 
 
 def require_recording(path: Path) -> None:
     """Raises `BadRecording` with one sentence where `path` is no MCAP."""
-    if path.is_dir() and (kind := kind_of(path)):
-        raise BadRecording(f'"{path}" {kind}')
     if path.is_dir():
-        raise BadRecording(f'"{path}" is a folder: name one file in it{_newest(path)}')
+        raise BadRecording(kind_of(path) or because("recording.folder", _newest(path), file=str(path)))
     if not path.exists():
-        raise BadRecording(f'there is no file "{path}"{_newest(path.parent)}')
+        raise BadRecording(because("recording.none", _newest(path.parent), file=str(path)))
     try:
         with path.open("rb") as file:
             begin = file.read(len(MAGIC))
     except OSError as error:
-        raise BadRecording(f'"{path}" cannot be read: {error.strerror or error}') from error
+        why = because("recording.unreadable", file=str(path), error=str(error.strerror or error))
+        raise BadRecording(why) from error
     if not begin:
-        raise BadRecording(f'"{path}" is empty: it was cut off before anything was written; nothing can be saved of it')
-    if begin != MAGIC and (kind := kind_of(path)):
-        raise BadRecording(f'"{path}" {kind}')
+        raise BadRecording(because("recording.empty", file=str(path)))
     if begin != MAGIC:
-        raise BadRecording(
-            f'"{path}" is no MCAP recording: it begins with {begin!r}; recordings are the files that end with .mcap'
-        )
+        raise BadRecording(kind_of(path) or because("recording.not_one", file=str(path), begin=repr(begin)))
 
 
-def _newest(folder: Path) -> str:
-    """The newest recording there, as a remedy."""
+def _newest(folder: Path) -> Remedy:
+    """The newest recording there."""
     found = sorted(folder.glob("*.mcap")) if folder.is_dir() else []
-    return f", as {found[-1]}" if found else "; recordings are in <out>/recordings"
+    return remedy("as_recording", file=str(found[-1])) if found else remedy("recordings_are_in")

@@ -13,6 +13,7 @@ from gemelo.libraries.recordings.foreign import PROFILE
 from gemelo.libraries.recordings.mcap_file import CHUNK_SIZE
 from gemelo.libraries.recordings.reader import Damage, RecordingReader
 from gemelo.libraries.runtime.process.own_files import own_file
+from gemelo.schemas.reasons import Reason, because
 
 
 @dataclass
@@ -26,16 +27,14 @@ class Repaired:
     last: int = 0  # and of the last
 
     @property
-    def sentences(self) -> tuple[str, str]:
+    def reasons(self) -> tuple[Reason, Reason]:
         """What is saved, and what is lost."""
-        length = (self.last - self.first) / 1e9
-        count = self.saved.total()
-        saved = f"saved {count} messages of {len(self.saved)} topics, {length:.1f} s, to {self.path}"
-        parts = (
-            [f"{self.damage.lost} bytes at the end, of a chunk that was not written whole"] if self.damage.lost else []
-        )
-        parts += [f"{self.damage.chunks} damaged chunks within"] if self.damage.chunks else []
-        return saved, f"lost: {' and '.join(parts)}" if parts else "lost: nothing but the index"
+        length, file = (self.last - self.first) / 1e9, str(self.path)
+        count, topics = self.saved.total(), len(self.saved)
+        saved = because("recording.saved", count=count, topics=topics, length=length, file=file)
+        parts = [because("recording.lost.end", size=self.damage.lost)] if self.damage.lost else []
+        parts += [because("recording.lost.chunks", count=self.damage.chunks)] if self.damage.chunks else []
+        return saved, because("recording.lost", *parts) if parts else because("recording.lost.nothing")
 
 
 def repair(source: Path, target: Path) -> Repaired:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from gemelo.libraries.recordings.mcap_file import ROBOT
 from gemelo.libraries.recordings.reader import BadRecording, RecordingReader
+from gemelo.schemas.reasons import because
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _NAME_LINE = re.compile(r'^name\s*=\s*("[^"]*"|\'[^\']*\')', re.MULTILINE)
@@ -34,15 +35,15 @@ def write_shadow(reader: RecordingReader, folder: Path, name: str, original: Pat
     try:
         robot = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise BadRecording(f'"{reader.path}": its robot.toml cannot be read: {error}') from error
+        raise BadRecording(because("recording.robot.unreadable", file=str(reader.path), error=str(error))) from error
     if not text or not _NAME_LINE.search(text):
-        raise BadRecording(f'"{reader.path}" has no robot.toml: it was recorded without state_publisher')
+        raise BadRecording(because("recording.robot.none", file=str(reader.path)))
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "robot.toml").write_text(_NAME_LINE.sub(f'name = "{name}"', text, count=1), encoding="utf-8")
     for key in ("urdf", "srdf"):
         file = str(robot.get(key, f"robot.{key}"))
         if Path(file).name != file:
-            raise BadRecording(f'"{reader.path}": its robot.toml names "{file}", which is in another folder')
+            raise BadRecording(because("recording.robot.elsewhere", file=str(reader.path), name=file))
         (folder / file).write_text(files.get(key, ""), encoding="utf-8")
     _link_folders(original, folder)
 

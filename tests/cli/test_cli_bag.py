@@ -239,7 +239,7 @@ def test_a_recording_is_compressed_as_it_was_asked_for(router, tmp_path, compres
         (["play", "{bag}", "--as", "a/b"], '--as "a/b": letters, digits'),
         (["play", "{bag}", "joint_stats"], 'no topic matches "joint_stats"'),
         (["export", "{bag}", "--to", "exel"], 'no form "exel"'),
-        (["info", "{folder}"], "is a folder: name one file in it, as"),
+        (["info", "{folder}"], "is a folder: name one file in it; the newest is"),
         (["info", "{folder}/none.mcap"], "there is no file"),
         (["record", "--compression", "gzip"], 'no compression "gzip"'),
     ],

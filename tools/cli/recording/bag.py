@@ -14,7 +14,9 @@ from gemelo.libraries.recordings.export import FORMS, NothingToExport, export
 from gemelo.libraries.recordings.reader import BadRecording
 from gemelo.libraries.recordings.repair import repair
 from gemelo.libraries.runtime.clock_offset import ClockOffset
+from gemelo.schemas.reasons import because, plain
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown, usage
+from gemelo.tools.cli.common.language import columns, sentence, word
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options, Parser, json_option
 
@@ -48,10 +50,10 @@ def run_repair(options: Options) -> ExitCode:
     """Writes what is readable of a recording that was cut off."""
     with one_sentence():
         if not contents_of(options.file).damage:
-            print(f"{options.file} is whole: there is nothing to repair")
+            print(sentence(because("recording.whole", file=str(options.file))))
             return ExitCode.OK
         target = options.output or options.file.with_suffix(".repaired.mcap")
-        print("\n".join(repair(options.file, target).sentences))
+        print("\n".join(map(sentence, repair(options.file, target).reasons)))
     return ExitCode.OK
 
 
@@ -69,7 +71,7 @@ def run_export(options: Options) -> ExitCode:
         raise unknown("form", options.to, list(FORMS))
     with one_sentence():
         for path, count in export(options.file, options.to, options.topics, options.output):
-            print(f"{path}: {count} rows" if count else f"{path}")
+            print(sentence(because("recording.exported", file=str(path), count=count)) if count else str(path))
     return ExitCode.OK
 
 
@@ -81,11 +83,13 @@ def one_sentence() -> Iterator[None]:
     except (BadRecording, NothingToExport) as error:
         raise usage(error) from error
     except FileExistsError as error:
-        raise CommandError(f'"{error.filename}" is there already: name another with -o, or remove it') from error
+        raise CommandError(because("recording.there_already", file=str(error.filename))) from error
     except OSError as error:
-        raise CommandError(
-            f"{error.filename or 'the disk'}: {error.strerror or error}; free space or name another place with -o"
-        ) from error
+        said = str(error.strerror or error)
+        where = because("recording.place", file=str(error.filename), error=said) if error.filename else because(
+            "recording.disk", error=said
+        )  # fmt: skip
+        raise CommandError(where) from error
 
 
 def _apart(contents: Contents) -> Iterator[tuple[str, WriterClock, ClockOffset]]:
@@ -98,15 +102,19 @@ def _apart(contents: Contents) -> Iterator[tuple[str, WriterClock, ClockOffset]]
 def information(contents: Contents) -> str:
     """A recording as text."""
     start = f"{datetime.fromtimestamp(contents.start / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC" if contents.start else "-"
-    head = [
-        f"file      {contents.file}, {contents.size / 1e6:.2f} MB",
-        f"start     {start}, {contents.duration:.1f} s",
-        f"messages  {contents.messages} on {len(contents.topics)} topics",
-        "versions  " + ", ".join(f"{name} {value}" for name, value in contents.versions.items() if name != "system"),
+    versions = ", ".join(f"{name} {value}" for name, value in contents.versions.items() if name != "system")
+    clocks = (
+        because("recording.line.clock", node=name, host=each.host, clock=str(clock))
+        for name, each, clock in _apart(contents)
+    )
+    lines = [
+        ("file", because("recording.line.file", file=contents.file, size=contents.size / 1e6)),
+        ("start", because("recording.line.start", start=start, duration=contents.duration)),
+        ("messages", because("recording.line.messages", count=contents.messages, topics=len(contents.topics))),
+        ("versions", plain(versions)),
+        *(("clock", each) for each in clocks),
+        *((("damaged", contents.damage_why),) if contents.damage_why is not None else ()),
     ]
-    head += [
-        f"clock     of {name} on {each.host}: {clock} from the recorder's" for name, each, clock in _apart(contents)
-    ]
-    head += [f"damaged   {contents.damage}"] if contents.damage else []
+    head = [f"{word('recording_line', name):<9} {sentence(what)}" for name, what in lines]
     rows = [(each.topic, each.message, str(each.count), f"{each.rate:.2f}") for each in contents.topics]
-    return "\n".join([*head, "", table(("topic", "message", "count", "rate [Hz]"), rows)])
+    return "\n".join([*head, "", table(columns("topic", "message", "count", "rate [Hz]"), rows)])

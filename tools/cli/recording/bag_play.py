@@ -24,7 +24,9 @@ from gemelo.libraries.runtime.errors import NodeNameTaken
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Deployment
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import load_robot, require_router
 from gemelo.tools.cli.motion.jog_keys import keyboard
 from gemelo.tools.cli.parser import Options, Parser
@@ -55,20 +57,20 @@ def add_options(parser: Parser) -> None:
 
 def rate_argument(text: str) -> float:
     """An argument's type: a finite factor of the recorded speed, above 0; dimensionless."""
-    return _number(text, lambda value: value > 0.0, "write how many times real time, as 0.5 or 2")
+    return _number(text, lambda value: value > 0.0, "cli.play.rate")
 
 
 def start_argument(text: str) -> float:
     """An argument's type: a finite time [s] of 0 or more."""
-    return _number(text, lambda value: value >= 0.0, "write seconds after the beginning, as 12.5")
+    return _number(text, lambda value: value >= 0.0, "cli.play.seconds")
 
 
-def _number(text: str, is_possible: Callable[[float], bool], remedy: str) -> float:
+def _number(text: str, is_possible: Callable[[float], bool], code: str) -> float:
     with suppress(ValueError):
         value = float(text)
         if is_possible(value) and value < float("inf"):
             return value
-    raise ArgumentTypeError(f'"{text}" cannot be: {remedy}')
+    raise ArgumentTypeError(sentence(because(code, text=text)))
 
 
 def run(options: Options) -> ExitCode:
@@ -82,7 +84,7 @@ def run(options: Options) -> ExitCode:
         topics = chosen(topics_in(reader), options.topics)
         player = Player(reader, topics.__contains__, options.rate, options.start, options.loop, options.paused)
     if player.is_over:
-        raise usage(f"--start {options.start:g}: the recording has no message after that")
+        raise usage(because("cli.play.start", start=options.start))
     own = load_robot()
     if name == own.description.name:
         raise refused(name)
@@ -99,14 +101,11 @@ def run(options: Options) -> ExitCode:
 def require_name(name: str) -> None:
     """Raises `CommandError` for a name that cannot be a key's first part."""
     if not NAME.fullmatch(name):
-        raise usage(f'--as "{name}": letters, digits, "_" and "-" only, as rm1-replay')
+        raise usage(because("cli.play.name", name=name))
 
 
 def refused(name: str) -> CommandError:
-    return CommandError(
-        f"refused: {name} is a living robot's name, and a recording may not speak for it; "
-        f"play under another name, as --as {name}-replay"
-    )
+    return CommandError(because("cli.play.living", name=name))
 
 
 @contextmanager
@@ -149,7 +148,8 @@ def play(deployment: Deployment, name: str, player: Player, put: Callable[..., N
                 node.stop()
 
         node.spin(step, rate=RATE)
-        print(f"played {player.played} messages, up to {player.position:.1f} s", flush=True)
+        played = because("cli.play.played", count=player.played, time=player.position)
+        print(sentence(played), flush=True)
 
 
 def press(node: Node, present: PlayerParameters, key: str) -> None:
@@ -171,10 +171,10 @@ def keys() -> Iterator[Callable[[], str]]:
     if not sys.stdin.isatty():
         yield lambda: ""
         return
-    print("space: pause, s: one step, + -: faster, slower, q: end", flush=True)
+    print(sentence(because("cli.play.keys")), flush=True)
     with keyboard() as typed:
         yield lambda: typed(0.0)
 
 
 def say_how(name: str) -> None:
-    print(f"playing as {name}: `gemelo --robot {name} topic echo joint_states` and every other tool see it", flush=True)
+    print(sentence(because("cli.play.begun", name=name)), flush=True)

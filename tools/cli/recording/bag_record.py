@@ -16,8 +16,10 @@ from gemelo.libraries.recordings.subscriptions import Subscriptions
 from gemelo.libraries.recordings.table import recorded_topics
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import DESCRIPTION, Delivery, Topic
 from gemelo.tools.cli.common.errors import ExitCode, unknown
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.parser import Options, Parser, positive_number
 from gemelo.tools.cli.recording.bag import one_sentence
@@ -122,7 +124,8 @@ def record(session: CommandSession, options: Options) -> None:
         files.write(node.now())
     finally:
         files.close()
-        print(f"{files.messages} messages in {', '.join(map(str, files.written))}", flush=True)
+        written = because("cli.record.written", count=files.messages, files=tuple(map(str, files.written)))
+        print(sentence(written), flush=True)
 
 
 def chosen_by(patterns: list[str]) -> Callable[[str], bool]:

@@ -19,13 +19,15 @@ from gemelo.libraries.recordings.incidents import (
     time_of,
 )
 from gemelo.libraries.runtime.deployment import project_root
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import columns, sentence
 from gemelo.tools.cli.common.session import load_robot
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options, Parser, json_option
 from gemelo.tools.cli.recording.bag import one_sentence
 
-SAVING = "a black box of what has just happened is being saved: `gemelo blackbox list` has it in a few seconds"
+SAVING = because("recording.black_box.saving")
 
 
 def list_options(parser: Parser) -> None:
@@ -39,14 +41,16 @@ def run_list(options: Options) -> ExitCode:
     if options.json:
         print(msgspec.json.encode(found).decode())
     elif not found:
-        print(saving or f"no black box in {folder}: nothing has happened yet")
+        print(sentence(saving or because("recording.black_box.none", folder=str(folder))))
     else:
         rows = [
             (str(number), time_of(each.incident.stamp), str(each.incident.kind), _clause(each.incident))
             for number, each in enumerate(found, 1)
         ]
-        print(table(("N", "when", "what", "sentence"), rows))
-        print("\n`gemelo blackbox show N`, or `open N` to see it" + (f"\n{saving}" if saving else ""))
+        print(f"{table(columns('N', 'when', 'what', 'sentence'), rows)}\n")
+        print(sentence(because("recording.black_box.show")))
+        if saving is not None:
+            print(sentence(saving))
     return ExitCode.OK
 
 
@@ -98,19 +102,19 @@ def _chosen(which: str) -> tuple[Path, Incident]:
             return Path(which), read_incident(Path(which))
     folder, found, saving = _found()
     if not found:
-        raise CommandError(saving or f"no black box in {folder}: nothing has happened yet")
+        raise CommandError(saving or because("recording.black_box.none", folder=str(folder)))
     if not 1 <= int(which) <= len(found):
-        raise CommandError(f"there is no black box {which}: there are 1 to {len(found)}, `gemelo blackbox list`")
+        raise CommandError(because("recording.black_box.number", number=which, count=len(found)))
     chosen = found[int(which) - 1]
     return Path(chosen.path), chosen.incident
 
 
-def _found() -> tuple[Path, list[BlackBoxFile], str]:
-    """The folder, what is in it of the robot, and what to say where one is being saved; empty where none is."""
+def _found() -> tuple[Path, list[BlackBoxFile], Reason | None]:
+    """The folder, what is in it of the robot, and what to say where one is being saved; None where none is."""
     robot = load_robot()
     folder = project_root() / robot.deployment.paths.out / FOLDER
     name = robot.description.name
-    saving = SAVING if is_saving(folder, name, time.time()) else ""
+    saving = SAVING if is_saving(folder, name, time.time()) else None
     return folder, black_boxes(folder, name), saving
 
 

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NoReturn
 
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.parser import Options
 
@@ -48,5 +49,5 @@ def run_soak(options: Options) -> ExitCode:
 def _become(program: str) -> NoReturn:
     """Raises `CommandError` where the project is installed without its own tests' tools."""
     if find_spec("gemelo.tools.chaos") is None:
-        raise CommandError(f"`gemelo {sys.argv[1]}` needs a checkout of the project: git clone it, then `make setup`")
+        raise CommandError(because("cli.checkout", command=sys.argv[1]))
     os.execv(sys.executable, [sys.executable, "-m", program, *sys.argv[2:]])
