@@ -17,6 +17,7 @@ from gemelo.schemas.topics import DEVICE_EVENTS, JOINT_STATES
 from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
 from gemelo.services.stepper_gateway.motion.target_tracker import TargetTracker
 from gemelo.tools.virtual_arm.gateway_driver import TargetsInput
+from gemelo.tools.virtual_arm.older_arm import OlderArm
 from gemelo.tools.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
 from tests.profiles import examples
 from tests.stepper_gateway.harness import assert_within_limits, move
@@ -59,7 +60,7 @@ def test_a_target_is_reached_exactly_while_the_stream_lasts() -> None:
 
 
 def test_a_stream_that_falls_silent_brakes_to_rest_and_does_not_go_on_to_the_stale_target() -> None:
-    rig = VirtualArm().ready()
+    rig = OlderArm().ready()
     rig.target(brazo_joint=2.5)
     assert rig.run(2.0, lambda: rig.device.mode == DeviceMode.RUN)
     assert rig.run(1.6, lambda: rig.device.mode == DeviceMode.IDLE)
@@ -70,8 +71,9 @@ def test_a_stream_that_falls_silent_brakes_to_rest_and_does_not_go_on_to_the_sta
 
 
 def silenced() -> VirtualArm:
-    """An arm that still decelerates after its targets have fallen silent, nearly at rest."""
-    rig = VirtualArm().ready()
+    """An arm that still decelerates after its targets have fallen silent, nearly at rest; by a STOP, as it has no
+    replacements."""
+    rig = OlderArm().ready()
     while rig.position[0] < 0.1:
         rig.target(brazo_joint=2.5)
         rig.run(0.1)

@@ -22,6 +22,7 @@ SLOTS = 2500.0  # [us] from the arrival of a frame to the slot that plays it; ch
 SURE = 0.95  # share of the frames that arrive before their knot is played; chosen: more costs more lag than it saves
 PATIENCE = 0.005  # [s] beyond one and a half round trips, after which a chunk counts as lost; chosen: five slots
 DELAYS = 100  # chosen: three seconds of 30 Hz
+UNANSWERED = 2.0  # [s] after which no answer comes any more; chosen: far beyond a network's delays
 LAST_DT = 20_000  # [us] of the knot that ends the stream where it rests; chosen: as of every other motion
 SUPERSEDED = (*TRANSIENT, Code.LATE, Code.OTHER_KNOT, Code.NO_STOP)  # a fresh one may be taken
 LIMITED = (Code.POSITION_LIMIT, Code.VELOCITY_LIMIT, Code.ACCELERATION_LIMIT)  # as well, and somebody is to know
@@ -39,6 +40,7 @@ class Splice(NamedTuple):
 class _Sent(NamedTuple):
     at: float  # [s] monotonic
     device_us: int  # the device's time then
+    is_given_up: bool = False
 
 
 class _Departure(NamedTuple):
@@ -205,14 +207,19 @@ class LiveStream(Stream):
         return None
 
     def _give_up(self, now: float) -> None:
-        """Chunks that nobody has answered count as lost: what goes on from their knots would be refused for ever."""
+        """Chunks that nobody has answered count as lost: what goes on from their knots would be refused for ever.
+
+        Their answers may still come, and say how long the wire takes.
+        """
         patience = 1.5e-6 * (self._delay(SURE) + self._half_trip) + PATIENCE
-        for seq in [seq for seq, sent in self._under_way.items() if now - sent.at > patience]:
-            if seq > 0:
+        for seq, sent in list(self._under_way.items()):
+            if now - sent.at > UNANSWERED:
                 del self._under_way[seq]
-            if seq > max(0, self._confirmed):
-                self.log.forget(seq, seq)
-                self.is_complete = self.log.newest.ends
+            elif now - sent.at > patience and not sent.is_given_up:
+                self._under_way[seq] = sent._replace(is_given_up=True)
+                if seq > max(0, self._confirmed):
+                    self.log.forget(seq, seq)
+                    self.is_complete = self.log.newest.ends
 
     def _delay(self, share: float) -> float:
         """[us] that `share` of the chunks took to the device at most."""
