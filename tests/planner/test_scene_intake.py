@@ -16,6 +16,9 @@ from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.scene import AllowedPair, MeshShape, PlanningScene, SceneObject
 from gemelo.services.planner.collision import arm_geometry
+from gemelo.services.planner.collision.checker import CollisionChecker
+from gemelo.services.planner.collision.clearance import CLEARANCE
+from gemelo.services.planner.collision.scene_shapes import SceneError
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.collision_geometry.coal_shapes import geometry_of
 from gemelo.services.planner.collision_geometry.shapes import SIZES, CollisionShape, ShapeKind
@@ -68,11 +71,11 @@ def test_a_scene_costs_no_walk_along_the_chain_for_what_stands_still(
     monkeypatch.setattr(arm_geometry, "load_collision_geometry", load)
     kinematics = Kinematics(arm)
     reach.calls = 0
-    World(arm, kinematics)
+    _ = World(arm, kinematics).geometry
     for_the_arm = reach.calls
     assert for_the_arm > 0
     for seed in range(3):
-        World(arm, kinematics, drawn_scene(seed, OBJECTS))
+        _ = World(arm, kinematics, drawn_scene(seed, OBJECTS)).geometry
     assert (reach.calls, load.calls) == (for_the_arm, 1)
 
 
@@ -80,11 +83,69 @@ def test_one_object_more_is_one_object_computed(arm: ArmDescription, monkeypatch
     scene = drawn_scene(1, OBJECTS + 1)
     fewer = PlanningScene(version=1, objects=scene.objects[:OBJECTS])
     kinematics = Kinematics(arm)
-    World(arm, kinematics, fewer)
+    _ = World(arm, kinematics, fewer).geometry
+    made, read = Counted(arm_geometry.geometry_of), Counted(arm_geometry.shape_of)
+    monkeypatch.setattr(arm_geometry, "geometry_of", made)
+    monkeypatch.setattr(arm_geometry, "shape_of", read)
+    world = World(arm, kinematics, scene)
+    assert (read.calls, made.calls) == (1, 0)
+    _ = world.geometry
+    assert made.calls == 1
+
+
+def test_what_coal_needs_is_made_when_it_is_first_asked_and_of_meshes_at_once(
+    arm: ArmDescription, monkeypatch: pytest.MonkeyPatch
+):
+    kinematics = Kinematics(arm)
     made = Counted(arm_geometry.geometry_of)
     monkeypatch.setattr(arm_geometry, "geometry_of", made)
-    World(arm, kinematics, scene)
-    assert made.calls == 1
+    world = World(arm, kinematics, drawn_scene(1, OBJECTS))
+    assert made.calls == 0
+    assert world.distance(configurations(arm, 1)[0]) < np.inf
+    assert made.calls == OBJECTS
+    block = SceneObject(name="block", shape=MeshShape(data=stl_box(0.1)), pose=Transform(translation=(3.0, 0.0, 0.0)))
+    World(arm, kinematics, PlanningScene(version=2, objects=(block,)))
+    assert made.calls == OBJECTS + 1
+
+
+def test_a_scene_that_cannot_be_is_refused_at_once(arm: ArmDescription):
+    kinematics, scene = Kinematics(arm), drawn_scene(1, 3)
+    first, second, third = scene.objects
+    for objects, code in (
+        ((first, second, msgspec.structs.replace(third, name=first.name)), "scene.names.same"),
+        ((first, msgspec.structs.replace(second, attached=True, frame="nowhere"), third), "scene.link.gone"),
+        ((first, second, msgspec.structs.replace(third, padding=-1.0)), "scene.object.padding"),
+    ):
+        for _ in range(2):  # what was refused is not known the second time either
+            with pytest.raises(SceneError) as refused:
+                World(arm, kinematics, PlanningScene(version=1, objects=objects))
+            assert refused.value.reason.code == code
+
+
+def test_a_scene_is_that_of_its_objects_whatever_stood_there_before(arm: ArmDescription):
+    """Objects come, go, move and change places: the native planner's answers are those of one that saw nothing
+    before."""
+    kinematics, random = Kinematics(arm), np.random.default_rng(7)
+    checker = CollisionChecker(World(arm, kinematics))
+    pool = drawn_scene(5, 24).objects
+    rows = configurations(arm, 60)
+    for _ in range(12):
+        chosen = [pool[number] for number in random.permutation(len(pool))[: int(random.integers(1, 12))]]
+        moved = pool[int(random.integers(len(pool)))].pose
+        objects = (msgspec.structs.replace(chosen[0], pose=moved), *chosen[1:])
+        scene = PlanningScene(version=1, objects=objects)
+        if random.uniform() < 0.5 and len(objects) > 1:
+            scene = with_load(scene, arm.tool_frame)
+        checker.newest = World(arm, kinematics, scene)
+        checker.begin()
+        fresh = CollisionChecker(World(arm, Kinematics(arm), scene))
+        ours, theirs = checker.native(CLEARANCE), fresh.native(CLEARANCE)
+        assert ours.free(rows).tolist() == theirs.free(rows).tolist()
+        assert [ours.nearest(row) for row in rows] == [theirs.nearest(row) for row in rows]
+        assert [ours.touching(np.array((row, row))) is None for row in rows] == [
+            theirs.touching(np.array((row, row))) is None for row in rows
+        ]
+        assert checker.world.pairs == fresh.world.pairs
 
 
 def test_the_reach_of_pairs_is_what_the_chain_between_them_gives(arm: ArmDescription):

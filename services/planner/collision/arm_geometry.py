@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics, frame_of_link
 from gemelo.libraries.arm.kinematics.self_collisions import driver_of, load_collision_geometry, shape_reach
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.scene import PlanningScene, SceneObject
 from gemelo.services.planner.collision.scene_shapes import SceneError, is_read_from_a_file, shape_of
 from gemelo.services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
@@ -32,6 +32,7 @@ class PlacedObject(NamedTuple):
     """An object of a scene, as pinocchio has it: on which joint (0: the base), the box (2, 3) around it, and its
     reach (joints,) as `ArmGeometry.reach_of`."""
 
+    item: SceneObject
     shape: CollisionShape
     placed: pin.GeometryObject
     joint: int
@@ -53,32 +54,57 @@ class ArmGeometry:
         self.drivers = self._drivers()
         self.reach = np.array([self.reach_of(shape) for shape in shapes])
         self.checked = self._checked()
-        self._placed: dict[SceneObject, PlacedObject] = {}
+        self._shapes: dict[str, tuple[SceneObject, CollisionShape]] = {}  # of the newest scene, by name
+        self._placed: dict[str, PlacedObject] = {}
 
-    def placed(self, scene: PlanningScene, folders: Sequence[Path]) -> list[PlacedObject]:
-        """The objects of a scene; those of the scene before it are computed no second time, but what is read from a
-        file."""
-        known = self._placed
-        placed = [known.get(item) or self._place(item, folders) for item in scene.objects]
-        lasting = zip(scene.objects, placed, strict=True)
-        self._placed = {item: each for item, each in lasting if not is_read_from_a_file(item)}
+    def shapes(self, scene: PlanningScene, folders: Sequence[Path]) -> tuple[CollisionShape, ...]:
+        """The objects of a scene as solids; of those of the scene before it the same, but of what is read from a file.
+        Raises `SceneError` for what cannot be."""
+        known, newest = self._shapes, dict[str, tuple[SceneObject, CollisionShape]]()
+        shapes = list[CollisionShape]()
+        for item in scene.objects:
+            before = known.get(item.name)
+            if before is not None and (before[0] is item or before[0] == item):
+                newest[item.name] = before
+                shapes.append(before[1])
+                continue
+            self._require_link(item)
+            shape = shape_of(item, folders)
+            if not is_read_from_a_file(item):
+                newest[item.name] = item, shape
+            shapes.append(shape)
+        if len({item.name for item in scene.objects}) != len(shapes):
+            raise SceneError(because("scene.names.same", remedy("other_name_for_one")))
+        self._shapes = newest
+        return tuple(shapes)
+
+    def placed(self, scene: PlanningScene, shapes: Sequence[CollisionShape]) -> list[PlacedObject]:
+        """The objects of a scene, whose `shapes` these are; those of the scene before it are computed no second
+        time."""
+        known, placed = self._placed, list[PlacedObject]()
+        for item, shape in zip(scene.objects, shapes, strict=True):
+            before = known.get(item.name)
+            is_known = before is not None and before.shape is shape and (before.item is item or before.item == item)
+            placed.append(before if before is not None and is_known else self._place(item, shape))
+        self._placed = {each.item.name: each for each in placed}
         return placed
 
-    def _place(self, item: SceneObject, folders: Sequence[Path]) -> PlacedObject:
-        shape = shape_of(item, folders)
+    def _require_link(self, item: SceneObject) -> None:
+        if item.attached and item.frame not in self.arm.model.link_names:
+            named = {"object": item.name, "link": item.frame, "robot": self.arm.name}
+            raise SceneError(because("scene.link.gone", **named))
+
+    def _place(self, item: SceneObject, shape: CollisionShape) -> PlacedObject:
         inner = pin.SE3(shape.matrix[:3, :3], shape.matrix[:3, 3])
         geometry = geometry_of(shape)
         if not item.attached:
             placed = pin.GeometryObject(item.name, 0, 0, self._base.act(inner), geometry)
-            return PlacedObject(shape, placed, 0, box_around(shape, geometry), np.zeros(len(self.drivers)))
-        if item.frame not in self.arm.model.link_names:
-            named = {"object": item.name, "link": item.frame, "robot": self.arm.name}
-            raise SceneError(because("scene.link.gone", **named))
+            return PlacedObject(item, shape, placed, 0, box_around(shape, geometry), np.zeros(len(self.drivers)))
         number = frame_of_link(self.pinocchio, item.frame)
         frame = self.pinocchio.frames[number]
         joint = int(frame.parentJoint)
         placed = pin.GeometryObject(item.name, joint, number, frame.placement.act(inner), geometry)
-        return PlacedObject(shape, placed, joint, box_around(shape, geometry), self.reach_of(placed))
+        return PlacedObject(item, shape, placed, joint, box_around(shape, geometry), self.reach_of(placed))
 
     def reach_of(self, shape: pin.GeometryObject) -> Array:
         """(joints,) [m/rad] or [m/m] that any point of the shape moves at most per unit of each joint; 0 for those that

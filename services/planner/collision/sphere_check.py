@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from gemelo.services.planner.native.native_planner import NativePlanner
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from gemelo.schemas.scene import PlanningScene, SceneObject
 from gemelo.services.planner.collision.scene_shapes import allows, shape_of
@@ -63,7 +62,7 @@ def counted_time(seconds_per_question: float) -> CountedTime:
 
 def show_scene(planner: NativePlanner, world: World) -> None:
     """Replaces what the planner is to keep clear of by the scene of `world`; raises ValueError for an unusable one."""
-    obstacles, attachments = native_scene(world.arm, world.scene, world.folders)
+    obstacles, attachments = native_scene(world.arm, world.scene, world.shapes)
     if planner.attached or attachments:
         planner.set_scene(())
     for name in planner.attached:
@@ -81,32 +80,30 @@ def rows_between(rows: Array, begin: float, end: float) -> Array:
 
 
 def native_scene(
-    arm: ArmDescription, scene: PlanningScene, folders: Sequence[Path] = ()
+    arm: ArmDescription, scene: PlanningScene, shapes: Sequence[CollisionShape] | None = None
 ) -> tuple[list[CollisionShape], list[Attachment]]:
-    """Obstacles and attachments with what they may touch; raises `SceneError`. What may touch is as in `World`."""
+    """Obstacles and attachments with what they may touch, of objects whose `shapes` these are; raises `SceneError`.
+    What may touch is as in `World`."""
+    solids = [shape_of(item) for item in scene.objects] if shapes is None else shapes
+    carried = [item for item in scene.objects if item.attached]
+    if not carried and not scene.allowed:
+        return list(solids), []
     links = [link.name for link in arm.model.links if link.collisions]
-    carried = [_attachment(item, scene, links, folders) for item in scene.objects if item.attached]
     names = [*links, *(item.name for item in carried)]
-    may_touch = bool(scene.allowed or carried)
-    around = [
-        _obstacle(item, _touching(item, scene, names) if may_touch else frozenset(), folders)
-        for item in scene.objects
-        if not item.attached
-    ]
-    return around, carried
+    around, attachments = list[CollisionShape](), list[Attachment]()
+    for item, shape in zip(scene.objects, solids, strict=True):
+        if item.attached:
+            attachments.append(_attachment(item, shape, scene, links))
+        else:
+            touching = _touching(item, scene, names)
+            around.append(replace(shape, touching=touching) if touching else shape)
+    return around, attachments
 
 
-def _obstacle(item: SceneObject, touching: frozenset[str], folders: Sequence[Path]) -> CollisionShape:
-    shape = shape_of(item, folders)
-    return replace(shape, touching=touching) if touching else shape
-
-
-def _attachment(item: SceneObject, scene: PlanningScene, links: list[str], folders: Sequence[Path]) -> Attachment:
+def _attachment(item: SceneObject, shape: CollisionShape, scene: PlanningScene, links: list[str]) -> Attachment:
     others = [other.name for other in scene.objects if other.attached and other.name != item.name]
     allowed = {name for name in (*links, *others) if allows(scene.allowed, name, item.name)}
-    return Attachment(
-        item.name, item.frame, (shape_of(item, folders),), frozenset(allowed | {item.frame, *item.touch_links})
-    )
+    return Attachment(item.name, item.frame, (shape,), frozenset(allowed | {item.frame, *item.touch_links}))
 
 
 def _touching(item: SceneObject, scene: PlanningScene, names: list[str]) -> frozenset[str]:

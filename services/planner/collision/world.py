@@ -20,11 +20,12 @@ from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.scene import Contact, PlanningScene
+from gemelo.services.planner.collision.arm_geometry import arm_geometry
 from gemelo.services.planner.collision.continuous import ContinuousCheck
 from gemelo.services.planner.collision.pair_distances import PairDistances
 from gemelo.services.planner.collision.world_geometry import LowerBounds, WorldGeometry
 from gemelo.services.planner.collision_geometry.coal_shapes import is_inside
-from gemelo.services.planner.request.deadline import Deadline
+from gemelo.services.planner.request.deadline import NEVER, Deadline
 
 Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
@@ -51,18 +52,52 @@ class World:
         scene: PlanningScene | None = None,
         folders: Sequence[Path] = (),
     ) -> None:
-        """Mesh files are looked for in `folders`; raises `SceneError` for a scene that cannot be."""
+        """Mesh files are looked for in `folders`; raises `SceneError` for a scene that cannot be.
+
+        What coal needs is made when it is first asked, as most plans never do, but with meshes at once: these may
+        take a second.
+        """
         self.arm = arm
         self.scene, self.folders = scene or PlanningScene(), tuple(folders)
         self._kinematics = kinematics
-        self.geometry = WorldGeometry(arm, kinematics, self.scene, folders)
-        self._bounds = LowerBounds(self.geometry)
-        self._data = kinematics.model.createData()
-        self._placed = self.geometry.model.createData()
-        self._distances = PairDistances(self.geometry)
-        self.reach: Array = self.geometry.reach
+        self._own = arm_geometry(arm, kinematics)
+        self.shapes = self._own.shapes(self.scene, folders)  # of the objects, in their order
+        self._deadline = NEVER
         self._sides: dict[tuple[int, int], Side] = {}  # the shapes' numbers, outer first
-        self._sweep = ContinuousCheck(self.geometry.pair_reach, self.distances)
+        if any(shape.mesh is not None for shape in self.shapes):
+            _ = self.geometry
+
+    @cached_property
+    def geometry(self) -> WorldGeometry:
+        """What is checked against what, on the exact shapes."""
+        return WorldGeometry(self._own, self.scene, self.shapes)
+
+    @cached_property
+    def _bounds(self) -> LowerBounds:
+        return LowerBounds(self.geometry)
+
+    @cached_property
+    def _data(self) -> pin.Data:
+        return self._kinematics.model.createData()
+
+    @cached_property
+    def _placed(self) -> pin.GeometryData:
+        return self.geometry.model.createData()
+
+    @cached_property
+    def _distances(self) -> PairDistances:
+        distances = PairDistances(self.geometry)
+        distances.deadline = self._deadline
+        return distances
+
+    @cached_property
+    def _sweep(self) -> ContinuousCheck:
+        return ContinuousCheck(self.geometry.pair_reach, self.distances)
+
+    @property
+    def reach(self) -> Array:
+        """(n,) [m/rad] or [m/m] that any point of the arm moves at most per unit of each joint."""
+        return self.geometry.reach
 
     @property
     def clearance(self) -> float:
@@ -72,11 +107,13 @@ class World:
     @property
     def deadline(self) -> Deadline:
         """Of the plan that asks: once it has passed, questions that may take long raise `PlanRefused`."""
-        return self._distances.deadline
+        return self._deadline
 
     @deadline.setter
     def deadline(self, deadline: Deadline) -> None:
-        self._distances.deadline = deadline
+        self._deadline = deadline
+        if "_distances" in vars(self):
+            self._distances.deadline = deadline
 
     @property
     def version(self) -> int:

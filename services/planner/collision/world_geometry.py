@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
-from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.schemas.reasons import because, remedy
+from gemelo.schemas.reasons import because
 from gemelo.schemas.scene import AllowedPair, PlanningScene
-from gemelo.services.planner.collision.arm_geometry import Mask, arm_geometry
+from gemelo.services.planner.collision.arm_geometry import ArmGeometry, Mask
 from gemelo.services.planner.collision.scene_shapes import ANY, SceneError
+from gemelo.services.planner.collision_geometry.shapes import CollisionShape
 
 Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
@@ -26,16 +24,13 @@ FEW = 100  # pairs: coal is done with them before numpy has said which of them m
 class WorldGeometry:
     """Built once for one state of the scene; one entry a shape, links first, and one a pair that is checked."""
 
-    def __init__(
-        self, arm: ArmDescription, kinematics: Kinematics, scene: PlanningScene, folders: Sequence[Path]
-    ) -> None:
+    def __init__(self, own: ArmGeometry, scene: PlanningScene, shapes: Sequence[CollisionShape]) -> None:
+        """`shapes` are those of the objects of the `scene`, in its order."""
         self._scene = scene
-        own = arm_geometry(arm, kinematics)
         self._own, self._links = own, len(own.names)
         self.model = own.model.copy()
         self.shape_names = [*own.names, *(item.name for item in scene.objects)]
-        self._require_distinct()
-        objects = own.placed(scene, folders)
+        objects = own.placed(scene, shapes)
         for each in objects:
             self.model.addGeometryObject(each.placed)
         self._require_all(len(self.shape_names))
@@ -57,11 +52,6 @@ class WorldGeometry:
         """Of `pairs`; made when first asked for, as most plans never do."""
         names = self.shape_names
         return [(names[one], names[other]) for one, other in self.pairs]
-
-    def _require_distinct(self) -> None:
-        objects = self.shape_names[self._links :]
-        if len(set(objects)) != len(objects):
-            raise SceneError(because("scene.names.same", remedy("other_name_for_one")))
 
     def _require_all(self, expected: int) -> None:
         """A shape that silently is not there would make everything look free."""

@@ -62,7 +62,8 @@ class CollisionShape:
 
     def __post_init__(self) -> None:
         wanted = SIZES[self.kind]
-        if len(self.size) != wanted or not all(0.0 < value < math.inf for value in self.size):
+        is_sized = min(self.size, default=1.0) > 0.0 and math.isfinite(sum(self.size))
+        if len(self.size) != wanted or not is_sized:
             raise ValueError(f'"{self.name}": a {self.kind} has {wanted} sizes above 0 m, not {self.size}')
         if (self.kind in (ShapeKind.MESH, ShapeKind.HULL)) != (self.mesh is not None):
             raise ValueError(f'"{self.name}": a mesh or hull, and nothing else, comes with its triangles')

@@ -28,7 +28,6 @@ log = logging.getLogger(__name__)
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 ATTACHED_SHARE = 1.0 / 40.0  # of an attached thing's longest side may be bulge: it is covered while somebody waits
-MOST_KNOWN = 2048  # obstacles that are kept: those of a scene before a change and after it
 WIDE = 25.0  # parts of a link's longest side: spheres that reach farther beyond its shapes are said
 OBSTACLES = 64  # the first obstacle's number in a contact: kMaxParts
 HAIR = 1e-4  # [m] a sphere's least radius; chosen: a smaller one adds a check and no safety
@@ -51,6 +50,23 @@ class NamedPart(NamedTuple):
     name: str
     link: str
     part: motion.Part
+
+
+class Bodies(NamedTuple):
+    """The arm with what it holds: `core` of the spheres less what they bulge, as far as anything is left of them."""
+
+    names: tuple[str, ...]  # of the parts: links, then what is attached
+    whole: motion.Body
+    core_names: tuple[str, ...]
+    core: motion.Body | None
+
+
+class StandingObstacle(NamedTuple):
+    """A shape and its obstacle; `touching` has a bit for every part that may touch it."""
+
+    shape: CollisionShape
+    touching: int
+    compiled: motion.Obstacle
 
 
 @dataclass(frozen=True)
@@ -79,9 +95,10 @@ class Assembly:
         self._chain = motion.chain(self._frames.links, self._frames.numbers, len(arm.joints))
         self._links: dict[str, motion.Part] = {}
         self._cores: dict[str, motion.Part | None] = {}
-        self._link_pairs: dict[tuple[str, ...], NDArray[np.int32]] = {}  # by the parts' names
+        self._standing: dict[int, StandingObstacle] = {}  # of the newest scene, by the shape's identity
         for link, cover in self.covers.items():
             self._links[link], self._cores[link] = self._part_and_core(link, shapes[link], cover)
+        self._alone = self._bodies({})
 
     def hold(self, attachment: Attachment) -> HeldPart:
         """The attachment with its spheres; raises ValueError for an unknown link or a shape without an end."""
@@ -93,31 +110,41 @@ class Assembly:
         return HeldPart(attachment, cover, *self._part_and_core(attachment.link, attachment.shapes, cover))
 
     def compiled_scene(self, shapes: Sequence[CollisionShape], held: Mapping[str, HeldPart]) -> CompiledScene:
-        """Links, then what is attached; raises ValueError for two obstacles of one name or an unknown name."""
+        """Links, then what is attached; raises ValueError for two obstacles of one name or an unknown name. Obstacles
+        that stood in the scene before are made no second time."""
         _require_distinct(shapes)
+        bodies = self._bodies(held) if held else self._alone
+        _require_known(shapes, bodies.names)
+        around = self._surroundings(shapes, bodies.names)
+        world, sure = motion.world(bodies.whole, around), None
+        if bodies.core is not None:
+            is_same = bodies.core_names == bodies.names or not any(shape.touching for shape in shapes)
+            sure = motion.world(bodies.core, around if is_same else self._surroundings(shapes, bodies.core_names))
+        return CompiledScene(world, bodies.names, tuple(shapes), dict(held), sure)
+
+    def _surroundings(self, shapes: Sequence[CollisionShape], names: tuple[str, ...]) -> motion.Surroundings:
+        """The shapes as they are for a world whose parts have these names."""
+        known, standing = self._standing, dict[int, StandingObstacle]()
+        for shape in shapes:
+            bits = _bits(shape, names) if shape.touching else 0
+            before = known.get(id(shape))
+            if before is None or before.touching != bits:
+                before = StandingObstacle(shape, bits, placed_obstacle_of(shape, bits))
+            standing[id(shape)] = before
+        self._standing = standing
+        return motion.surroundings([each.compiled for each in standing.values()])
+
+    def _bodies(self, held: Mapping[str, HeldPart]) -> Bodies:
+        """The arm, and what it holds, with whole spheres and with what surely is in them."""
         parts = [NamedPart(link, link, part) for link, part in self._links.items()]
         parts += [NamedPart(name, one.attachment.link, one.part) for name, one in held.items()]
         cores = [NamedPart(link, link, core) for link, core in self._cores.items() if core is not None]
         cores += [NamedPart(name, one.attachment.link, one.core) for name, one in held.items() if one.core is not None]
         names, core_names = tuple(part.name for part in parts), tuple(core.name for core in cores)
-        _require_known(shapes, names)
-        obstacles = _obstacles(shapes, names)
-        world = self._world(parts, obstacles, held)
-        sure = None
-        if cores:
-            sure = self._world(cores, obstacles if core_names == names else _obstacles(shapes, core_names), held)
-        return CompiledScene(world, names, tuple(shapes), dict(held), sure)
+        return Bodies(names, self._body(parts, held), core_names, self._body(cores, held) if cores else None)
 
-    def _world(
-        self, parts: Sequence[NamedPart], obstacles: list[motion.Obstacle], held: Mapping[str, HeldPart]
-    ) -> motion.World:
-        return motion.world(self._chain, [part.part for part in parts], self._pairs(parts, held), obstacles)
-
-    def _pairs(self, parts: Sequence[NamedPart], held: Mapping[str, HeldPart]) -> NDArray[np.int32]:
-        """(k, 2) the places of the parts that are checked against each other; of links alone computed once."""
-        names = tuple(part.name for part in parts)
-        if not held and names in self._link_pairs:
-            return self._link_pairs[names]
+    def _body(self, parts: Sequence[NamedPart], held: Mapping[str, HeldPart]) -> motion.Body:
+        """With the pairs, places of the parts, that are checked against each other."""
         pairs = [
             (first, second)
             for first in range(len(parts))
@@ -125,9 +152,7 @@ class Assembly:
             if self._is_checked(parts[first], parts[second], held)
         ]
         both = np.array(pairs, dtype=np.int32).reshape(-1, 2)
-        if not held:
-            self._link_pairs[names] = both
-        return both
+        return motion.body(self._chain, [part.part for part in parts], both)
 
     def _part_and_core(
         self, link: str, shapes: Sequence[CollisionShape], cover: SphereCover
@@ -205,9 +230,10 @@ def wide_spheres(
 
 
 def _require_distinct(shapes: Sequence[CollisionShape]) -> None:
-    for name, count in Counter(shape.name for shape in shapes).items():
-        if count > 1:
-            raise ValueError(f'the scene has "{name}" twice')
+    if len({shape.name for shape in shapes}) == len(shapes):
+        return
+    [(name, _)] = Counter(shape.name for shape in shapes).most_common(1)
+    raise ValueError(f'the scene has "{name}" twice')
 
 
 def _require_known(shapes: Sequence[CollisionShape], names: Sequence[str]) -> None:
@@ -229,22 +255,19 @@ def _bulge(shapes: Sequence[CollisionShape]) -> float:
     return max(BULGE, ATTACHED_SHARE * max(longest, default=0.0))
 
 
-def _obstacles(shapes: Sequence[CollisionShape], names: Sequence[str]) -> list[motion.Obstacle]:
-    """The shapes as they are for a world whose parts have these names."""
-    return [_obstacle(shape, _bits(shape, names)) for shape in shapes]
+def placed_obstacle_of(shape: CollisionShape, touching: int = 0) -> motion.Obstacle:
+    """The shape where its own pose says; `touching` has a bit for every part that may touch it."""
+    number, size, radius = _form(shape)
+    compiled = None if shape.mesh is None else _compiled(shape.mesh)
+    return motion.placed_obstacle(number, *shape.pose, size, radius + shape.padding, touching, compiled)
 
 
-@lru_cache(maxsize=MOST_KNOWN)
-def _obstacle(shape: CollisionShape, touching: int) -> motion.Obstacle:
-    return obstacle_of(shape, shape.matrix, touching=touching)
-
-
-def obstacle_of(shape: CollisionShape, pose: Array, padding: float = 0.0, touching: int = 0) -> motion.Obstacle:
-    """The shape at `pose` (4, 4), larger by `padding` [m]; `touching` has a bit for every part that may touch it."""
+def obstacle_of(shape: CollisionShape, pose: Array, padding: float = 0.0) -> motion.Obstacle:
+    """The shape at `pose` (4, 4), larger by `padding` [m]."""
     number, size, radius = _form(shape)
     compiled = None if shape.mesh is None else _compiled(shape.mesh)
     around = radius + shape.padding + padding
-    return motion.obstacle(number, transform_row(pose), np.array(size), around, touching, compiled)
+    return motion.obstacle(number, transform_row(pose), np.array(size), around, 0, compiled)
 
 
 @lru_cache(maxsize=64)

@@ -2,6 +2,7 @@
 //
 // Shapes and finiteness are checked here and in core.py; the headers trust what they are given.
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -259,12 +260,49 @@ Obstacle make_obstacle(int shape, const Row& pose, const Row& size, double round
     return obstacle;
 }
 
-std::shared_ptr<const World> make_world(std::shared_ptr<const Chain> chain, Parts parts, const Integers& pairs,
-                                        std::vector<Obstacle> obstacles) {
+// As `make_obstacle`, at a place [m] and turned by a quaternion (x, y, z, w) of any length but 0.
+Obstacle make_placed_obstacle(int shape, const Vector& place, const std::array<double, 4>& quaternion,
+                              const Vector& size, double rounding, uint64_t touching,
+                              std::shared_ptr<const TriangleMesh> mesh) {
+    require(shape >= 0 && shape <= 3, "a shape is 0 to 3");
+    require((shape == 3) == (mesh != nullptr), "a mesh, and only a mesh, comes with its triangles");
+    Obstacle obstacle{static_cast<ShapeKind>(shape), {}, {}, rounding, touching, std::move(mesh)};
+    double length = 0.0;
+    for (const double each : quaternion) length += each * each;
+    length = std::sqrt(length);
+    const double x = quaternion[0] / length, y = quaternion[1] / length, z = quaternion[2] / length,
+                 w = quaternion[3] / length;
+    const double pose[12] = {1 - 2 * (y * y + z * z),
+                             2 * (x * y - z * w),
+                             2 * (x * z + y * w),
+                             2 * (x * y + z * w),
+                             1 - 2 * (x * x + z * z),
+                             2 * (y * z - x * w),
+                             2 * (x * z - y * w),
+                             2 * (y * z + x * w),
+                             1 - 2 * (x * x + y * y),
+                             place[0],
+                             place[1],
+                             place[2]};
+    std::copy(pose, pose + 12, obstacle.pose);
+    std::copy(size.begin(), size.end(), obstacle.size);
+    return obstacle;
+}
+
+std::shared_ptr<const Body> make_body(std::shared_ptr<const Chain> chain, Parts parts, const Integers& pairs) {
     require_columns(pairs.shape(1), 2, "pairs");
     std::vector<PairView> both;
     for (size_t i = 0; i < pairs.shape(0); ++i) both.push_back({pairs(i, 0), pairs(i, 1), 0});
-    return std::make_shared<const World>(std::move(chain), std::move(parts), std::move(both), std::move(obstacles));
+    return std::make_shared<const Body>(std::move(chain), std::move(parts), std::move(both));
+}
+
+std::shared_ptr<const Surroundings> make_surroundings(std::vector<Obstacle> obstacles) {
+    return std::make_shared<const Surroundings>(std::move(obstacles));
+}
+
+std::shared_ptr<const World> make_world(std::shared_ptr<const Body> body,
+                                        std::shared_ptr<const Surroundings> surroundings) {
+    return std::make_shared<const World>(std::move(body), std::move(surroundings));
 }
 
 // As many as there are parts or pairs, or more.
@@ -463,6 +501,8 @@ NB_MODULE(_motion, module) {
     nb::class_<Part>(module, "Part");
     nb::class_<TriangleMesh>(module, "TriangleMesh");
     nb::class_<Obstacle>(module, "Obstacle");
+    nb::class_<Body>(module, "Body");
+    nb::class_<Surroundings>(module, "Surroundings");
     nb::class_<World>(module, "World");
     nb::class_<Kernel>(module, "Kernel").def_ro("name", &Kernel::name);
     nb::class_<CancelFlag>(module, "CancelFlag")
@@ -509,7 +549,11 @@ NB_MODULE(_motion, module) {
     module.def("mesh", &make_mesh, "vertices"_a, "faces"_a);
     module.def("solid_cells", &solid_cells, "vertices"_a, "faces"_a, "cell"_a);
     module.def("obstacle", &make_obstacle, "shape"_a, "pose"_a, "size"_a, "rounding"_a, "touching"_a, "mesh"_a.none());
-    module.def("world", &make_world, "chain"_a, "parts"_a, "pairs"_a, "obstacles"_a);
+    module.def("placed_obstacle", &make_placed_obstacle, "shape"_a, "place"_a, "quaternion"_a, "size"_a, "rounding"_a,
+               "touching"_a, "mesh"_a.none());
+    module.def("body", &make_body, "chain"_a, "parts"_a, "pairs"_a);
+    module.def("surroundings", &make_surroundings, "obstacles"_a);
+    module.def("world", &make_world, "body"_a, "surroundings"_a);
     module.def("are_free", &are_free, "world"_a, "kernel"_a, "rows"_a, "margin"_a);
     module.def("is_free", &is_free, "world"_a, "kernel"_a, "joints"_a, "margin"_a);
     module.def("clearance", &clearance, "world"_a, "kernel"_a, "row"_a, "most"_a);

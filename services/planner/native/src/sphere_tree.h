@@ -25,7 +25,9 @@ inline float raised(double value) { return static_cast<float>(1.000001 * value);
 
 class SphereTree {
   public:
-    explicit SphereTree(const std::vector<Sphere>& spheres) : spheres_(spheres), order_(spheres.size()) {
+    // `steps` of making the sphere around several smaller.
+    explicit SphereTree(const std::vector<Sphere>& spheres, int steps = 64)
+        : spheres_(spheres), order_(spheres.size()), steps_(steps) {
         std::iota(order_.begin(), order_.end(), 0);
         nodes_.reserve(2 * spheres.size());
         if (!spheres.empty()) add(0, spheres.size());
@@ -51,7 +53,7 @@ class SphereTree {
     // Badoiu and Clarkson (2003): towards the farthest one by ever smaller steps; then what that centre needs.
     Sphere around(size_t begin, size_t end) const {
         Sphere best = spheres_[static_cast<size_t>(order_[begin])];
-        for (int step = 1; step <= 64; ++step) {
+        for (int step = 1; step <= steps_; ++step) {
             const Sphere& far = *farthest(best, begin, end).sphere;
             const double share = 1.0 / (step + 1);
             best.x += share * (far.x - best.x);
@@ -103,6 +105,7 @@ class SphereTree {
 
     const std::vector<Sphere>& spheres_;
     std::vector<int32_t> order_;
+    int steps_;
     std::vector<NodeView> nodes_;
 };
 

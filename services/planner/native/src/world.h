@@ -1,4 +1,4 @@
-// An arm among obstacles, ready for the check. Never changed once built: whoever plans in it keeps it.
+// An arm among obstacles, ready for the check, put together from what is known of either.
 #pragma once
 
 #include <array>
@@ -9,10 +9,41 @@ namespace gemelo {
 
 using Parts = std::vector<std::shared_ptr<const Part>>;
 
-class World {
+// What stands around an arm: the obstacles, and spheres around them in a tree. Never changed once built.
+struct Surroundings {
+    std::vector<ObstacleView> obstacles;
+    std::vector<NodeView> tree;      // its leaves' items are obstacles
+    std::vector<int32_t> unbounded;  // obstacles that are in no sphere
+    std::vector<Obstacle> owned;
+
+    explicit Surroundings(std::vector<Obstacle> things) : owned(std::move(things)) {
+        std::vector<Sphere> spheres;
+        std::vector<int32_t> items;
+        for (const Obstacle& obstacle : owned) {
+            const int32_t item = static_cast<int32_t>(obstacles.size());
+            obstacles.push_back(view_of(obstacle));
+            if (obstacle.shape == ShapeKind::kHalfSpace) {
+                unbounded.push_back(item);
+            } else {
+                spheres.push_back(around(obstacle, obstacles.back().rounding));
+                items.push_back(item);
+            }
+        }
+        tree = SphereTree(spheres, kSteps).take();
+        for (NodeView& node : tree) node.item = node.item < 0 ? -1 : items[static_cast<size_t>(node.item)];
+    }
+    Surroundings(const Surroundings&) = delete;
+    Surroundings& operator=(const Surroundings&) = delete;
+
+  private:
+    static constexpr int kSteps = 8;  // chosen: the tree is built while a scene is taken in, of links but once
+};
+
+// An arm and what it holds, without what stands around it. Never changed once built.
+class Body {
   public:
-    World(std::shared_ptr<const Chain> chain, Parts parts, std::vector<PairView> pairs, std::vector<Obstacle> obstacles)
-        : chain_(std::move(chain)), parts_(std::move(parts)), pairs_(std::move(pairs)), owned_(std::move(obstacles)) {
+    Body(std::shared_ptr<const Chain> chain, Parts parts, std::vector<PairView> pairs)
+        : chain_(std::move(chain)), parts_(std::move(parts)), pairs_(std::move(pairs)) {
         require_sound();
         for (PairView& pair : pairs_) {
             if (cost(pair.second, pair.first) < cost(pair.first, pair.second)) std::swap(pair.first, pair.second);
@@ -27,20 +58,21 @@ class World {
         for (const PairView& pair : pairs_) {
             pair_carriers_.push_back({carriers(pair.first, pair.common), carriers(pair.second, pair.common)});
         }
-        add_obstacles();
-        view_ = {chain_->frames.data(), part_views_.data(), pairs_.data(),         obstacles_.data(),
-                 tree_.data(),          unbounded_.data(),  count(chain_->frames), count(part_views_),
-                 count(pairs_),         count(tree_),       count(unbounded_),     count(obstacles_)};
     }
-    World(const World&) = delete;
-    World& operator=(const World&) = delete;
+    Body(const Body&) = delete;
+    Body& operator=(const Body&) = delete;
 
-    const WorldView& view() const { return view_; }
     int32_t dof() const { return chain_->dof; }
     size_t sphere_count() const {
         size_t sum = 0;
         for (const auto& part : parts_) sum += part->spheres.size();
         return sum;
+    }
+
+    WorldView among(const Surroundings& around) const {
+        return {chain_->frames.data(), part_views_.data(),      pairs_.data(),           around.obstacles.data(),
+                around.tree.data(),    around.unbounded.data(), count(chain_->frames),   count(part_views_),
+                count(pairs_),         count(around.tree),      count(around.unbounded), count(around.obstacles)};
     }
 
     // How far at most every part and pair moves while each joint value goes its way of `speed` (dof,).
@@ -133,34 +165,31 @@ class World {
         return first;
     }
 
-    void add_obstacles() {
-        std::vector<Sphere> spheres;
-        std::vector<int32_t> items;
-        for (const Obstacle& obstacle : owned_) {
-            const int32_t item = count(obstacles_);
-            obstacles_.push_back(view_of(obstacle));
-            if (obstacle.shape == ShapeKind::kHalfSpace) {
-                unbounded_.push_back(item);
-            } else {
-                spheres.push_back(around(obstacle, obstacles_.back().rounding));
-                items.push_back(item);
-            }
-        }
-        tree_ = SphereTree(spheres).take();
-        for (NodeView& node : tree_) node.item = node.item < 0 ? -1 : items[static_cast<size_t>(node.item)];
-    }
-
     std::shared_ptr<const Chain> chain_;
     Parts parts_;
     std::vector<PairView> pairs_;
-    std::vector<Obstacle> owned_;
     std::vector<PartView> part_views_;
     std::vector<std::vector<double>> reaches_;  // of every part by frame: [m/rad] or [m/m]
     std::vector<Carriers> carriers_;
     std::vector<std::array<Carriers, 2>> pair_carriers_;
-    std::vector<ObstacleView> obstacles_;
-    std::vector<NodeView> tree_;
-    std::vector<int32_t> unbounded_;
+};
+
+// An arm among obstacles, ready for the check. Never changed once built: whoever plans in it keeps it.
+class World {
+  public:
+    World(std::shared_ptr<const Body> body, std::shared_ptr<const Surroundings> around)
+        : body_(std::move(body)), around_(std::move(around)), view_(body_->among(*around_)) {}
+
+    const WorldView& view() const { return view_; }
+    int32_t dof() const { return body_->dof(); }
+    size_t sphere_count() const { return body_->sphere_count(); }
+    void bound_motion(const double* speed, std::vector<MotionView>& parts, std::vector<MotionView>& pairs) const {
+        body_->bound_motion(speed, parts, pairs);
+    }
+
+  private:
+    std::shared_ptr<const Body> body_;
+    std::shared_ptr<const Surroundings> around_;
     WorldView view_;
 };
 
