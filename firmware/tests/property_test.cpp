@@ -152,6 +152,64 @@ TEST(Stepper, MakesAnyIncrementsWithinTheDriversTimesAndOwesNothingInTheEnd) {
     expect_none(findings, Property::PulseTiming);
 }
 
+namespace {
+
+void work(Stand& stand, Gateway& gateway, int64_t ms) {
+    for (; ms > 0; --ms) {
+        stand.run_to_a_tick();
+        gateway.work();
+        stand.run_to_slot_end();
+    }
+}
+
+bool has_come_to_rest(const Stand& stand, const Gateway& gateway) {
+    const Point& point = stand.machine.present();
+    if (stand.mode() == Mode::Hold) return point.scale_q30 == 0;
+    return stand.mode() == Mode::Idle || point.play_us == gateway.live()->end_us();
+}
+
+}  // namespace
+
+// A gateway that dies: half of the times only what it steers, half of the times its heartbeat too.
+TEST(Cut, OfASteeredStreamEndsAtRestWheneverItComes) {
+    Findings findings;
+    int ends = 0, holds = 0;
+    uint64_t pulses = 0;
+    for (uint64_t seed = first_seed(); seed < first_seed() + 40 * share_of(50); ++seed) {
+        SCOPED_TRACE(seed);
+        findings.context = "seed " + std::to_string(seed);
+        Dice dice(seed);
+        Stand stand(random_bench(dice), findings, 0, 1, true, seed);
+        Gateway gateway(stand, 1, seed, false);
+        gateway.open_stream(true);
+        work(stand, gateway, dice.between(200, 3000));
+        gateway.is_feeding = false;
+        gateway.is_beating = seed % 2 == 0;
+        work(stand, gateway, 170);  // what is under way
+        const bool has_stop = gateway.live()->rests() && !has_come_to_rest(stand, gateway);
+        const int underruns = stand.events("underrun");
+        for (int ms = 0; ms < 20000 && !has_come_to_rest(stand, gateway); ++ms) work(stand, gateway, 1);
+        work(stand, gateway, 3);
+        pulses += stand.scope->pulses();
+        EXPECT_TRUE(stand.machine.stepper().is_quiet());
+        EXPECT_TRUE(!has_stop || stand.events("underrun") == underruns);
+        if (stand.mode() == Mode::Hold) {
+            EXPECT_FALSE(gateway.is_beating);
+            ++holds;
+            continue;
+        }
+        ++ends;
+        for (uint8_t j = 0; j < stand.bench.config.joints; ++j)
+            EXPECT_EQ(stand.machine.stepper().executed(j), (gateway.target()[j] + 128) >> 8);
+    }
+    EXPECT_GT(ends, holds);
+    EXPECT_GT(pulses, 10000u);
+    expect_none(findings, Property::EmittedSteps);
+    expect_none(findings, Property::Limits);
+    expect_none(findings, Property::OnThePath);
+    expect_none(findings, Property::Answers);
+}
+
 TEST(Idempotence, SayingEveryFrameTwiceChangesNoPinAndNoWord) {
     Findings findings;
     for (uint64_t seed = first_seed(); seed < first_seed() + share_of(20); ++seed) {

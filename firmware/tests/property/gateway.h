@@ -2,7 +2,9 @@
 #pragma once
 
 #include <deque>
+#include <set>
 
+#include "live_stream.h"
 #include "random_path.h"
 #include "stand.h"
 
@@ -15,18 +17,21 @@ class Gateway {
 
     // In each slot, at a tick between two others.
     void work();
-    bool has_stream() const { return path_.has_value(); }
+    bool has_stream() const { return path_.has_value() || live_.has_value(); }
     // The device has taken all of the stream.
-    bool is_done() const { return path_ && path_->is_over() && taken_ == chunks_.size(); }
-    void open_stream();
-    void end_stream() { path_->end(); }
+    bool is_done() const;
+    void open_stream() { open_stream(dice_.chance(0.4)); }
+    // `is_live`: one that is steered, with REPLACE.
+    void open_stream(bool is_live);
+    void end_stream();
     void forget_stream();
+    const std::optional<LiveStream>& live() const { return live_; }
     // Its answer; now and then an old command is said again, and must be answered as before.
     gemelo::Code command(gemelo::Command command, uint16_t argument = 0, const std::vector<int32_t>& position = {});
     // Every frame so far.
     const std::vector<rig::Bytes>& said() const { return said_; }
     // Q24.8 steps where the last knot of the stream lies.
-    const std::vector<int32_t>& target() const { return chunks_.back().rows.back().position; }
+    const std::vector<int32_t>& target() const;
 
     bool is_feeding = true, is_beating = true;
 
@@ -40,6 +45,10 @@ class Gateway {
         gemelo::Code code;
     };
     void send_due();
+    void send_live();
+    uint64_t played_us() const;
+    bool may_say(const ChunkAnswer& answer) const;
+    void take(uint32_t seq);
     void post(const rig::Bytes& frame);
     void deliver_due();
     void deliver(const rig::Bytes& frame);
@@ -50,6 +59,10 @@ class Gateway {
     Dice dice_;
     bool repeats_;
     std::optional<RandomPath> path_;
+    std::optional<LiveStream> live_;
+    bool is_ending_ = false;    // of the latter
+    std::set<uint32_t> wrong_;  // seq of what must not be taken
+    uint64_t next_live_us_ = 0;
     std::vector<rig::ChunkSpec> chunks_;
     std::vector<uint64_t> begins_us_;  // stream time at which each chunk begins
     std::deque<Letter> link_;

@@ -62,9 +62,15 @@ void Inspector::look(Oscilloscope& scope) {
     slot_begin_ = scope.tick();
 }
 
-// A path may begin up to one step from where the arm stands; the steps between are made in its first slot.
+// A path may begin up to one step from where the arm stands; the steps between are made in its first slot. A stream that
+// was stopped before has none: the arm stays where it is.
 void Inspector::switch_stream(const Point& point) {
     if (next_.stream == 0 || point.stream != next_.stream) return;
+    if (machine_.mode() == Mode::Idle && stands(point)) {
+        next_ = Expected{};
+        stream_ = 0;
+        return;
+    }
     stream_ = next_.stream;
     path_ = next_.path;
     next_ = Expected{};
@@ -72,6 +78,12 @@ void Inspector::switch_stream(const Point& point) {
     path_.seek(0);
     for (uint8_t j = 0; j < axis_.size(); ++j)
         jump_[j] = path_.position(j) - static_cast<double>(axis_[j].p_q20) * kFine;
+}
+
+bool Inspector::stands(const Point& point) const {
+    for (uint8_t j = 0; j < axis_.size(); ++j)
+        if (point.position_q20[j] != axis_[j].p_q20) return false;
+    return true;
 }
 
 void Inspector::check_path(const Point& point) {

@@ -49,6 +49,7 @@ class Inspector {
     void check_path(const gemelo::Point& point);
     void check_limits(uint8_t joint, double shift);
     void switch_stream(const gemelo::Point& point);
+    bool stands(const gemelo::Point& point) const;
     double shortest_dt() const;
 
     const Bench& bench_;

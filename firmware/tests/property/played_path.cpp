@@ -11,10 +11,16 @@ void PlayedPath::begin(const rig::ChunkSpec& first) {
 }
 
 void PlayedPath::add(const rig::ChunkSpec& chunk) {
-    for (size_t k = chunk.first ? 1 : 0; k < chunk.rows.size(); ++k) {
-        spans_.push_back(Span{end_us(), chunk.dt_us, end_, chunk.rows[k]});
+    for (size_t k = chunk.first || chunk.replacing ? 1 : 0; k < chunk.rows.size(); ++k) {
+        spans_.push_back(Span{end_us(), chunk.dt_to(k), end_, chunk.rows[k]});
         end_ = chunk.rows[k];
     }
+}
+
+void PlayedPath::replace(const rig::ChunkSpec& chunk) {
+    while (!spans_.empty() && spans_.back().begin_us >= chunk.replacing->from_us) spans_.pop_back();
+    end_ = spans_.empty() ? start_ : spans_.back().to;
+    add(chunk);
 }
 
 bool PlayedPath::seek(uint64_t play_us) {

@@ -13,6 +13,8 @@ class PlayedPath {
   public:
     void begin(const rig::ChunkSpec& first);
     void add(const rig::ChunkSpec& chunk);
+    // With REPLACE: what follows its knot 0 is forgotten.
+    void replace(const rig::ChunkSpec& chunk);
 
     // Moves on to a stream time [us], which never falls; false beyond the last knot.
     bool seek(uint64_t play_us);

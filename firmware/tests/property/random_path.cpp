@@ -17,10 +17,13 @@ int64_t change_in(const JointConfig& limits, uint32_t dt_us) {
 }  // namespace
 
 RandomPath::RandomPath(const DeviceConfig& config, std::vector<int32_t> start, uint64_t seed)
+    : RandomPath(config, rig::Row{start, std::vector<int32_t>(start.size())}, seed) {}
+
+RandomPath::RandomPath(const DeviceConfig& config, const rig::Row& start, uint64_t seed)
     : dice_(seed), pace_(static_cast<int>(dice_.between(0, 3))) {
     for (uint8_t j = 0; j < config.joints; ++j) {
         const int32_t fastest = velocity_limit_q8(config, j);
-        joints_.push_back(Joint{start[j], 0, 0, config.joint[j], fastest});
+        joints_.push_back(Joint{start.position[j], start.velocity[j], 0, config.joint[j], fastest});
         joints_.back().target = random_target(joints_.back());
     }
 }
@@ -34,14 +37,41 @@ rig::ChunkSpec RandomPath::next() {
     const size_t most = static_cast<size_t>(dice_.between(1, kMostKnots));
     while (chunk.rows.size() < most && !is_over_) {
         if (is_ending_ && stands() && !chunk.rows.empty()) break;
-        for (Joint& joint : joints_) {
-            if (dice_.chance(0.02)) joint.target = random_target(joint);
-            move(joint, chunk.dt_us);
-        }
-        chunk.rows.push_back(row());
+        add_row(chunk.dt_us, &chunk);
     }
     chunk.last = is_over_ = is_ending_ && stands();
     return chunk;
+}
+
+rig::ChunkSpec RandomPath::steered() {
+    rig::ChunkSpec chunk;
+    chunk.dt_us = random_dt();
+    chunk.rows.push_back(row());
+    for (int64_t near = dice_.between(0, 12); near > 0; --near) add_row(chunk.dt_us, &chunk);
+    is_ending_ = true;
+    chunk.replacing = rig::Replacing{0, 0, tail_dt()};
+    do {
+        add_row(chunk.replacing->tail_dt_us, &chunk);
+        ++chunk.replacing->tail;
+    } while (!stands());
+    return chunk;
+}
+
+// One time step of all joints.
+void RandomPath::add_row(uint32_t dt_us, rig::ChunkSpec* chunk) {
+    for (Joint& joint : joints_) {
+        if (dice_.chance(0.02)) joint.target = random_target(joint);
+        move(joint, dt_us);
+    }
+    chunk->rows.push_back(row());
+}
+
+// At most some sixteen of them to rest.
+uint32_t RandomPath::tail_dt() {
+    double stop_us = 0;
+    for (const Joint& joint : joints_)
+        stop_us = std::max(stop_us, std::abs(1e6 * joint.v / joint.limits.max_acceleration_q8));
+    return static_cast<uint32_t>(std::min(dice_.logarithmic(std::max(1000.0, stop_us / 16), 250000), 250000.0));
 }
 
 // 1 to 250 ms, another in every chunk; about 20 ms; 20 ms; short ones.
