@@ -38,9 +38,13 @@ fuzz::Bytes read_file(const files::path& path) {
     return fuzz::Bytes(std::istreambuf_iterator<char>(file), {});
 }
 
+fuzz::Taken taken;
+
 size_t run(const Items& items) {
     played = fuzz::write_items(items);
-    fuzz::play(items);
+    const fuzz::Taken now = fuzz::play(items);
+    taken.chunks += now.chunks;
+    taken.replacements += now.replacements;
     return items.size();
 }
 
@@ -87,13 +91,20 @@ int main(int count, char** arguments) {
     const std::vector<Items> corpus = load(arguments[1]);
     uint64_t frames = 0, inputs = 0;
     for (const Items& items : corpus) frames += run(items), ++inputs;
+    // A corpus that moves nothing finds nothing.
+    if (corpus.size() > 1 && (taken.chunks < 10 || taken.replacements < 3)) {
+        fprintf(stderr, "of the corpus the device takes %llu chunks and %llu replacements: write the seeds anew\n",
+                static_cast<unsigned long long>(taken.chunks), static_cast<unsigned long long>(taken.replacements));
+        return 1;
+    }
     while (frames < wanted && !corpus.empty()) {
         Items items = corpus[random() % corpus.size()];
         fuzz::mutate(items, corpus[random() % corpus.size()], static_cast<uint32_t>(random()));
         frames += run(items);
         ++inputs;
     }
-    printf("%llu inputs with %llu items played, no promise broken\n", static_cast<unsigned long long>(inputs),
-           static_cast<unsigned long long>(frames));
+    printf("%llu inputs with %llu items played, %llu chunks and %llu replacements taken, no promise broken\n",
+           static_cast<unsigned long long>(inputs), static_cast<unsigned long long>(frames),
+           static_cast<unsigned long long>(taken.chunks), static_cast<unsigned long long>(taken.replacements));
     return 0;
 }

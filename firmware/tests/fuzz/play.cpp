@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "bytes.h"
 #include "config_text.h"
 #include "json_reader.h"
 #include "phrase.h"
@@ -119,6 +120,7 @@ class Bench {
     }
 
     void take(const Item& item);
+    const Taken& taken() const { return taken_; }
 
   private:
     static void put(void* self, Output output, const uint8_t* bytes, size_t size) {
@@ -138,17 +140,21 @@ class Bench {
         check_output(output, bytes, size, config_.joints);
         check_wrapping(port_, output, bytes, size);
         if (!is_refusal(output, bytes, size)) has_agreed_ = true;
+        if (output == Output::TrajAck && bytes[20] == 0) ++taken_.chunks;
     }
     void deliver(const Item& item);
     void serial(const Bytes& bytes) { port_.receive(bytes.data(), bytes.size(), now_us_, now_us_); }
     void frame(const Bytes& bytes, bool is_retained) {
         const Arrival arrival{bytes.data(), bytes.size(), is_retained, now_us_};
         port_.yield_to_mqtt(arrival);
+        const uint64_t chunks = taken_.chunks;
         machine_.receive(arrival, now_us_);
+        if (taken_.chunks != chunks && (load_u16(&bytes[30]) & kFlagReplace) != 0) ++taken_.replacements;
     }
     void slots(uint32_t count);
     void slot();
     void check_steps(const int32_t* before, bool was_homing);
+    void check_motion();
 
     DeviceConfig config_;
     Machine machine_;
@@ -158,6 +164,9 @@ class Bench {
     uint8_t unsettled_ = 0;  // slots in which every tick is run
     uint64_t now_us_ = 1000000;
     bool has_agreed_ = false;  // to what came last
+    Taken taken_;
+    uint8_t moved_ = 0;  // slots in which it has followed a path or a target, one after the other
+    int64_t place_q20_[kMaxJoints] = {}, change_q20_[kMaxJoints] = {};
 };
 
 void Bench::take(const Item& item) {
@@ -291,6 +300,23 @@ void Bench::slot() {
     for (; done < ticks; ++done) stepper.tick(levels_);
     now_us_ += kSlotUs;
     check_steps(before, was_homing);
+    check_motion();
+}
+
+// From slot to slot no velocity changes by more than limits, bends and roundings of knots 1 ms apart allow: the arm
+// brakes, but for what stops it dead.
+void Bench::check_motion() {
+    const bool moves = machine_.mode() == Mode::Run || machine_.mode() == Mode::Hold;
+    const Point& point = machine_.present();
+    moved_ = moves && !point.is_start ? static_cast<uint8_t>(moved_ < 9 ? moved_ + 1 : 9) : 0;
+    for (uint8_t j = 0; j < config_.joints; ++j) {
+        const int64_t change = point.position_q20[j] - place_q20_[j];
+        // In Q20 steps a slot: 2.3 times the limit over two slots, and 47 steps/s.
+        const int64_t allowed = config_.joint[j].max_acceleration_q8 / 50 + 54000;
+        PROMISE(moved_ < 5 || llabs(change - change_q20_[j]) <= allowed);
+        place_q20_[j] = point.position_q20[j];
+        change_q20_[j] = change;
+    }
 }
 
 void Bench::check_steps(const int32_t* before, bool was_homing) {
@@ -309,10 +335,11 @@ void Bench::check_steps(const int32_t* before, bool was_homing) {
 
 }  // namespace
 
-void play(const std::vector<Item>& items) {
+Taken play(const std::vector<Item>& items) {
     // On the heap, so that a sanitizer sees its edges.
     const std::unique_ptr<Bench> bench = std::make_unique<Bench>();
     for (const Item& item : items) bench->take(item);
+    return bench->taken();
 }
 
 }  // namespace fuzz

@@ -33,8 +33,13 @@ struct Item {
 std::vector<Item> read_items(const uint8_t* data, size_t size);
 Bytes write_items(const std::vector<Item>& items);
 
+// Chunks that a device has taken.
+struct Taken {
+    uint64_t chunks = 0, replacements = 0;
+};
+
 // Plays them to a device and ends the process where it breaks a promise.
-void play(const std::vector<Item>& items);
+Taken play(const std::vector<Item>& items);
 
 // Good starts.
 std::vector<std::vector<Item>> seeds();

@@ -30,6 +30,20 @@ Bytes chunk(uint32_t seq, int32_t from, int32_t to, bool first, bool last, uint3
     return rig::build(spec);
 }
 
+// One joint's path with REPLACE from the knot at `from_us`: rows of position and velocity, 40 ms apart, the last one a
+// tail.
+Bytes replacement(uint32_t seq, uint64_t from_us, const std::vector<std::pair<int32_t, int32_t>>& rows,
+                  bool last = false) {
+    rig::ChunkSpec spec;
+    spec.seq = seq;
+    spec.first = seq == 0;
+    spec.last = last;
+    spec.dt_us = 40000;
+    spec.replacing = rig::Replacing{from_us, 1, 40000};
+    for (const auto& [position, velocity] : rows) spec.rows.push_back({{position, 0}, {velocity, 0}});
+    return rig::build(spec);
+}
+
 Bytes command(Command what, uint32_t id, uint16_t argument = 0, const std::vector<int32_t>& position = {}) {
     return rig::build_command(what, id, position, rig::kNever, rig::kBoot, 0, argument);
 }
@@ -62,8 +76,9 @@ const char* const kSmall =
 
 std::vector<std::vector<Item>> seeds() {
     const Item beat{Kind::Frame, rig::build_heartbeat(1, 1)}, later_beat{Kind::Frame, rig::build_heartbeat(1, 2)};
-    const Item first{Kind::Frame, chunk(0, 0, 25600, true, false)},
-        second{Kind::Frame, chunk(1, 25600, 0, false, true)};
+    const Item first{Kind::Frame, chunk(0, 0, 2560, true, false)}, second{Kind::Frame, chunk(1, 2560, 0, false, true)};
+    const Item live{Kind::Frame, replacement(0, 0, {{0, 0}, {1280, 51200}, {2560, 0}})},
+        on{Kind::Frame, replacement(3, 40000, {{1280, 51200}, {3328, 51200}, {4352, 0}})};
     std::vector<std::vector<Item>> all = {
         {beat, first, slots(30), second, slots(60), later_beat, silence(20)},
         {first,
@@ -131,7 +146,7 @@ std::vector<std::vector<Item>> seeds() {
         {{Kind::Packet, rig::build_sync(5)},
          {Kind::Packet, json_frame(FrameType::Config, kSmall)},
          {Kind::Packet, json_frame(FrameType::Provision, "{}")},
-         {Kind::Packet, chunk(0, 0, 2560, true, true)},
+         {Kind::Packet, chunk(0, 0, 1280, true, true)},
          slots(60)},
         {{Kind::Provision,
           text(
@@ -147,6 +162,26 @@ std::vector<std::vector<Item>> seeds() {
          {Kind::Frame, command(Command::Reference, 3, 0, {256, -256})},
          {Kind::Line, text("<9,0,0>")},
          silence(60)},
+        {beat,
+         live,
+         slots(20),
+         on,
+         on,
+         slots(63),
+         slots(63),
+         {Kind::Frame, replacement(4, 120000, {{4352, 0}, {4352, 0}}, true)},
+         silence(9)},
+        {live,
+         slots(20),
+         {Kind::Frame, command(Command::Hold, 1)},
+         on,
+         slots(20),
+         {Kind::Frame, command(Command::Speed, 2, 300)},
+         {Kind::Frame, command(Command::Resume, 3)},
+         slots(9),
+         {Kind::Frame, replacement(9, 80000, {{3328, 51200}, {5376, 51200}, {6400, 0}})},
+         {Kind::Packet, chunk(10, 6400, 7680, false, true)},
+         silence(30)},
     };
     return all;
 }

@@ -62,8 +62,8 @@ void Inspector::look(Oscilloscope& scope) {
     slot_begin_ = scope.tick();
 }
 
-// A path may begin up to one step from where the arm stands; the steps between are made in its first slot. A stream that
-// was stopped before has none: the arm stays where it is.
+// A path may begin up to one step from where the arm stands; the steps between are made in its first slot. A stream
+// that was stopped before has none: the arm stays where it is.
 void Inspector::switch_stream(const Point& point) {
     if (next_.stream == 0 || point.stream != next_.stream) return;
     if (machine_.mode() == Mode::Idle && stands(point)) {
