@@ -623,8 +623,9 @@ class Arm:
     def stream(self, joints: Joints) -> None:
         """A target [rad] or [m] that the arm follows within its limits, now; the newest wins. No path is planned.
 
-        Say 20 to 100 a second: the arm brakes 0.11 s after the last one, and the stream ends 0.5 s after it. A target
-        that the gateway has refused raises `Refused` at the next call, a gateway that says nothing for 1 s `Lost`.
+        Say 20 to 100 a second: the arm brakes 0.11 s after the last one, and rests there where it is near. The stream
+        ends 0.5 s after it. A target that the gateway has refused raises `Refused` at the next call, a gateway that
+        says nothing for 1 s `Lost`.
 
         >>> for step in range(20):
         ...     arm.stream({"brazo_joint": arm.joints["brazo_joint"] + 0.002})

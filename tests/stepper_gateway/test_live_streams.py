@@ -110,6 +110,17 @@ def test_a_stream_that_falls_silent_rests_and_ends_and_does_not_go_on_to_its_tar
     assert_within_limits(rig)
 
 
+@pytest.mark.parametrize("period", [0.02, 1 / 30, 0.1])
+def test_the_last_target_is_where_the_arm_rests_if_no_more_come(period: float) -> None:
+    rig = VirtualArm().ready()
+    for index in range(1, round(1.0 / period) + 1):
+        rig.target(brazo_joint=0.2 * period * index)
+        rig.run(period)
+    assert rig.run(2.0, lambda: rig.device.mode is DeviceMode.IDLE)
+    assert rig.position[0] == pytest.approx(0.2, abs=0.51 * rm1().joints[0].steps.resolution)
+    assert not violations(rig, rig.path)
+
+
 def streaming(rig: VirtualArm, seconds: float) -> None:
     """A second or so of a stream in full motion."""
     lead(rig, {0: sine(0.5, 0.3)}, seconds, Sender())

@@ -78,10 +78,31 @@ class LiveFollower:
                 return None
         return stream.replace(splice, near, NEAR_DT, tail.knots, tail.dt_us)
 
+    def settling(self, stream: LiveStream, moment: Moment, clock: ClockSync) -> SentChunk | None:
+        """The chunk that lets the arm rest at the last target, where no more targets come and it is near that; else
+        None."""
+        now, target, end = moment.monotonic, self.target, stream.log.last.position
+        if now < self._arrival + self._patience or now - self._sent < APART:
+            return None
+        away = [abs(a - b) for a, b in zip(end, target, strict=True)]
+        far = self._tracker.far(self._reference.velocity, catch_up=True)
+        if max(away) < SAME_PLACE or any(a > b for a, b in zip(away, far, strict=True)):
+            return None
+        splice = stream.splice(now, clock)
+        stop = self._tracker.settle(splice.knot, target, KNOTS // len(self._joints))
+        if leaving(self._joints, [splice.knot, *stop.knots], [stop.dt_us * 1e-6] * len(stop.knots)) is not None:
+            return None
+        self._sent = now
+        return stream.replace(splice, stop.knots[:-1], stop.dt_us, stop.knots[-1:], stop.dt_us)
+
+    @property
+    def _patience(self) -> float:
+        """[s] from a target's arrival until the next one is missed."""
+        return max(HOLDS, 2.0 * self._reference.period + LATE)
+
     def _near(self, splice: Splice, reference: ReferenceAt, catch_up: bool) -> list[Knot]:
         """The knots until a stop is due if no more targets come."""
-        until = self._arrival + max(HOLDS, 2.0 * self._reference.period + LATE)
-        count = math.ceil((until - splice.begins) * 1e6 / NEAR_DT)
+        count = math.ceil((self._arrival + self._patience - splice.begins) * 1e6 / NEAR_DT)
         count = max(LEAST_NEAR, min(count, MOST_NEAR))
         return self._tracker.near(splice.knot, splice.begins, count, reference, catch_up)
 

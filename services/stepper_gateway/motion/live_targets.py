@@ -80,6 +80,10 @@ class LiveTargets:
             stream.wants_fresh, follower.is_pending = False, True
         if stream.is_begun and follower.is_due(moment.monotonic):
             self._send(follower, stream, None, moment)
+        elif stream.is_begun:
+            chunk = follower.settling(stream, moment, self._device.session.clock)
+            if chunk is not None:
+                self._controller.replace(stream, chunk, moment)
 
     def end(self) -> None:
         """No more targets: the stream ends where its newest path comes to rest."""

@@ -57,6 +57,9 @@ class MovingTracker:
         zeros = (0.0,) * count
         self._problem.target_position = self._problem.target_velocity = self._problem.target_acceleration = zeros
         self._planner, self._stop = Ruckig(count), Trajectory(count)
+        self._settling = InputParameter(count)
+        self._settling.synchronization = Synchronization.No
+        self._settling.target_velocity = self._settling.target_acceleration = zeros
         self._braking = InputParameter(count)
         self._braking.synchronization = Synchronization.No
         self._braking.control_interface = ControlInterface.Velocity
@@ -82,9 +85,38 @@ class MovingTracker:
         if dt_us > TAIL_DT:
             duration = self._brake(knot, CALMER)
             dt_us = min(LARGEST_TAIL_DT, 10_000 * math.ceil(duration / most * 100.0))
+        return self._sampled(duration, dt_us)
+
+    def _sampled(self, duration: float, dt_us: int) -> Tail:
+        """The profile in `_stop`, which lasts `duration` [s]."""
         count = max(1, math.ceil(duration * 1e6 / dt_us - 1e-6))
         knots = [Knot(*map(tuple, self._stop.at_time(index * dt_us * 1e-6))) for index in range(1, count)]
         return Tail([*knots, Knot.at_rest(tuple(self._stop.at_time(duration)[0]))], dt_us)
+
+    def settle(self, knot: Knot, target: Vector, most: int) -> Tail:
+        """To rest at `target` [rad] or [m], as `tail`."""
+        problem, calm = self._settling, tuple(CALMER * a for a in self._acceleration)
+        problem.current_position, problem.current_velocity, problem.current_acceleration = knot
+        problem.target_position = target
+        limits = Limits(self._limits.velocity, calm, self._limits.jerk).raised_to(knot)
+        problem.max_velocity, problem.max_acceleration, problem.max_jerk = limits
+        result = self._planner.calculate(problem, self._stop)
+        if result not in (Result.Working, Result.Finished):
+            raise RuntimeError(f"ruckig finds no way from {knot} to rest at {target}: {result}")
+        duration = self._stop.duration
+        dt_us = max(FINEST_TAIL_DT, min(LARGEST_TAIL_DT, 10_000 * math.ceil(duration / most * 100.0)))
+        return self._sampled(duration, dt_us)
+
+    def far(self, rate: Vector, catch_up: bool) -> Vector:
+        """[rad] or [m] per joint beyond which an arm that is to go at `rate` [rad/s] or [m/s] is far behind.
+
+        With `catch_up` that grows with the speed, so that who was left behind can catch up.
+        """
+        found = []
+        for v, top in zip(rate, self._limits.acceleration, strict=True):
+            stopping = 0.5 * abs(v) * (abs(v) / top + 0.1) if catch_up else 0.0
+            found.append(0.5 * top * CATCHES_UP**2 + stopping)
+        return tuple(found)
 
     def _brake(self, knot: Knot, effort: float) -> float:
         """[s] of the stop from `knot`, which is in `_stop` then."""
@@ -119,13 +151,9 @@ class MovingTracker:
 
     def _rate_for(self, knot: Knot, place: Vector, rate: Vector, catch_up: bool) -> Vector:
         """The reference's velocity, less of it the farther the arm is behind: with all of it, it would swing beyond
-        what it cannot follow. What is far grows with the speed, so that who was left behind can catch up."""
-        found = []
-        for p, a, v, top in zip(knot.position, place, rate, self._limits.acceleration, strict=True):
-            stopping = 0.5 * abs(v) * (abs(v) / top + 0.1) if catch_up else 0.0
-            far = 0.5 * top * CATCHES_UP**2 + stopping
-            found.append(v * max(0.0, min(2.0 * (1.0 - abs(a - p) / far), 1.0)))
-        return tuple(found)
+        what it cannot follow."""
+        rows = zip(knot.position, place, rate, self.far(rate, catch_up), strict=True)
+        return tuple(v * max(0.0, min(2.0 * (1.0 - abs(a - p) / far), 1.0)) for p, a, v, far in rows)
 
     def _within(self, place: Vector, rate: Vector) -> tuple[Vector, Vector]:
         """A reference that would leave a joint's travel brakes before its end and stands there."""

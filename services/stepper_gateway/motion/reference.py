@@ -66,6 +66,11 @@ class Reference:
         return self._samples[-1].position
 
     @property
+    def velocity(self) -> Vector:
+        """[rad/s] or [m/s] of the newest target."""
+        return self._samples[-1].velocity
+
+    @property
     def period(self) -> float:
         """[s] between the last two targets; 0 for a single one."""
         return self._samples[-1].time - self._samples[-2].time if len(self._samples) > 1 else 0.0
