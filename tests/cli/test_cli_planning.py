@@ -90,7 +90,7 @@ def test_a_terminal_is_shown_how_planning_stands_and_nothing_of_it_stays(
     with pytest.raises(CommandError):
         move(connected, past_the_wall(), plan_only=True, as_json=False)
     written = capsys.readouterr().out
-    assert re.search(r"planning: search, \d+\.\d of 100 s \(Ctrl-C cancels\)\n", written)
+    assert re.search(r"planning: searching, \d+\.\d of 100 s \(Ctrl-C cancels\)\n", written)
     assert written.endswith("\x1b[1F\x1b[J")
 
 

@@ -23,38 +23,49 @@ from gemelo.schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from gemelo.schemas.reasons import Reason, remedy
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.tools.cli.common.errors import CommandError
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.units import DEGREE, SHOWN
 
 if TYPE_CHECKING:
     from gemelo import Refused
     from gemelo.libraries.arm.model.description import ArmDescription
-    from gemelo.schemas.reasons import Reason
+
+
+def understood(text: str) -> str:
+    """What a command says first, before it asks the stack."""
+    return sentence(because("understood", text=text))
 
 
 def request_text(request: PlanRequest, arm: ArmDescription) -> str:
     """A request as one line: `brazo_joint 30 deg; in a straight line of the joints; at 50 % speed`."""
-    speed = f"at {100.0 * request.velocity_scaling:g} % speed" if request.velocity_scaling != 1.0 else ""
-    timing = "without a jerk limit" if request.timing is Timing.TIME_OPTIMAL else ""
+    speed = request.velocity_scaling
     points = len(request.goal.points) - 1 if isinstance(request.goal, WaypointGoal) else 0
-    time = f"planned within {request.allowed_time:g} s" if request.allowed_time != usual_time(points) else ""
-    clearance = "" if request.clearance is None else f"{1000.0 * request.clearance:g} mm from everything"
-    return _joined([goal_text(request.goal, arm), motion_text(request.motion), speed, timing, clearance, time])
+    parts = [
+        because("understood.speed", speed=100.0 * speed) if speed != 1.0 else None,
+        because("understood.time_optimal") if request.timing is Timing.TIME_OPTIMAL else None,
+        None if request.clearance is None else because("understood.clearance", distance=1e3 * request.clearance),
+        because("understood.time", time=request.allowed_time) if request.allowed_time != usual_time(points) else None,
+    ]
+    return _joined([goal_text(request.goal, arm), motion_text(request.motion), *map(_said, parts)])
 
 
 def goal_text(goal: Goal, arm: ArmDescription) -> str:
     """A goal in degrees and millimetres."""
     match goal:
         case NamedGoal():
-            return f'to the named state "{goal.name}"'
+            return sentence(because("understood.named", name=goal.name))
         case JointGoal():
             return joints_text(goal.name, goal.position, arm)
         case PoseGoal():
             return _pose_text(goal)
         case WaypointGoal():
-            blend = f"; corners cut within {millimetres([goal.blend])}" if goal.blend else ""
-            return f"{', then '.join(goal_text(point, arm) for point in goal.points)}{blend}"
+            first, *rest = (goal_text(point, arm) for point in goal.points)
+            path = ", ".join([first, *(sentence(because("understood.then", text=text)) for text in rest)])
+            if not goal.blend:
+                return path
+            return _joined([path, sentence(because("understood.blend", distance=millimetres([goal.blend])))])
 
 
 def joints_text(names: Iterable[str], values: Iterable[float], arm: ArmDescription, per: str = "") -> str:
@@ -80,34 +91,38 @@ def motion_text(motion: Motion) -> str:
     """The kind of a motion and its limits; empty for a free motion without any."""
     match motion:
         case PointToPoint():
-            return "in a straight line of the joints"
+            return sentence(because("understood.ptp"))
         case FreeMotion():
-            seed = f"seed {motion.seed}" if motion.seed else ""
-            attempts = f"{motion.attempts} attempts" if motion.attempts != 1 else ""
-            return _joined([f"by {motion.planner_id}" if motion.planner_id else "", seed, attempts])
+            parts = [
+                because("understood.planner", name=motion.planner_id) if motion.planner_id else None,
+                because("understood.seed", seed=motion.seed) if motion.seed else None,
+                because("understood.attempts", count=motion.attempts) if motion.attempts != 1 else None,
+            ]
+            return _joined(map(_said, parts))
         case LinearMotion():
-            return _joined(["the tool in a straight line", *_tool_limits(motion)])
+            return _joined(map(_said, (because("understood.line"), *_tool_limits(motion))))
         case CircularMotion():
-            point = "about" if motion.center else "through"
-            arc = f"the tool on an arc {point} {millimetres(motion.center or motion.interim)}"
-            return _joined([arc, *_tool_limits(motion)])
+            code = "understood.arc.about" if motion.center else "understood.arc.through"
+            arc = because(code, point=millimetres(motion.center or motion.interim))
+            return _joined(map(_said, (arc, *_tool_limits(motion))))
 
 
 def _pose_text(goal: PoseGoal) -> str:
-    parts = [f"tool to {millimetres(goal.position)}"]
+    parts = [because("understood.tool", position=millimetres(goal.position))]
     if goal.frame:
-        parts.append(f"in {goal.frame}")
+        parts.append(because("understood.frame", frame=goal.frame))
     if goal.orientation:
-        parts.append(f"turned {rotation_text(goal.orientation)}")
+        parts.append(because("understood.turned", turn=rotation_text(goal.orientation)))
     if goal.tool_axis:
-        parts.append(f"its axis {_direction(goal.tool_axis)} along {_direction(goal.direction)}")
+        axis, along = _direction(goal.tool_axis), _direction(goal.direction)
+        parts.append(because("understood.axis", axis=axis, along=along))
     if goal.free_axis:
-        parts.append(f"free about its axis {_direction(goal.free_axis)}")
+        parts.append(because("understood.free_axis", axis=_direction(goal.free_axis)))
     if goal.position_tolerance:
-        parts.append(f"within {millimetres([goal.position_tolerance])}")
+        parts.append(because("understood.within", distance=millimetres([goal.position_tolerance])))
     if goal.orientation_tolerance:
-        parts.append(f"within {degrees([goal.orientation_tolerance])}")
-    return ", ".join(parts)
+        parts.append(because("understood.within", distance=degrees([goal.orientation_tolerance])))
+    return ", ".join(map(sentence, parts))
 
 
 def rotation_text(rotation: Sequence[float]) -> str:
@@ -116,16 +131,18 @@ def rotation_text(rotation: Sequence[float]) -> str:
     angle = math.degrees(2.0 * math.atan2(sine, rotation[3]))
     if abs(angle) < 0.05:
         return "-"
-    return f"{angle:.1f} deg about {' '.join(f'{value / sine:z.2f}' for value in rotation[:3])}"
+    axis = " ".join(f"{value / sine:z.2f}" for value in rotation[:3])
+    return sentence(because("understood.rotation", angle=angle, axis=axis))
 
 
-def _tool_limits(motion: LinearMotion | CircularMotion) -> list[str]:
+def _tool_limits(motion: LinearMotion | CircularMotion) -> list[Reason | None]:
+    least = motion.least_fraction
     return [
-        f"at most {millimetres([motion.speed], '/s')}" if motion.speed else "",
-        f"at most {millimetres([motion.acceleration], '/s2')}" if motion.acceleration else "",
-        f"checked every {millimetres([motion.max_step])}" if motion.max_step else "",
-        f"no joint jumping by more than {degrees([motion.jump_threshold])}" if motion.jump_threshold else "",
-        f"at least {100.0 * motion.least_fraction:g} % of it" if motion.least_fraction != 1.0 else "",
+        because("understood.at_most", limit=millimetres([motion.speed], "/s")) if motion.speed else None,
+        because("understood.at_most", limit=millimetres([motion.acceleration], "/s2")) if motion.acceleration else None,
+        because("understood.checked", step=millimetres([motion.max_step])) if motion.max_step else None,
+        because("understood.jump", angle=degrees([motion.jump_threshold])) if motion.jump_threshold else None,
+        because("understood.least", share=100.0 * least) if least != 1.0 else None,
     ]
 
 
@@ -151,6 +168,10 @@ def as_typed(goal: Goal, values: Sequence[float], arm: ArmDescription) -> str:
 
 def _joined(parts: Iterable[str]) -> str:
     return "; ".join(part for part in parts if part)
+
+
+def _said(part: Reason | None) -> str:
+    return "" if part is None else sentence(part)
 
 
 def _number(value: float) -> str:

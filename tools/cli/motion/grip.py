@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
 from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.output import control
@@ -19,7 +19,7 @@ from gemelo.tools.cli.parser import Choices, Options, Parser, json_option
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
     from gemelo.api.arguments import Grip
-    from gemelo.schemas.gripper import GripperCommandFeedback
+    from gemelo.schemas.gripper import GripperCommandFeedback, GripperState
 
 WORDS = ("open", "close")
 STATE = "state"
@@ -85,9 +85,14 @@ def _show(arm: Arm, as_json: bool) -> ExitCode:
     state = arm.gripper
     if as_json:
         print(msgspec.json.encode(state).decode())
-    elif not state.known:
-        print("gripper: not known: nothing measures it, and it was not moved since the device started")
     else:
-        presses = f", presses with {state.effort:g} N" if state.effort else ""
-        print(f"gripper: {state.position * 1000:.1f} mm{'' if state.measured else ' (commanded)'}{presses}")
+        print(sentence(standing(state)))
     return ExitCode.OK
+
+
+def standing(state: GripperState) -> Reason:
+    """How far the gripper is open, and with what force it presses."""
+    if not state.known:
+        return because("gripper.unknown")
+    known = because("gripper.at" if state.measured else "gripper.at.commanded", opening=1e3 * state.position)
+    return because("gripper.presses", known, force=state.effort) if state.effort else known

@@ -9,8 +9,9 @@ import msgspec
 
 import gemelo
 from gemelo.api.homing_report import HOME, WAITS
-from gemelo.schemas.reasons import because, plain
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, joint_of
+from gemelo.tools.cli.common.language import sentence, word
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.terminal import LiveBlock
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option
@@ -72,7 +73,8 @@ def home(arm: Arm, names: Sequence[str], as_json: bool = False) -> ExitCode:
         code = ExitCode.CANCELLED if is_interrupted else ExitCode.FAILED
         raise CommandError(because("homing.ended", ended.why or plain(report.reason), time=ended.took), code)
     if not as_json:
-        print(f"homed {len(report.homed)} of {len(report.homed)} joints in {report.took_s:.1f} s")
+        count = len(report.homed)
+        print(sentence(because("homing.done", homed=count, count=count, time=report.took_s)))
     return ExitCode.OK
 
 
@@ -102,26 +104,27 @@ class Screen:
         self._shown = progress
         for name, phase in changed.items():
             if phase == HOME:
-                self._block.say(home_text(name, progress.steps_off.get(name)))
+                self._block.say(sentence(home_reason(name, progress.steps_off.get(name))))
             elif not self._block.is_live:
-                self._block.say(f"{name}: {phase}")
-        rows = [f"  {name:<20} {phase}" for name, phase in progress.items()]
-        self._block.draw("\n".join([f"homing for {progress.elapsed:.1f} s (Ctrl-C stops it)", *rows]))
+                self._block.say(sentence(because("homing.phase", joint=name, phase=phase)))
+        rows = [f"  {name:<20} {word('homing', phase)}" for name, phase in progress.items()]
+        heading = sentence(because("homing.running", time=progress.elapsed))
+        self._block.draw("\n".join([heading, *rows]))
 
     def on_cancel(self) -> None:
         """Says what Ctrl-C has done."""
         if not self._is_quiet:
-            self._block.say("stopping: the joints slow down (Ctrl-C again leaves without waiting)")
+            self._block.say(sentence(because("homing.stopping")))
 
     def clear(self) -> None:
         """Removes the phases from the terminal."""
         self._block.say()
 
 
-def home_text(name: str, steps_off: int | None) -> str:
-    """One line about a homed joint; `steps_off` is how far its counter was from its true position [steps]."""
+def home_reason(name: str, steps_off: int | None) -> Reason:
+    """A joint that is home; `steps_off` is how far its counter was from its true position [steps]."""
     if steps_off is None:
-        return f"{name}: home"
+        return because("homing.home", joint=name)
     if abs(steps_off) <= 1:
-        return f"{name}: home; its counter was right{' to a step' if steps_off else ''}"
-    return f"{name}: home; its counter was {steps_off:+d} steps off (steps were lost, or it was moved by hand)"
+        return because("homing.home.near" if steps_off else "homing.home.right", joint=name)
+    return because("homing.home.off", joint=name, steps=steps_off)

@@ -13,9 +13,9 @@ import gemelo
 from gemelo.schemas.planning import JogCommand, JogLimit, JogStatus
 from gemelo.schemas.reasons import because, plain
 from gemelo.schemas.topics import JOG_STATUS, JOINT_STATES
-from gemelo.tools.cli.bus.request_text import degrees, joints_text, millimetres
+from gemelo.tools.cli.bus.request_text import degrees, joints_text, millimetres, understood
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
-from gemelo.tools.cli.common.language import sentence
+from gemelo.tools.cli.common.language import sentence, translated
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.terminal import LiveBlock, two_stage_interrupt
 from gemelo.tools.cli.common.units import SPEED_OF, angular_speed, parse_joints, positive_seconds, show, speed
@@ -79,7 +79,7 @@ def run(options: Options) -> ExitCode:
         raise usage(because("cli.jog.which"))
     robot = load_robot()
     command = command_of(robot.description, options.joint, options.twist, options.turn, options.frame == "tool")
-    print(f"understood: {command_text(command, robot.description)} for {options.seconds:g} s", flush=True)
+    print(understood(for_time(command_text(command, robot.description), options.seconds)), flush=True)
     with connect_arm(robot) as arm:
         return jog_for(arm, command, options.seconds)
 
@@ -108,9 +108,15 @@ def command_text(command: JogCommand, arm: ArmDescription) -> str:
     """The command as a line, in degrees and millimetres a second."""
     if command.name:
         return joints_text(command.name, command.velocity, arm, "/s")
-    parts = [f"tool at {millimetres(command.linear, '/s')}"] if command.linear else []
-    parts += [f"turning at {degrees(command.angular, '/s')}"] if command.angular else []
-    return f"{', '.join(parts)}, along the axes of {command.frame or 'the base'}"
+    parts = [because("understood.jog.tool", speed=millimetres(command.linear, "/s"))] if command.linear else []
+    parts += [because("understood.jog.turn", speed=degrees(command.angular, "/s"))] if command.angular else []
+    axes = because("understood.jog.axes", frame=command.frame) if command.frame else because("understood.jog.axes.base")
+    return ", ".join(map(sentence, (*parts, axes)))
+
+
+def for_time(text: str, seconds: float) -> str:
+    """The line of a command that moves for so long [s]."""
+    return sentence(because("understood.jog.time", text=text, time=seconds))
 
 
 class Position:
@@ -128,10 +134,10 @@ class Position:
         state = self._states.message
         found = {} if state is None else dict(zip(state.name, state.position, strict=False))
         if any(name not in found for name in self._arm.joint_names):
-            return "no joint_states: is the stepper_gateway running?"
+            return sentence(because("understood.jog.no_state"))
         x, y, z = (1e3 * value for value in self._kinematics.tool([found[n] for n in self._arm.joint_names]).position)
         joints = ", ".join(f"{joint.name} {show(found[joint.name], joint.unit, 2)}" for joint in self._arm.joints)
-        return f"tool x {x:z.1f}  y {y:z.1f}  z {z:z.1f} mm; {joints}"
+        return sentence(because("understood.jog.at", x=x, y=y, z=z, joints=joints))
 
 
 def jog_for(arm: Arm, command: JogCommand, seconds: float) -> ExitCode:
@@ -164,7 +170,7 @@ def jog_by_hand(arm: Arm) -> ExitCode:
     with keyboard() as typed, two_stage_interrupt() as interrupt:
         position, status = Position(arm), arm.node.latest(JOG_STATUS)
         keys, block = JogKeys(arm.description.joints, arm.tool_frame), LiveBlock()
-        block.say(HELP)
+        block.say(translated(HELP))
         drawn = 0.0
         while not (keys.wants_to_leave or interrupt.is_set):
             now = time.monotonic()
@@ -185,10 +191,10 @@ def jog_by_hand(arm: Arm) -> ExitCode:
 def status_lines(status: JogStatus | None) -> list[str]:
     """The planner's newest status as lines."""
     if status is None or not (status.active or status.limited_by):
-        return ["at rest"]
+        return [sentence(because("understood.jog.rest"))]
     if not status.active:
         return [sentence(because("refused.plan", status.why or plain(status.limited_by)))]
-    share = f"{100.0 * status.scale:.0f} % of the asked speed"
+    share = sentence(because("understood.jog.share", share=status.scale))
     if not status.limits:
         return [share]
     return [share, *(f"  {_limited_by(limit)}" for limit in status.limits)]

@@ -10,7 +10,8 @@ import gemelo
 from gemelo.api.targets import usual_time
 from gemelo.schemas.planners import NAMES
 from gemelo.schemas.planning import PlanProgress, PlanRequest
-from gemelo.tools.cli.bus.request_text import refusal_error, request_text
+from gemelo.schemas.reasons import because
+from gemelo.tools.cli.bus.request_text import refusal_error, request_text, understood
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
@@ -121,7 +122,7 @@ def run(options: Options) -> ExitCode:
             return execute(arm, plan, options.json)
     request = request_from(options, robot.description)
     if not options.json:
-        print(f"understood: {request_text(request, robot.description)}", flush=True)
+        print(understood(request_text(request, robot.description)), flush=True)
     with connect_arm(robot) as arm:
         return move(arm, request, options.plan_only, options.json)
 
@@ -153,8 +154,8 @@ def make_plan(arm: Arm, request: PlanRequest, quiet: bool = False) -> Plan:
     block = LiveBlock(False if quiet else None)
 
     def show(progress: PlanProgress) -> None:
-        stand = f"{progress.phase}, {progress.elapsed:.1f} of {progress.allowed:g} s"
-        block.draw(f"planning: {stand} (Ctrl-C cancels)")
+        times = {"time": progress.elapsed, "allowed": progress.allowed}
+        block.draw(sentence(because("move.planning", phase=str(progress.phase), **times)))
 
     try:
         return arm.plan(request, on_progress=show)
@@ -173,7 +174,8 @@ def execute(arm: Arm, plan: Plan, as_json: bool) -> ExitCode:
 
 def _print(report: MoveReport, plan: Plan, arm: ArmDescription, as_json: bool) -> ExitCode:
     if plan.response.stopped_by is not None:
-        report = replace(report, fraction=plan.response.fraction, stopped_by=plan.response.stopped_by.message)
+        by = plan.response.stopped_by
+        report = replace(report, fraction=plan.response.fraction, stopped_by=by.message, stopped_why=by.why)
     print(report.as_json() if as_json else summary(report, arm, isinstance(report, PlanReport)))
     return report.exit_code
 

@@ -11,7 +11,9 @@ import msgspec
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.motion import FollowJointTrajectoryResult, JointTrajectory
 from gemelo.schemas.planning import PlanResponse
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.tools.cli.common.errors import ExitCode
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.units import show
 
 if TYPE_CHECKING:
@@ -37,6 +39,8 @@ class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
     fraction: float = 1.0  # of a line, of which less will do
     stopped_by: str = ""  # why it is no more
     verified: bool = True  # false: all was sent, and what the device executed is not known
+    why: Reason | None = None  # `reason` as data
+    stopped_why: Reason | None = None  # `stopped_by` as data
 
     @property
     def exit_code(self) -> ExitCode:
@@ -80,27 +84,36 @@ def report_of(
         max_following_error_steps=dict(zip(result.joint_names, result.max_following_error, strict=False)),
         stopped_at=stopped_at,
         verified=result.verified,
+        why=result.why,
     )
 
 
 def summary(report: MoveReport, arm: ArmDescription, plan_only: bool = False) -> str:
     """The report as one line for a person."""
-    planned = f"planned in {1e3 * report.planned_s:.1f} ms"
+    return sentence(_summary(report, arm, plan_only))
+
+
+def _summary(report: MoveReport, arm: ArmDescription, plan_only: bool) -> Reason:
+    planned = because("move.planned", time=1e3 * report.planned_s)
     if report.stopped_by:
-        planned = f"{planned} {report.fraction:.1%} of the way ({report.stopped_by})"
+        by = report.stopped_why or plain(report.stopped_by)
+        planned = because("move.planned.part", planned, by, fraction=report.fraction)
     if plan_only:
-        return f"{planned}, would take {report.duration_s:.2f} s"
+        return because("move.plan_only", planned, duration=report.duration_s)
     where = ", ".join(f"{name} {show(position, arm.joint(name).unit)}" for name, position in report.stopped_at.items())
+    took = report.took_s
     if report.status == "CANCELED":
-        return f"cancelled after {report.took_s:.2f} s: stopped at {where or 'an unknown place'}"
+        return because("move.cancelled", took=took, where=where) if where else because("move.cancelled.lost", took=took)
+    why = report.why or (plain(report.reason) if report.reason else because("move.unexplained"))
     if not report.succeeded:
-        reason = report.reason or "no reason was given"
-        return f"{report.status.lower()} after {report.took_s:.2f} s: {reason}" + (f"; now at {where}" if where else "")
+        ended = because("move.ended", why, status=report.status, took=took)
+        return because("move.ended.at", ended, where=where) if where else ended
     if not report.verified:
-        return f"{planned}, took {report.took_s:.2f} s; {report.reason}"
+        return because("move.unverified", planned, why, took=took)
     steps = ", ".join(f"{name} {error:+z.2f}" for name, error in report.final_error_steps.items())
-    millimetres = "unknown" if report.final_error_m is None else f"{1e3 * report.final_error_m:.3f} mm"
-    return f"{planned}, took {report.took_s:.2f} s, final error {millimetres}, steps: {steps}"
+    if report.final_error_m is None:
+        return because("move.done.unknown", planned, took=took, steps=steps)
+    return because("move.done", planned, took=took, error=1e3 * report.final_error_m, steps=steps)
 
 
 def tool_error(arm: ArmDescription, trajectory: JointTrajectory, errors: Mapping[str, float]) -> float:

@@ -7,16 +7,15 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
-from gemelo.schemas.reasons import Reason
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, joint_of
 from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
-from gemelo.tools.cli.motion.home import home_text
+from gemelo.tools.cli.motion.home import home_reason
 from gemelo.tools.cli.parser import Options, Parser, json_option
 
 if TYPE_CHECKING:
     from gemelo import Arm
-    from gemelo.schemas.reasons import Reason
 
 
 class VerifyReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -63,25 +62,20 @@ def verify(arm: Arm, names: list[str], as_json: bool) -> ExitCode:
 
 def text_of(report: VerifyReport) -> str:
     """A line for each joint, and what is sure now."""
-    lines = [
-        f"{name}: passed its switch; its counter was {_off(report.steps_off.get(name, 0))}" for name in report.passed
-    ]
-    lines += [home_text(name, report.steps_off.get(name)) for name in report.homed]
-    lines += [
-        f"{name}: has no switch; look where it stands and say so: `gemelo reference --joints {name}=...`"
-        for name in report.without_switch
-    ]
+    lines = [_passed(name, report.steps_off.get(name, 0)) for name in report.passed]
+    lines += [home_reason(name, report.steps_off.get(name)) for name in report.homed]
+    lines += [because("homing.verify.no_switch", joint=name) for name in report.without_switch]
     count = len(report.passed) + len(report.homed)
-    lines.append(
-        f"verified {count} of {count + len(report.without_switch)} joints in {report.took_s:.1f} s: "
-        f"{int(1000.0 * report.confidence) / 10.0:g} % sure that no step is lost, "
-        f"tool within {1e3 * report.tool_bound:.2f} mm ({report.level:.0%})"
-    )
-    return "\n".join(lines)
+    verified = because(
+        "homing.verified",
+        count=count, of=count + len(report.without_switch), time=report.took_s,
+        sure=f"{int(1000.0 * report.confidence) / 10.0:g}", bound=1e3 * report.tool_bound, level=report.level,
+    )  # fmt: skip
+    return "\n".join(map(sentence, (*lines, verified)))
 
 
-def _off(steps: int) -> str:
-    return "right to the step" if steps == 0 else f"{steps:+d} steps off, less than a motor can lose"
+def _passed(name: str, steps: int) -> Reason:
+    return because("homing.passed.off", joint=name, steps=steps) if steps else because("homing.passed", joint=name)
 
 
 def _tell(what: Reason) -> None:

@@ -10,8 +10,10 @@ import msgspec
 import gemelo
 from gemelo.schemas.frames import Transform
 from gemelo.schemas.planning import FkResponse, IkRequest, IkResponse, PlanCode
-from gemelo.tools.cli.bus.request_text import goal_text, joints_text, refusal_error
+from gemelo.schemas.reasons import because
+from gemelo.tools.cli.bus.request_text import goal_text, joints_text, refusal_error, understood
 from gemelo.tools.cli.common.errors import ExitCode
+from gemelo.tools.cli.common.language import columns, sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.common.units import SHOWN, angle, length, parse_joints, rotation
@@ -67,10 +69,11 @@ def run_ik(options: Options) -> ExitCode:
     robot = load_robot()
     request = ik_request_from(options, robot.description)
     if not options.json:
-        near = (
-            f"; near {joints_text(request.near.name, request.near.position, robot.description)}" if request.near else ""
-        )
-        print(f"understood: {goal_text(request.goal, robot.description)}{near}", flush=True)
+        text = goal_text(request.goal, robot.description)
+        if request.near:
+            near = joints_text(request.near.name, request.near.position, robot.description)
+            text = sentence(because("understood.near", text=text, joints=near))
+        print(understood(text), flush=True)
     with connect_arm(robot) as arm:
         return ik(arm, request, options.json)
 
@@ -99,7 +102,7 @@ def run_fk(options: Options) -> ExitCode:
     robot = load_robot()
     values = parse_joints(options.joints, robot.description.joints)
     if values and not options.json:
-        print(f"understood: {joints_text(values, values.values(), robot.description)}", flush=True)
+        print(understood(joints_text(values, values.values(), robot.description)), flush=True)
     with connect_arm(robot) as arm:
         return fk(arm, values, options.links, options.json)
 
@@ -147,11 +150,11 @@ def configurations_text(arm: ArmDescription, found: Configurations) -> str:
         [*(f"{v * factor:z.4f}" for v, (_, factor) in zip(joints.values(), units, strict=True)), f"{distance:.3f}"]
         for joints, distance in zip(found, found.distances, strict=True)
     ]
-    return table([*headings, "away [s]"], rows)
+    return table([*headings, *columns("away [s]")], rows)
 
 
 def poses_text(poses: dict[str, Pose]) -> str:
     """A table with a row for each link: position and unit quaternion in the base frame."""
-    headings = ["link", "x [m]", "y [m]", "z [m]", "qx", "qy", "qz", "qw"]
+    headings = [*columns("link"), "x [m]", "y [m]", "z [m]", "qx", "qy", "qz", "qw"]
     rows = [[link, *(f"{value:z.6f}" for value in (*pose.position, *pose.orientation))] for link, pose in poses.items()]
     return table(headings, rows)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
+from gemelo.schemas.reasons import because, plain
 from gemelo.schemas.scene import (
     AllowedPair,
     PlanningScene,
@@ -23,9 +24,9 @@ from gemelo.schemas.scene import (
     SceneReplace,
     SceneResize,
 )
-from gemelo.tools.cli.bus.request_text import millimetres
+from gemelo.tools.cli.bus.request_text import millimetres, understood
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
-from gemelo.tools.cli.common.language import reason_or
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import connect_arm
 from gemelo.tools.cli.parser import Choices, Options, Parser, positive_number
 from gemelo.tools.cli.robot.scene_object import listing, object_of, place_text, pose_of, shape_of, sized_text
@@ -86,10 +87,10 @@ def add_options(parser: Parser) -> None:
 def add(options: Options) -> ExitCode:
     """Adds an object, or replaces the one of its name."""
     item = object_of(options)
-    padding = f", {millimetres([item.padding])} kept around it" if item.padding else ""
-    print(
-        f"understood: {item.name}, {sized_text(item.shape)}, {place_text(item.pose, item.frame)}{padding}", flush=True
-    )
+    parts = [item.name, sized_text(item.shape), place_text(item.pose, item.frame)]
+    if item.padding:
+        parts.append(sentence(because("understood.padding", distance=millimetres([item.padding]))))
+    print(understood(", ".join(parts)), flush=True)
     return ask(SceneAdd(object=item))
 
 
@@ -97,8 +98,9 @@ def ask(change: SceneEdit) -> ExitCode:
     """Connects, sends the change and prints the new version."""
     with connect_arm() as arm:
         response = arm.scene.edit(change)
-    said = reason_or(response.why, response.reason)
-    print(f"scene version {response.version}{f': {said}' if said else ''}")
+    version = because("understood.scene.version", version=response.version)
+    why = response.why or (plain(response.reason) if response.reason else None)
+    print(sentence(version if why is None else because("understood.scene.version.but", version, why)))
     return ExitCode.OK
 
 
@@ -116,7 +118,7 @@ def move_options(parser: Parser) -> None:
 def move(options: Options) -> ExitCode:
     """Moves an object."""
     pose = pose_of(options.at, options.rpy)
-    print(f"understood: {options.name} {place_text(pose, options.frame)}", flush=True)
+    print(understood(f"{options.name} {place_text(pose, options.frame)}"), flush=True)
     return ask(SceneMove(name=options.name, pose=pose, frame=options.frame))
 
 
@@ -129,7 +131,7 @@ def resize_options(parser: Parser) -> None:
 def resize(options: Options) -> ExitCode:
     """Gives an object another shape."""
     shape = shape_of(options)
-    print(f"understood: {options.name}, {sized_text(shape)}", flush=True)
+    print(understood(f"{options.name}, {sized_text(shape)}"), flush=True)
     return ask(SceneResize(name=options.name, shape=shape))
 
 
@@ -189,7 +191,7 @@ def save(options: Options) -> ExitCode:
     with connect_arm() as arm:
         scene = arm.scene.whole()
         write_scene(scene, options.file)
-    print(f"{options.file} has the scene, version {scene.version}")
+    print(sentence(because("understood.scene.saved", file=str(options.file), version=scene.version)))
     return ExitCode.OK
 
 

@@ -8,6 +8,7 @@ import gemelo
 from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.frames import Transform
+from gemelo.schemas.reasons import because
 from gemelo.schemas.scene import (
     BoxShape,
     CylinderShape,
@@ -20,6 +21,7 @@ from gemelo.schemas.scene import (
 )
 from gemelo.tools.cli.bus.request_text import millimetres, rotation_text
 from gemelo.tools.cli.common.errors import usage
+from gemelo.tools.cli.common.language import columns, sentence, word
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.common.units import LENGTH, parse_quantity, parse_rotation
 from gemelo.tools.cli.parser import Options
@@ -79,23 +81,24 @@ def length(text: str, owner: str) -> float:
 
 def listing(scene: PlanningScene) -> str:
     """A table of the objects, and the pairs that may touch."""
-    headings = ("object", "shape [mm]", "x y z [mm]", "turned", "in", "touches", "padding [mm]")
+    headings = columns("object", "shape [mm]", "x y z [mm]", "turned", "in", "touches", "padding [mm]")
     rows = [_row(item) for item in scene.objects]
-    lines = [table(headings, rows)] if rows else ["nothing is around the arm"]
-    lines += [f"{pair.first} and {pair.second} may touch" for pair in scene.allowed]
-    return "\n".join([*lines, f"version {scene.version}"])
+    pairs = [because("understood.scene.pair", first=pair.first, second=pair.second) for pair in scene.allowed]
+    lines = [table(headings, rows)] if rows else [sentence(because("understood.scene.empty"))]
+    lines += map(sentence, pairs)
+    return "\n".join([*lines, sentence(because("understood.scene.number", version=scene.version))])
 
 
 def _row(item: SceneObject) -> tuple[str, ...]:
     at = " ".join(f"{1000.0 * value:z.1f}" for value in item.pose.translation)
-    held = f"{item.frame} (attached)" if item.attached else item.frame or "base"
+    held = sentence(because("understood.scene.attached", frame=item.frame)) if item.attached else item.frame
     touches = ", ".join(item.touch_links) or "-"
     return (
         item.name,
         shape_text(item.shape),
         at,
         rotation_text(item.pose.rotation),
-        held,
+        held or word("scene", "base"),
         touches,
         f"{1000.0 * item.padding:g}",
     )
@@ -104,8 +107,10 @@ def _row(item: SceneObject) -> tuple[str, ...]:
 def place_text(pose: Transform, frame: str) -> str:
     """A pose in `frame` (empty: the base) as text, lengths in [mm]."""
     rotation = rotation_text(pose.rotation)
-    turned = f", turned {rotation}" if rotation != "-" else ""
-    return f"at {millimetres(pose.translation)}{turned}, in {frame or 'the base'}"
+    parts = [because("understood.at", position=millimetres(pose.translation))]
+    parts += [because("understood.turned", turn=rotation)] if rotation != "-" else []
+    parts += [because("understood.frame", frame=frame) if frame else because("understood.base")]
+    return ", ".join(map(sentence, parts))
 
 
 def sized_text(shape: Shape) -> str:
@@ -124,20 +129,28 @@ def _mesh_size(shape: MeshShape) -> str:
     except (BadStl, OSError):
         return ""
     edges = (vertices.max(axis=0) - vertices.min(axis=0)) * shape.scale
-    return f", {' x '.join(f'{1000.0 * edge:.3g}' for edge in edges)} mm large"
+    size = " x ".join(f"{1000.0 * edge:.3g}" for edge in edges)
+    return f", {sentence(because('understood.shape.large', size=size))}"
 
 
 def shape_text(shape: Shape) -> str:
     """The shape as text, lengths in [mm]."""
     match shape:
         case BoxShape():
-            return f"box {' x '.join(f'{1000.0 * edge:g}' for edge in shape.size)}"
+            edges = " x ".join(f"{1000.0 * edge:g}" for edge in shape.size)
+            return sentence(because("understood.shape.box", edges=edges))
         case SphereShape():
-            return f"sphere of radius {1000.0 * shape.radius:g}"
+            return sentence(because("understood.shape.sphere", radius=1000.0 * shape.radius))
         case CylinderShape():
-            return f"cylinder of radius {1000.0 * shape.radius:g}, length {1000.0 * shape.length:g}"
+            sizes = {"radius": 1000.0 * shape.radius, "length": 1000.0 * shape.length}
+            return sentence(because("understood.shape.cylinder", **sizes))
         case PlaneShape():
-            return "plane, solid below"
+            return sentence(because("understood.shape.plane"))
         case MeshShape():
-            scale = "" if set(shape.scale) == {1.0} else f", scale {shape.scale[0]:g}"
-            return f"mesh {shape.path or f'of {len(shape.data) or shape.size} bytes'}{scale}"
+            size = len(shape.data) or shape.size
+            mesh = because("understood.shape.mesh", file=shape.path) if shape.path else because(
+                "understood.shape.mesh.data", size=size
+            )  # fmt: skip
+            if set(shape.scale) == {1.0}:
+                return sentence(mesh)
+            return sentence(because("understood.shape.scaled", mesh, scale=shape.scale[0]))
