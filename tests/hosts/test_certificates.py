@@ -17,6 +17,7 @@ from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Broker, MqttSection
 from gemelo.schemas.device import DeviceStatus
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import DEVICE_STATUS
 from gemelo.tools.cli.main import run
 from gemelo.tools.hosts.certificates import Certificate, days_by_host, endings, older, shown_at
@@ -30,18 +31,19 @@ def test_the_first_that_ends_counts_for_a_host_and_what_ends_within_a_month_is_n
     now = time.time()
     found = [Certificate("cell", "gateway", now + 300 * DAY), Certificate("cell", "router", now + 29 * DAY),
              Certificate("desk", "operator", now - DAY), Certificate("brain", "planner", now + 31 * DAY)]  # fmt: skip
-    assert days_by_host(found, now) == {"cell": "29 days", "desk": "expired", "brain": "31 days"}
-    assert endings(found, now) == (
-        "the certificate of router on cell ends in 29 days", "the certificate of operator on desk has expired",
-    )  # fmt: skip
+    left = {host: str(days) for host, days in days_by_host(found, now).items()}
+    assert left == {"cell": "29 days", "desk": "expired", "brain": "31 days"}
+    ends, expired = endings(found, now)
+    assert (ends.code, ends.values["name"], ends.values["host"]) == ("site.certificate.ends", "router", "cell")
+    assert ends.values["days"] == pytest.approx(29.0)
+    assert expired == because("site.certificate.expired", name="operator", host="desk")
 
 
 def test_what_runs_with_an_older_certificate_than_was_made_for_it_is_named():
     now = time.time()
     here = [Certificate("cell", "gateway", now + 365 * DAY), Certificate("brain", "planner", now + 365 * DAY)]
     running = [Certificate("cell", "gateway", now + 200 * DAY), here[1], Certificate("desk", "panel", now)]
-    (said,) = older(running, here)
-    assert said.startswith("gateway on cell runs with an older certificate than the one that is here for it")
+    assert older(running, here) == (because("site.certificate.older", name="gateway", host="cell"),)
 
 
 def test_check_says_it_of_the_keys_that_are_here(tmp_path, monkeypatch, capsys):

@@ -80,9 +80,9 @@ def test_what_cannot_be_written_is_named(out, capsys):
     out.parent.mkdir(parents=True)
     out.touch()
     assert gemelo("deploy", "render", "example") == 1
-    assert capsys.readouterr().err == f"gemelo: {out}/cell: Not a directory\n"
+    assert capsys.readouterr().err == f"gemelo: {out}/cell cannot be written: Not a directory\n"
     assert gemelo("deploy", "keys", "example") == 1
-    assert capsys.readouterr().err == f"gemelo: {out}: File exists\n"
+    assert capsys.readouterr().err == f"gemelo: {out} cannot be written: File exists\n"
 
 
 def test_an_authority_without_its_key_is_not_replaced_and_a_broken_one_harms_no_certificate(out, capsys):

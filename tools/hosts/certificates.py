@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gemelo.libraries.credentials.authority import FORMER
-from gemelo.libraries.credentials.expiry import WARN_WITHIN, days_left, ending, expiry, not_after
+from gemelo.libraries.credentials.expiry import WARN_WITHIN, days_left, expiry, not_after
 from gemelo.libraries.mqtt.secure_folder import CERTIFICATE
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.site import Site
 from gemelo.tools.hosts.layout import BROKER, ROUTER, roles
 
@@ -74,60 +75,57 @@ def shown_at(address: str, port: int, certificate: str = "", key: str = "") -> f
         return None
 
 
-def days_by_host(certificates: Iterable[Certificate], now: float | None = None) -> dict[str, str]:
-    """What is left of the first certificate that ends on each host, as words of a table; `now` in [s] UNIX time."""
+def days_by_host(certificates: Iterable[Certificate], now: float | None = None) -> dict[str, Reason]:
+    """What is left of the first certificate that ends on each host, for a table; `now` in [s] UNIX time."""
     ends: dict[str, float] = {}
     for each in certificates:
         ends[each.host] = min(each.expires, ends.get(each.host, each.expires))
     return {host: in_days(first, now) for host, first in ends.items()}
 
 
-def in_days(ends: float, now: float | None = None) -> str:
-    """What is left until `ends`, as a word of a table; both in [s] UNIX time."""
+def in_days(ends: float, now: float | None = None) -> Reason:
+    """What is left until `ends`, for a table; both in [s] UNIX time."""
     left = days_left(ends, now)
-    return f"{left:.0f} days" if left > 0.0 else "expired"
+    return because("site.days.left", days=left) if left > 0.0 else because("site.days.expired")
 
 
-def endings(certificates: Iterable[Certificate], now: float | None = None) -> tuple[str, ...]:
-    """A sentence for each that ends within a month, or has; `now` in [s] UNIX time."""
-    said = ((each, ending(each.expires, now)) for each in certificates)
-    return tuple(f"the certificate of {each.name} on {each.host} {text}" for each, text in said if text)
-
-
-def renewal(site: Site) -> str:
-    """What to do about those that end."""
-    return (
-        f"`gemelo deploy keys {site.name}` renews what ends within {WARN_WITHIN:.0f} days; then give these hosts their "
-        "folders again, and restart what runs there"
+def endings(certificates: Iterable[Certificate], now: float | None = None) -> tuple[Reason, ...]:
+    """Each that ends within a month, or has; `now` in [s] UNIX time."""
+    left = ((each, days_left(each.expires, now)) for each in certificates)
+    return tuple(
+        because("site.certificate.ends", name=each.name, host=each.host, days=days)
+        if days > 0.0
+        else because("site.certificate.expired", name=each.name, host=each.host)
+        for each, days in left
+        if days <= WARN_WITHIN
     )
 
 
-def authority_told(site: Site, folder: Path, now: float | None = None) -> tuple[str, ...]:
+def renewal(site: Site) -> Reason:
+    """What to do about those that end."""
+    return because("site.certificate.renew", site=site.name, days=WARN_WITHIN)
+
+
+def authority_told(site: Site, folder: Path, now: float | None = None) -> tuple[Reason, ...]:
     """When the authority ends whose keys are below `folder`, and what to do about it; `now` in [s] UNIX time."""
     file = folder / AUTHORITY_FOLDER / "ca.pem"
     if not _is_ours(file):
         return ()
     ends = expiry(file)
-    said = [f"the authority ends on {time.strftime('%Y-%m-%d', time.gmtime(ends))} ({in_days(ends, now)})"]
+    date = time.strftime("%Y-%m-%d", time.gmtime(ends))
+    said = [because("site.authority.ends", in_days(ends, now), date=date)]
     if days_left(ends, now) < site.certificate_days + WARN_WITHIN:
-        said.append(
-            f"certificates of {site.certificate_days} days will soon outlive it: `gemelo deploy keys {site.name} "
-            "--renew-authority` makes another one, without an outage"
-        )
+        said.append(because("site.authority.renew", days=site.certificate_days, site=site.name))
     if file.with_name(FORMER).exists():
-        said.append(
-            f"the former authority is trusted too, until `gemelo deploy keys {site.name} --retire-authority`: when "
-            f"every host has its folder of today, and `gemelo deploy status {site.name}` names no older certificate"
-        )
+        said.append(because("site.authority.former", site=site.name))
     return tuple(said)
 
 
-def older(running: Iterable[Certificate], made_here: Iterable[Certificate]) -> tuple[str, ...]:
-    """A sentence for each that runs with another certificate than the newest that was made for it."""
+def older(running: Iterable[Certificate], made_here: Iterable[Certificate]) -> tuple[Reason, ...]:
+    """Each that runs with another certificate than the newest that was made for it."""
     newest = {(each.host, each.name): each.expires for each in made_here}
     return tuple(
-        f"{each.name} on {each.host} runs with an older certificate than the one that is here for it: give that host "
-        "its folder, and restart what runs there"
+        because("site.certificate.older", name=each.name, host=each.host)
         for each in running
         if newest.get((each.host, each.name), each.expires) - each.expires > SAME
     )

@@ -15,6 +15,7 @@ from gemelo.libraries.runtime.deployment import is_loopback
 from gemelo.libraries.toml_lines import Where
 from gemelo.schemas.deployment import DeviceKind, Wire
 from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.roles import ROLES
 from gemelo.schemas.site import Site
 from gemelo.tools.hosts.certificates import AUTHORITY_FOLDER
@@ -46,41 +47,39 @@ def _addresses(site: Site, problems: Problems) -> None:
     seen: dict[str, str] = {}
     for name, host in site.hosts.items():
         if name == AUTHORITY_FOLDER:  # its folder would go to a host with the key in it
-            problems.add(("hosts", name), f'no host can have the name "{name}": {name}/ holds the key of the authority')
+            problems.add(("hosts", name), because("site.host.authority", name=name))
         for key, address in (("address", host.address), ("listen", host.listen)):
             if (address or key == "address") and not _is_address(address):
-                problems.add(("hosts", name, key), f"{address!r} is neither a host name nor an IP address")
+                problems.add(("hosts", name, key), because("site.host.address", address=repr(address)))
         if host.address.lower() in seen:
             other = seen[host.address.lower()]
-            problems.add(("hosts", name, "address"), f"{host.address} is the address of {other} too")
+            problems.add(
+                ("hosts", name, "address"), because("site.host.same_address", address=host.address, other=other)
+            )
         seen.setdefault(host.address.lower(), name)
         if len(site.hosts) > 1:
             _require_reachable(site, name, problems)
         for key in ("address", "listen") if name in (site.router.host, site.broker.host) else ():
             if "%" in getattr(host, key):
-                text = f"{getattr(host, key)} has a zone, which no certificate can name: take an address without one"
-                problems.add(("hosts", name, key), text)
+                problems.add(("hosts", name, key), because("site.host.zone", address=getattr(host, key)))
         if _is_unspecified(host.address):
-            problems.add(("hosts", name, "address"), f"nobody can connect to {host.address}: that is for `listen`")
+            problems.add(("hosts", name, "address"), because("site.host.unspecified", address=host.address))
 
 
 def _require_reachable(site: Site, name: str, problems: Problems) -> None:
     """Where there are several hosts, each reaches the others."""
     host, serves = site.hosts[name], name in (site.router.host, site.broker.host)
     if is_loopback(host.address):
-        problems.add(("hosts", name, "address"), f"{host.address} is each host's own: write the address by which the "
-                     f"others reach {name}")  # fmt: skip
+        problems.add(("hosts", name, "address"), because("site.host.loopback", address=host.address, name=name))
     elif serves and host.listen and is_loopback(host.listen):
-        problems.add(
-            ("hosts", name, "listen"), f"{host.listen} is {name}'s own: no other host reaches what listens there"
-        )
+        problems.add(("hosts", name, "listen"), because("site.host.listens_alone", address=host.listen, name=name))
 
 
 def _places(site: Site, problems: Problems) -> None:
     for key, host in ((ROUTER, site.router.host), (BROKER, site.broker.host)):
         if host not in site.hosts:
-            hint = nearest(host, site.hosts)
-            problems.add((key, "host"), f'the {key} is on "{host}", which is not in [hosts]: {hint}')
+            why = because("site.host.unknown", nearest(host, site.hosts), service=key, host=host)
+            problems.add((key, "host"), why)
 
 
 def _services(site: Site, problems: Problems) -> None:
@@ -89,14 +88,15 @@ def _services(site: Site, problems: Problems) -> None:
         for robot, services in host.services.items():
             place: Where = ("hosts", name, "services", robot)
             if robot not in site.robots:
-                problems.add(place, f'there is no robot "{robot}" in [robots]: {nearest(robot, site.robots)}')
+                problems.add(place, because("site.robot.unknown", nearest(robot, site.robots), robot=robot))
             for index, service in enumerate(services):
                 if service not in OF_A_ROBOT:
-                    said = f"[{service}] says where it runs" if service in (ROUTER, BROKER) else ""
-                    hint = said or nearest(service, OF_A_ROBOT)
-                    problems.add((*place, index), f'"{service}" is not a service of a robot: {hint}')
+                    own_table = because("site.service.own_table", service=service)
+                    other_one = because("site.service.unknown", nearest(service, OF_A_ROBOT), service=service)
+                    problems.add((*place, index), own_table if service in (ROUTER, BROKER) else other_one)
                 elif other := where.get((robot, service)):
-                    problems.add((*place, index), f"{robot} has two of {service}, on {other} and on {name}")
+                    twice = {"robot": robot, "service": service, "first": other, "second": name}
+                    problems.add((*place, index), because("site.service.twice", **twice))
                 else:
                     where[robot, service] = name
     for robot, settings in site.robots.items():
@@ -109,12 +109,10 @@ def _lines(site: Site, problems: Problems) -> None:
         if settings.wire is not Wire.SERIAL:
             continue
         if not PurePosixPath(settings.serial).is_absolute():
-            text = f'serial = "{settings.serial}" must be the path of a device, as "/dev/ttyUSB0"'
-            problems.add(("robots", robot, "serial"), text)
+            problems.add(("robots", robot, "serial"), because("site.serial", path=settings.serial))
         ends = [name for name, host in site.hosts.items() if {GATEWAY, DEVICE} & {*host.services.get(robot, ())}]
         if settings.device is DeviceKind.VIRTUAL and len(ends) > 1:
-            text = f"a virtual device on a serial line is on the host of its gateway: put both of {robot} on one"
-            problems.add(("robots", robot, "wire"), text)
+            problems.add(("robots", robot, "wire"), because("site.serial.virtual", robot=robot))
 
 
 def _require_complete(robot: str, device: DeviceKind, where: dict[str, str], problems: Problems) -> None:
@@ -122,11 +120,12 @@ def _require_complete(robot: str, device: DeviceKind, where: dict[str, str], pro
     place: Where = ("robots", robot)
     needed = (*NEEDED, *((DEVICE,) if device is DeviceKind.VIRTUAL else ()))
     for missing in (service for service in needed if not where[service]):
-        problems.add(place, f"{robot} has no {missing} on any host: write it into [hosts.<host>.services]")
+        problems.add(place, because("site.service.missing", robot=robot, service=missing))
     if where[DEVICE] and device is DeviceKind.BOARD:
-        problems.add(place, f'{robot} has device = "board", so {DEVICE} has nothing to do on {where[DEVICE]}')
+        idle = {"robot": robot, "service": DEVICE, "host": where[DEVICE]}
+        problems.add(place, because("site.service.idle", **idle))
     if where["visualizer"] != where["viewer"]:
-        problems.add(place, f"the visualizer of {robot} shows in a viewer on its own host: put both on one")
+        problems.add(place, because("site.service.viewer", robot=robot))
 
 
 def _roles(site: Site, problems: Problems) -> None:
@@ -134,30 +133,30 @@ def _roles(site: Site, problems: Problems) -> None:
     for name, host in site.hosts.items():
         for index, role in enumerate(host.roles):
             if role not in people:
-                text = f'"{role}" has no permission that a person or script could use: {nearest(role, people)}'
-                problems.add(("hosts", name, "roles", index), text)
+                why = because("site.role", nearest(role, people), role=role)
+                problems.add(("hosts", name, "roles", index), why)
 
 
 def _listeners(site: Site, problems: Problems) -> None:
     """Two that would listen on one port of a host."""
-    ports: defaultdict[str, list[tuple[int, str, Where]]] = defaultdict(list)
-    ports[site.router.host].append((site.router.port, "the router", (ROUTER, "port")))
-    ports[site.broker.host].append((site.broker.port, "the broker", (BROKER, "port")))
+    ports: defaultdict[str, list[tuple[int, Reason, Where]]] = defaultdict(list)
+    ports[site.router.host].append((site.router.port, because("site.port.of", service=ROUTER), (ROUTER, "port")))
+    ports[site.broker.host].append((site.broker.port, because("site.port.of", service=BROKER), (BROKER, "port")))
     for name, host in site.hosts.items():
         for robot, services in host.services.items():
             settings = site.robots.get(robot)
             for service, key in (("panel", "panel_port"), ("viewer", "viewer_port"), ("viewer", "web_port")):
                 if settings is not None and service in services:
                     place: Where = ("robots", robot, key)
-                    ports[name].append((getattr(settings, key), f"{service} of {robot} ({key})", place))
+                    who = because("site.port.of_robot", service=service, robot=robot, key=key)
+                    ports[name].append((getattr(settings, key), who, place))
     for name, wanted in ports.items():
-        taken: dict[int, str] = {}
+        taken: dict[int, Reason] = {}
         for port, who, place in wanted:
             if not 1024 <= port < 65536:
-                what = f"{port} is root's, which the services are not" if 0 < port < 1024 else f"{port} is no port"
-                problems.add(place, f"{what}: 1024 to 65535")
+                problems.add(place, because("site.port.root" if 0 < port < 1024 else "site.port.none", port=port))
             elif port in taken:
-                problems.add(place, f"port {port} of {name} is wanted by {taken[port]} and by {who}: give one another")
+                problems.add(place, because("site.port.taken", taken[port], who, port=port, host=name))
             taken[port] = who
 
 
@@ -165,22 +164,20 @@ def _paths(site: Site, problems: Problems) -> None:
     for key in ("project", "config", "state"):
         path = getattr(site, key)
         if not PurePosixPath(path).is_absolute() or ".." in PurePosixPath(path).parts or path == "/":
-            problems.add((key,), f'{key} = "{path}" must be an absolute path without ".."')
+            problems.add((key,), because("site.path.absolute", key=key, path=path))
         _require_meaningless(path, (key,), problems)
     for key in ("project", "config"):
         if PurePosixPath(getattr(site, key)).is_relative_to(site.state):
-            text = f'the services may write below state = "{site.state}", so {key} cannot be there'
-            problems.add((key,), text)
+            problems.add((key,), because("site.path.state", state=site.state, key=key))
     for robot, settings in site.robots.items():
         for key in ("folder", "cell", "serial"):
             _require_meaningless(getattr(settings, key), ("robots", robot, key), problems)
     if not USER.fullmatch(site.user):
-        problems.add(("user",), f'"{site.user}" cannot be a user\'s name: 1 to 32 lower-case letters, digits, "_", "-"')
+        problems.add(("user",), because("site.user", user=site.user))
     if site.user == "root":
-        problems.add(("user",), "the services do not run as root: take a user of their own")
+        problems.add(("user",), because("site.user.root"))
     if not 1 <= site.certificate_days <= DAYS:
-        text = f"{site.certificate_days} days: a certificate has 1 to {DAYS}, as many as its authority"
-        problems.add(("certificate_days",), text)
+        problems.add(("certificate_days",), because("site.days", days=site.certificate_days, most=DAYS))
 
 
 def _robots(site: Site, problems: Problems, project: Path) -> None:
@@ -189,20 +186,21 @@ def _robots(site: Site, problems: Problems, project: Path) -> None:
     for robot, settings in site.robots.items():
         place: Where = ("robots", robot, "folder")
         if robot == HOST:
-            problems.add(("robots", robot), f'no robot can have the name "{HOST}": {HOST}.toml is of router and broker')
+            problems.add(("robots", robot), because("site.robot.host", name=HOST))
         if not _is_below(settings.folder):
-            problems.add(place, f'folder = "{settings.folder}" must be below the project, as "urdf/{robot}"')
+            problems.add(place, because("site.robot.folder", folder=settings.folder, robot=robot))
             continue
         try:
             arm = load_arm(project / settings.folder)
         except (ConfigurationError, OSError, tomllib.TOMLDecodeError) as error:
-            problems.add(place, f"{robot}: {error}")
+            problems.add(place, because("site.robot", _why(error), robot=robot))
             continue
         if arm.name != robot:
-            problems.add(place, f'the robot of {settings.folder} is named "{arm.name}": write [robots.{arm.name}]')
+            problems.add(place, because("site.robot.name", folder=settings.folder, name=arm.name))
         if arm.device.name in devices and settings.wire is Wire.MQTT:
             other = devices[arm.device.name]
-            problems.add(place, f'{robot} and {other} both have the device "{arm.device.name}" at the broker')
+            both = {"first": robot, "second": other, "device": arm.device.name}
+            problems.add(place, because("site.robot.device", **both))
         devices[arm.device.name] = robot
         _cell(site, robot, arm, problems, project)
 
@@ -212,16 +210,20 @@ def _cell(site: Site, robot: str, arm: ArmDescription, problems: Problems, proje
     cell, place = site.robots[robot].cell, ("robots", robot, "cell")
     eyes = [(name, each) for name, host in site.hosts.items() for each in EYES if each in host.services.get(robot, ())]
     for name, each in eyes if not cell else ():
-        problems.add(("hosts", name, "services", robot), f'{each} of {robot} needs a cell: write cell = "urdf/{robot}/'
-                     f'cell.toml" in [robots.{robot}]')  # fmt: skip
+        place_of_service: Where = ("hosts", name, "services", robot)
+        problems.add(place_of_service, because("site.cell.needed", service=each, robot=robot))
     if not cell:
         return
     if not _is_below(cell):
-        return problems.add(place, f'cell = "{cell}" must be below the project, as "urdf/{robot}/cell.toml"')
+        return problems.add(place, because("site.cell.folder", cell=cell, robot=robot))
     try:
         load_cell(project / cell, arm)
     except (ConfigurationError, OSError, tomllib.TOMLDecodeError) as error:
-        problems.add(place, f"{robot}: {error}")
+        problems.add(place, because("site.robot", _why(error), robot=robot))
+
+
+def _why(error: Exception) -> Reason:
+    return error.reason if isinstance(error, ConfigurationError) else plain(str(error))
 
 
 def _is_below(path: str) -> bool:
@@ -231,7 +233,7 @@ def _is_below(path: str) -> bool:
 
 def _require_meaningless(path: str, place: Where, problems: Problems) -> None:
     if HAS_MEANING.search(path) or path != path.strip():
-        problems.add(place, f'"{path}" cannot be a path here: no $, % or \\, and no blank at either end')
+        problems.add(place, because("site.path.meaning", path=path))
 
 
 def _is_address(text: str) -> bool:

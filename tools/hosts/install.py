@@ -7,6 +7,7 @@ import shlex
 import subprocess
 from pathlib import Path, PurePosixPath
 
+from gemelo.schemas.reasons import because
 from gemelo.schemas.site import Site
 from gemelo.tools.hosts.firewall import UNIT_NAME, ports
 from gemelo.tools.hosts.layout import robots
@@ -29,7 +30,9 @@ def commands(site: Site, host: str, folder: Path) -> tuple[Command, ...]:
     """
     for name, maker in MADE_BY.items():
         if not (folder / name).is_dir():
-            raise SiteError(f"{folder} has no {name}/: `{maker} {site.name}` makes it")
+            raise SiteError(
+                because("site.install.missing", folder=str(folder), name=name, maker=f"{maker} {site.name}")
+            )
     address = site.hosts[host].address
     config, state, user = shlex.quote(site.config), shlex.quote(site.state), site.user
     prepare = (
@@ -79,9 +82,9 @@ def run(wanted: tuple[Command, ...]) -> None:
         try:
             code = subprocess.run(command, check=False).returncode
         except FileNotFoundError:
-            raise SiteError(f"the command {command[0]} is missing: sudo apt-get install {command[0]}") from None
+            raise SiteError(because("site.install.command", command=command[0])) from None
         if code:
-            raise SiteError(f"ended with {code}: {shlex.join(command)}")
+            raise SiteError(because("site.install.ended", code=code, command=shlex.join(command)))
 
 
 def _bracketed(address: str) -> str:

@@ -13,17 +13,13 @@ from typing import Any, TypeVar, get_args
 import msgspec
 
 from gemelo.libraries.toml_lines import Where, nearest_line, toml_lines
-from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.errors import ConfigurationError, ReasonedError
+from gemelo.schemas.reasons import Reason, Remedy, because, plain, remedy
 from gemelo.schemas.site import Site, SiteBroker, SiteHost, SiteRecord, SiteRobot, SiteRouter
 from gemelo.schemas.text_file import NotUtf8, read_text
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,30}")  # of a host or a site: part of file names, units and certificates
-PLAIN = '1 to 31 lower-case letters, digits, "_" or "-"'
 WANTED = re.compile(r"Expected `(\w+)`, got `(\w+)`")  # msgspec's own sentence
-IN_TOML = {
-    "array": "a list", "object": "a table", "str": 'a text in "..."', "int": "a whole number",
-    "float": "a number with a point", "bool": "true or false",
-}  # fmt: skip
 TABLES: dict[str, type[SiteRecord]] = {"router": SiteRouter, "broker": SiteBroker}
 TABLES_BY_NAME: dict[str, type[SiteRecord]] = {"robots": SiteRobot, "hosts": SiteHost}
 
@@ -34,22 +30,31 @@ class SiteError(ConfigurationError):
     """A site that cannot be deployed; one line for each problem."""
 
 
+class NotPlain(ReasonedError, ValueError):
+    """A text that would end a line in the files that are written of it."""
+
+
 class Problems:
     """What is wrong with a file, with lines."""
 
     def __init__(self, file: Path, text: str) -> None:
         self._file, self._lines = file, toml_lines(text)
-        self._found: list[tuple[int, str]] = []
+        self._found: list[tuple[int, Reason]] = []
 
-    def add(self, place: Where, text: str) -> None:
+    def add(self, place: Where, why: Reason) -> None:
         """At the line of `place`, or of the nearest thing around it that stands in the file."""
         at = nearest_line(self._lines, place) or 1
-        self._found.append((at, text))
+        self._found.append((at, why))
 
     def raise_any(self) -> None:
         """Raises `SiteError` if there is any."""
         if self._found:
-            raise SiteError("\n".join(f"{self._file}, line {at}: {text}" for at, text in sorted(self._found)))
+            found = sorted(self._found, key=lambda each: (each[0], str(each[1])))
+            raise SiteError(
+                because(
+                    "site.problems", *(because("file.line", why, file=str(self._file), line=at) for at, why in found)
+                )
+            )
 
 
 def read_site(file: Path) -> tuple[Site, Problems]:
@@ -58,9 +63,10 @@ def read_site(file: Path) -> tuple[Site, Problems]:
         text = read_text(file)
         raw = tomllib.loads(text)
     except FileNotFoundError:
-        raise SiteError(f"{file}: there is no such file; deploy/hosts/example.toml is one to copy") from None
+        raise SiteError(because("site.none", file=str(file))) from None
     except (OSError, NotUtf8, tomllib.TOMLDecodeError) as error:
-        raise SiteError(f"{file}: {error}") from error
+        why = error.reason if isinstance(error, NotUtf8) else plain(str(error))
+        raise SiteError(because("site.unreadable", why, file=str(file))) from error
     problems = Problems(file, text)
     site = _site(raw, file.stem, problems)
     problems.raise_any()
@@ -70,10 +76,10 @@ def read_site(file: Path) -> tuple[Site, Problems]:
 
 def _site(raw: dict[str, Any], name: str, problems: Problems) -> Site | None:
     if "name" in raw:
-        problems.add(("name",), f'a site has the name of its file, "{name}": take the key "name" away')
+        problems.add(("name",), because("site.name.key", name=name))
     is_plain = NAME.fullmatch(name) is not None
     if not is_plain:
-        problems.add((), f"{name!r} cannot be the name of a site: {PLAIN}")
+        problems.add((), because("site.name", name=repr(name)))
     values = {**raw, "name": name if is_plain else ""}
     for key, kind in TABLES.items():
         if isinstance(raw.get(key), dict):
@@ -87,9 +93,9 @@ def _site(raw: dict[str, Any], name: str, problems: Problems) -> Site | None:
 def _named(kind: type[R], tables: dict[str, Any], key: str, problems: Problems) -> dict[str, R | None]:
     for name, table in tables.items():
         if not NAME.fullmatch(name):
-            problems.add((key, name), f"{name!r} cannot be a name in [{key}]: {PLAIN}")
+            problems.add((key, name), because("site.name.of_table", name=repr(name), key=key))
         if not isinstance(table, dict):
-            problems.add((key, name), f"[{key}.{name}] must be a table")
+            problems.add((key, name), because("site.no_table", key=key, name=name))
     return {
         name: _record(kind, table, (key, name), problems) for name, table in tables.items() if isinstance(table, dict)
     }
@@ -100,13 +106,14 @@ def _record(kind: type[R], raw: dict[str, Any], place: Where, problems: Problems
     fields = {field.name: field for field in msgspec.structs.fields(kind)}
     for key in raw:
         if key not in fields:
-            problems.add((*place, key), f'unknown key "{".".join(map(str, (*place, key)))}": {nearest(key, fields)}')
+            path = ".".join(map(str, (*place, key)))
+            problems.add((*place, key), because("site.key.unknown", nearest(key, fields), key=path))
     values, is_whole = {}, all(key in fields for key in raw)
     for name, field in fields.items():
         if name not in raw:
             is_whole &= not field.required
             if field.required:
-                problems.add(place, f'key "{".".join(map(str, (*place, name)))}" is missing')
+                problems.add(place, because("site.key.missing", key=".".join(map(str, (*place, name)))))
             continue
         try:
             values[name] = _converted(raw[name], field.type)
@@ -124,7 +131,7 @@ def _converted(value: object, kind: Any) -> Any:
     return made
 
 
-def _wrong(place: Where, value: object, kind: Any) -> tuple[Where, str]:
+def _wrong(place: Where, value: object, kind: Any) -> tuple[Where, Reason]:
     """The innermost thing of a value that is no `kind`: where it stands, and what is wrong with it."""
     key, inner = ".".join(str(each) for each in place if not isinstance(each, int)), get_args(kind)
     parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
@@ -137,19 +144,22 @@ def _wrong(place: Where, value: object, kind: Any) -> tuple[Where, str]:
     try:
         _converted(value, kind)
     except ValueError as error:
-        what = "what stands in it " if isinstance(place[-1], int) else ""
-        return place, f'key "{key}": {what}{_in_toml(str(error), kind)}'
+        code = "site.key.element" if isinstance(place[-1], int) else "site.key"
+        return place, because(code, _in_toml(error, kind), key=key)
     raise AssertionError(f"{key} is right")
 
 
-def _in_toml(said: str, kind: object) -> str:
+def _in_toml(error: ValueError, kind: object) -> Reason:
     """What msgspec says of a value that should be a `kind`, in the words of who writes TOML."""
+    if isinstance(error, NotPlain):
+        return error.reason
+    said = str(error)
     if isinstance(kind, EnumType):
-        return f"{said.removeprefix('Invalid enum value ')} is not one of {', '.join(kind)}"
+        return because("site.value.none_of", value=said.removeprefix("Invalid enum value "), known=tuple(kind))
     if not (found := WANTED.fullmatch(said)):
-        return said
+        return plain(said)
     wanted, got = found.groups()
-    return f"must be {IN_TOML.get(wanted, wanted)}, not {IN_TOML.get(got, got)}"
+    return because("site.value.kind", wanted=wanted, got=got)
 
 
 def _is_reported(value: object) -> bool:
@@ -160,13 +170,13 @@ def _is_reported(value: object) -> bool:
 def _require_plain(value: object) -> None:
     """No text may hold what ends a line in the files that are written of it."""
     if isinstance(value, str) and not value.isprintable():
-        raise ValueError(f"{value!r} holds a character that cannot be printed")
+        raise NotPlain(because("site.value.unprintable", value=repr(value)))
     for inner in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
         _require_plain(inner)
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def nearest(name: str, known: Iterable[str]) -> Remedy:
     """A hint for a name that is not known."""
     names = list(known)
     near = difflib.get_close_matches(name, names, n=1)
-    return f'did you mean "{near[0]}"?' if near else f"known are {', '.join(names)}"
+    return remedy("did_you_mean", name=near[0]) if near else remedy("known_are", names=", ".join(names))

@@ -10,6 +10,7 @@ import msgspec
 
 from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.schemas.device import DeviceStatus
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.roles import SERVICES
 from gemelo.schemas.site import Site
 from gemelo.schemas.system import NodeInfo
@@ -43,6 +44,7 @@ class ServiceStatus(msgspec.Struct, frozen=True, kw_only=True):
     clock_offset: float | None = None  # [s] its clock against the asker's; None: not measured
     clock_bound: float = 0.0  # [s] by how much at most that is wrong
     certificate_ends: float | None = None  # [s] UNIX time, of the one that it shows; None: none, or it is not known
+    why: Reason | None = None  # `reason` as data
 
 
 @dataclass(frozen=True)
@@ -86,29 +88,27 @@ def _expected(
             if process.role and process.service.name in SERVICES:
                 yield _node(site, host, robot, service, at.nodes.get(service))
             else:
-                standing, reason = _from_others(service, robot, seen)
+                standing, why = _from_others(service, robot, seen)
                 yield ServiceStatus(
-                    host=host, robot=robot, service=service, standing=standing, reason=reason,
+                    host=host, robot=robot, service=service, standing=standing, reason=str(why or ""), why=why,
                     certificate_ends=shown.get(service),
                 )  # fmt: skip
 
 
 def _node(site: Site, host: str, robot: str, service: str, seen: SeenNode | None) -> ServiceStatus:
-    if seen is None:
+    if seen is None or seen.info is None:
+        silent = because("site.status.absent" if seen is None else "site.status.unanswered")
         return ServiceStatus(
-            host=host, robot=robot, service=service, standing=ServiceState.SILENT, reason="it is not on the bus"
+            host=host, robot=robot, service=service, standing=ServiceState.SILENT, reason=str(silent), why=silent
         )
-    if seen.info is None:
-        reason = "it is on the bus, and does not answer"
-        return ServiceStatus(host=host, robot=robot, service=service, standing=ServiceState.SILENT, reason=reason)
-    info, clock = seen.info, seen.clock
-    standing, reason = ServiceState.READY, ""
+    info, clock, why = seen.info, seen.clock, None
+    standing = ServiceState.READY
     if other := _other_host(site, host, info.host):
-        standing, reason = ServiceState.ELSEWHERE, f"it runs on {other}; the file has it on {host}"
+        standing, why = ServiceState.ELSEWHERE, because("site.status.elsewhere", other=other, host=host)
     elif not info.ready:
-        standing, reason = ServiceState.NOT_READY, info.problem or "it does not say why"
+        standing, why = ServiceState.NOT_READY, _problem(info) or because("site.status.unexplained")
     return ServiceStatus(
-        host=host, robot=robot, service=service, standing=standing, reason=reason, machine=info.host,
+        host=host, robot=robot, service=service, standing=standing, reason=str(why or ""), why=why, machine=info.host,
         version=info.version, pid=info.pid, clock_offset=None if clock is None else clock.offset,
         clock_bound=0.0 if clock is None else clock.bound, certificate_ends=info.certificate_ends,
     )  # fmt: skip
@@ -121,44 +121,51 @@ def _other_host(site: Site, host: str, machine: str) -> str:
     return next((name for name, each in site.hosts.items() if machine in (name, each.address)), "")
 
 
-def _from_others(service: str, robot: str, seen: Mapping[str, SeenRobot]) -> tuple[ServiceState, str]:
+def _from_others(service: str, robot: str, seen: Mapping[str, SeenRobot]) -> tuple[ServiceState, Reason | None]:
     """What is not on the bus, by those that need it."""
     at = seen.get(robot, SeenRobot())
     match service:
         case _ if service == ROUTER:
-            return ServiceState.READY, ""  # all this came through it
+            return ServiceState.READY, None  # all this came through it
         case _ if service == BROKER:
             devices = [each.device for each in seen.values() if each.device is not None]
             if any(each.online for each in devices):
-                return ServiceState.READY, ""
-            why = next((each.reason for each in devices if each.reason), "no gateway says anything of its device")
-            return ServiceState.UNKNOWN, why
+                return ServiceState.READY, None
+            why = next((found for each in devices if (found := _offline(each)) is not None), None)
+            return ServiceState.UNKNOWN, why or because("site.status.no_gateway")
         case _ if service == DEVICE:
             if at.device is None:
-                return ServiceState.UNKNOWN, f"{GATEWAY} says nothing of it"
-            return (
-                (ServiceState.READY, "")
-                if at.device.online
-                else (ServiceState.SILENT, at.device.reason or "it is offline")
-            )
+                return ServiceState.UNKNOWN, because("site.status.says_nothing", service=GATEWAY)
+            if at.device.online:
+                return ServiceState.READY, None
+            return ServiceState.SILENT, _offline(at.device) or because("site.status.offline")
         case _:
             shown = at.nodes.get(VISUALIZER)
             if service != VIEWER or shown is None or shown.info is None:
-                return ServiceState.UNKNOWN, f"{VISUALIZER} says nothing of it"
-            return (ServiceState.READY, "") if shown.info.ready else (ServiceState.UNKNOWN, shown.info.problem)
+                return ServiceState.UNKNOWN, because("site.status.says_nothing", service=VISUALIZER)
+            return (ServiceState.READY, None) if shown.info.ready else (ServiceState.UNKNOWN, _problem(shown.info))
+
+
+def _offline(device: DeviceStatus) -> Reason | None:
+    return device.why or (plain(device.reason) if device.reason else None)
+
+
+def _problem(info: NodeInfo) -> Reason | None:
+    return info.why or (plain(info.problem) if info.problem else None)
 
 
 def _not_expected(site: Site, seen: Mapping[str, SeenRobot]) -> Iterator[ServiceStatus]:
     """Services, and robots, that the file does not have; nodes of people and programs are everybody's."""
     wanted = {(process.robot, process.service.name) for host in site.hosts for process in processes(site, host)}
     for robot, at in seen.items():
-        reason = "the file does not have it" if robot in site.robots else f"the file has no robot {robot}"
+        no_robot = because("site.status.no_robot", robot=robot)
+        why = because("site.status.not_in_file") if robot in site.robots else no_robot
         for name, node in at.nodes.items():
             if name not in SERVICES or (robot, name) in wanted:
                 continue
             info, clock = node.info or NodeInfo(), node.clock
             yield ServiceStatus(
-                host="", robot=robot, service=name, standing=ServiceState.NOT_EXPECTED, reason=reason,
+                host="", robot=robot, service=name, standing=ServiceState.NOT_EXPECTED, reason=str(why), why=why,
                 machine=info.host,
                 version=info.version, pid=info.pid, clock_offset=None if clock is None else clock.offset,
                 clock_bound=0.0 if clock is None else clock.bound,

@@ -143,7 +143,7 @@ def send_goal(
             handle = client.send(goal, on_feedback=on_feedback if with_feedback else None)
         except GoalRefused as error:
             raise CommandError(because("refused.by", reason_of(error), server=action.server)) from error
-        say({"accepted": handle.goal_id}, f"accepted: goal {handle.goal_id}")
+        say({"accepted": handle.goal_id}, sentence(because("cli.action.accepted", goal=handle.goal_id)))
         outcome = handle.wait(LONGEST_HOLD, on_tick=cancel_once)
     result = indented(outcome.result) if outcome.result else ""
     say(

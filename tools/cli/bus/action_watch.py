@@ -15,6 +15,7 @@ from gemelo.tools.cli.bus.action import action_of, action_option, indented
 from gemelo.tools.cli.bus.field_path import FieldPath
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown, usage
 from gemelo.tools.cli.common.forms import Form, count_options, csv_lines, form_options, json_line, yaml_document
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.parser import Options, Parser
 
@@ -77,7 +78,10 @@ class GoalStatement(NamedTuple):
     def text(self) -> str:
         """For a person."""
         if isinstance(self.message, GoalStatus):
-            return f"goal {self.goal} of {self.message.client or 'nobody'}: {self.message.status.name}"
+            status = self.message.status.name
+            if not self.message.client:
+                return sentence(because("cli.action.status.nobody", goal=self.goal, status=status))
+            return sentence(because("cli.action.status", goal=self.goal, client=self.message.client, status=status))
         of_goal = f" of {self.goal}" if self.part == "feedback" else ""
         told = indented(self.message) if self.message is not None else f"  # {self.problem}\n"
         return f"{self.part}{of_goal}:\n{told}---"
@@ -127,8 +131,10 @@ def _whole(session: CommandSession, action: Action[Any, Any, Any], begin: str) -
     found = [each.goal_id for each in goals if each.goal_id.startswith(begin)]
     if len(found) != 1:
         known = ", ".join(f"{each.goal_id} ({each.status.name})" for each in goals) or "none"
-        problem = f'no goal begins with "{begin}"' if not found else f'{len(found)} goals begin with "{begin}"'
-        raise CommandError(f"{problem}; {action.key} knows {known}")
+        why = because("cli.action.known", action=action.key, goals=known)
+        if not found:
+            raise CommandError(because("cli.action.no_goal", why, begin=begin))
+        raise CommandError(because("cli.action.goals", why, begin=begin, count=len(found)))
     return found[0]
 
 

@@ -12,7 +12,7 @@ import msgspec
 
 from gemelo.schemas.message import Message
 from gemelo.schemas.reasons import because
-from gemelo.tools.cli.common.errors import CommandError, nearest, usage
+from gemelo.tools.cli.common.errors import CommandError, hint_of, usage
 
 _UNIT = re.compile(r"\[[^\]]+\](?: or \[[^\]]+\])*")
 _PART = re.compile(r"([A-Za-z_][A-Za-z_0-9]*)((?:\[-?\d+\])*)")
@@ -65,9 +65,8 @@ class FieldPath:
         return unit
 
     def _refuse(self, name: str, known: tuple[str, ...]) -> None:
-        guess = nearest(name, known)
-        hint = f'did you mean "{guess}"?' if guess else f"there is {', '.join(known) or 'none'}"
-        raise usage(f'{self._kind.__name__} has no field "{name}": {hint}')
+        hint = hint_of(name, known, is_sorted=False)
+        raise usage(because("cli.field.unknown", hint, message=self._kind.__name__, field=name))
 
 
 def _is_message(kind: object) -> bool:

@@ -13,9 +13,11 @@ import msgspec.structs
 
 import gemelo.schemas
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import ACTIONS, REQUESTS, TOPICS
 from gemelo.tools.cli.common.errors import ExitCode, unknown
 from gemelo.tools.cli.common.forms import print_value
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.parser import Choices, Options, Parser
 
 if TYPE_CHECKING:
@@ -109,10 +111,11 @@ def _named_in(kind: type[Message], known: dict[str, type[Message]]) -> list[str]
 
 
 def _uses(kind: type[Message]) -> Iterator[str]:
-    yield from (f"topic {topic.key}: {topic.about}" for topic in TOPICS if topic.message is kind)
-    yield from (f"request {each.key}: what is asked" for each in REQUESTS if each.request is kind)
-    yield from (f"request {each.key}: the answer" for each in REQUESTS if each.response is kind)
+    uses = [because("cli.interface.topic", key=each.key, about=each.about) for each in TOPICS if each.message is kind]
+    uses += [because("cli.interface.request", key=each.key) for each in REQUESTS if each.request is kind]
+    uses += [because("cli.interface.answer", key=each.key) for each in REQUESTS if each.response is kind]
+    yield from map(sentence, uses)
     for action in ACTIONS:
         for part, message in (("goal", action.goal), ("feedback", action.feedback), ("result", action.result)):
             if message is kind:
-                yield f"action {action.key}: its {part}"
+                yield sentence(because("cli.interface.action", key=action.key, part=part))

@@ -11,7 +11,7 @@ import msgspec
 
 from gemelo.schemas.message import Message
 from gemelo.schemas.reasons import because
-from gemelo.tools.cli.common.errors import nearest, usage
+from gemelo.tools.cli.common.errors import hint_of, usage
 
 INDENT = "  "
 _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
@@ -34,9 +34,8 @@ def message_of(kind: type[Message], text: str) -> Any:
             )
         for field in raw:
             if field not in kind.__struct_fields__:
-                guess = nearest(field, kind.__struct_fields__)
-                hint = f'did you mean "{guess}"?' if guess else f"it has {', '.join(kind.__struct_fields__)}"
-                raise usage(f'{kind.__name__} has no field "{field}": {hint}')
+                hint = hint_of(field, kind.__struct_fields__, is_sorted=False)
+                raise usage(because("cli.field.unknown", hint, message=kind.__name__, field=field))
         return msgspec.convert(raw, kind)
     except (msgspec.DecodeError, ValueError) as error:
         raise usage(because("cli.message.not_one", message=kind.__name__, error=str(error))) from error

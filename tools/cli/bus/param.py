@@ -13,6 +13,7 @@ from gemelo.tools.cli.bus.messages import dump
 from gemelo.tools.cli.bus.node import TIMEOUT, living, node_option, require_alive
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, hint_of, usage
 from gemelo.tools.cli.common.forms import print_value
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options, Parser, json_option
@@ -133,8 +134,8 @@ def change_parameter(
     after = session.node.call(parameter_request(node), question, timeout=TIMEOUT)
     if save and not after.saved_in:  # an older node knows of no `save`
         raise CommandError(because("cli.param.not_saved", node=node, name=after.name, value=written(after.value)))
-    kept = f", saved in {after.saved_in}" if save else ""
-    return f"{node} {after.name}: {written(parameter.value)} -> {written(after.value)}{kept}"
+    change = f"{node} {after.name}: {written(parameter.value)} -> {written(after.value)}"
+    return sentence(because("cli.param.saved", change=change, file=after.saved_in)) if save else change
 
 
 def require_in_range(node: str, parameter: Parameter, value: ParameterValue) -> None:

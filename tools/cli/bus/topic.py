@@ -17,6 +17,7 @@ from gemelo.tools.cli.bus.messages import dump, fields_of, message_of
 from gemelo.tools.cli.bus.topic_ends import Ends, ends
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown
 from gemelo.tools.cli.common.forms import Form, count_options, form_of, form_options, print_value, yaml_document
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option, positive_integer, positive_number
@@ -195,7 +196,7 @@ def publish(
 
     session.node.wait(0.3)  # until the readers are known
     session.node.spin(step, rate=rate or 1.0)
-    print(f"published {sent} x {topic.message.__name__} on {topic.key}")
+    print(sentence(because("cli.topic.published", count=sent, message=topic.message.__name__, topic=topic.key)))
     return ExitCode.OK
 
 

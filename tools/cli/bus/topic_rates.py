@@ -17,6 +17,7 @@ from gemelo.tools.cli.bus.living_topics import connected
 from gemelo.tools.cli.bus.topic import listen, topic_option
 from gemelo.tools.cli.common.errors import ExitCode, usage
 from gemelo.tools.cli.common.forms import Form, count_options, form_of, form_options
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import CommandSession
 from gemelo.tools.cli.parser import Options, Parser, positive_integer
 
@@ -33,11 +34,8 @@ class MeasuredRate(msgspec.Struct, frozen=True, kw_only=True):
     window: int  # messages
 
     def __str__(self) -> str:
-        return (
-            f"average rate: {self.rate:.3f}\n"
-            f"\tmin: {self.gap_min:.3f}s max: {self.gap_max:.3f}s "
-            f"std dev: {self.gap_deviation:.5f}s window: {self.window}"
-        )
+        gaps = {"least": self.gap_min, "most": self.gap_max, "deviation": self.gap_deviation}
+        return sentence(because("cli.topic.rate", rate=self.rate, window=self.window, **gaps))
 
 
 class Bandwidth(msgspec.Struct, frozen=True, kw_only=True):
@@ -50,10 +48,9 @@ class Bandwidth(msgspec.Struct, frozen=True, kw_only=True):
     window: int  # messages
 
     def __str__(self) -> str:
-        return (
-            f"{self.bytes_per_second / 1000.0:.2f} kB/s from {self.window} messages\n"
-            f"\tmessage size mean: {self.size_mean:.0f} B min: {self.size_min} B max: {self.size_max} B"
-        )
+        sizes = {"mean": self.size_mean, "least": self.size_min, "most": self.size_max}
+        rate = self.bytes_per_second / 1000.0
+        return sentence(because("cli.topic.bandwidth", rate=rate, window=self.window, **sizes))
 
 
 class Delay(msgspec.Struct, frozen=True, kw_only=True):
@@ -69,10 +66,8 @@ class Delay(msgspec.Struct, frozen=True, kw_only=True):
         mean, least, most, deviation = (
             1000.0 * each for each in (self.delay_mean, self.delay_min, self.delay_max, self.delay_deviation)
         )
-        return (
-            f"average delay: {mean:.2f} ms\n\tmin: {least:.2f} ms max: {most:.2f} ms "
-            f"std dev: {deviation:.2f} ms window: {self.window}"
-        )
+        times = {"mean": mean, "least": least, "most": most, "deviation": deviation}
+        return sentence(because("cli.topic.delay", window=self.window, **times))
 
 
 Report = Callable[[], MeasuredRate | Bandwidth | Delay | None]
@@ -234,7 +229,8 @@ def _reported(
         heard = total()
         if found is None and form is not str:
             return
-        print(f"no new messages on {topic.key}" if found is None else form(found), flush=True)
+        silence = because("cli.topic.silent", topic=topic.key)
+        print(sentence(silence) if found is None else form(found), flush=True)
         reports += 1
         if reports == count:
             session.node.stop()

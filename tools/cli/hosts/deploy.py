@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 from gemelo.libraries.runtime.deployment import DEFAULT_FILE, load_deployment, project_root
 from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.reasons import because
 from gemelo.schemas.site import Site
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown
+from gemelo.tools.cli.common.language import columns, sentence, word
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options, Parser, positive_number
 
@@ -68,11 +70,21 @@ def run_check(options: Options) -> ExitCode:
     for name, host in site.hosts.items():
         running = ", ".join(process.unit.removeprefix("gemelo-") for process in processes(site, name))
         needed = f'EXTRAS="{" ".join(extras(site, name))}"'
-        rows.append((name, host.address, running or "-", ", ".join(host.roles) or "-", days.get(name, "-"), needed))
-    print(table(("host", "address", "runs", "people", "certificates", "make setup"), rows))
+        rows.append(
+            (
+                name,
+                host.address,
+                running or "-",
+                ", ".join(host.roles) or "-",
+                sentence(days[name]) if name in days else "-",
+                needed,
+            )
+        )
+    print(table(columns("host", "address", "runs", "people", "certificates", "make setup"), rows))
     near = endings(made)
     try:
-        print("\n".join((*near, *((renewal(site),) if near else ()), *authority_told(site, site_folder(site)))))
+        found = (*near, *((renewal(site),) if near else ()), *authority_told(site, site_folder(site)))
+        print("\n".join(map(sentence, found)))
     except ConfigurationError as error:
         raise CommandError(error) from error
     return ExitCode.OK
@@ -91,11 +103,9 @@ def run_render(options: Options) -> ExitCode:
         try:
             files = ", ".join(str(file.relative_to(folder)) for file in write(site, host, folder))
         except OSError as error:
-            raise CommandError(f"{error.filename}: {error.strerror}") from error
+            raise _unwritten(error) from error
         print(f"{said_folder(site, host)}: {files}")
-    print(
-        f"the folder of a host goes to {site.config} there, and its systemd/ to /etc/systemd/system (deploy/README.md)"
-    )
+    print(sentence(because("site.rendered", folder=site.config)))
     return ExitCode.OK
 
 
@@ -112,16 +122,21 @@ def run_keys(options: Options) -> ExitCode:
             authority_in(site_folder(site)).retire()
         made = make_keys(site, site_folder(site), project_root(), options.renew_within)
     except OSError as error:
-        raise CommandError(f"{error.filename}: {error.strerror}") from error
+        raise _unwritten(error) from error
     except ConfigurationError as error:
         raise CommandError(error) from error
     rows = [
-        (each.host, each.name, time.strftime("%Y-%m-%d", time.gmtime(each.expires)), "new" if each.is_new else "kept")
+        (
+            each.host,
+            each.name,
+            time.strftime("%Y-%m-%d", time.gmtime(each.expires)),
+            word("key", "new" if each.is_new else "kept"),
+        )
         for each in made
     ]
-    print(table(("host", "certificate of", "valid until", ""), rows))
-    print(f"in {said_folder(site)}, for you alone. Its authority/ stays here; keys/ and broker/ of a host go to it")
-    print("\n".join(authority_told(site, site_folder(site))))
+    print(table((*columns("host", "certificate of", "valid until"), ""), rows))
+    print(sentence(because("site.keys.made", folder=str(said_folder(site)))))
+    print("\n".join(map(sentence, authority_told(site, site_folder(site)))))
     return ExitCode.OK
 
 
@@ -137,15 +152,23 @@ def run_install(options: Options) -> ExitCode:
         commands = install.commands(site, options.host, site_folder(site) / options.host)
         if old := outdated(site, options.host, site_folder(site) / options.host):
             file = said_folder(site, options.host) / old
-            raise CommandError(f"{file} is not what the site's file says now: `gemelo deploy render {options.site}`")
+            raise CommandError(because("site.install.outdated", file=str(file), site=str(options.site)))
         for command in commands:
             print(shlex.join(command), flush=True)
         if not options.dry_run:
             install.run(commands)
-            print("what ran already runs on with its old files: `systemctl restart gemelo.target` there, arm at rest")
+            print(sentence(because("site.install.running")))
     except ConfigurationError as error:
         raise CommandError(error) from error
     return ExitCode.OK
+
+
+def _date(at: float) -> str:
+    return time.strftime("%Y-%m-%d", time.gmtime(at))
+
+
+def _unwritten(error: OSError) -> CommandError:
+    return CommandError(because("cli.file.unwritable", file=str(error.filename), error=str(error.strerror)))
 
 
 def site_named(name: str) -> Site:

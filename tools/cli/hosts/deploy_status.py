@@ -16,11 +16,13 @@ from gemelo.libraries.runtime.node_clock import ask_about
 from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.roles import ROLE_OF_NODE
 from gemelo.schemas.site import Site
 from gemelo.schemas.topics import DEVICE_STATUS
 from gemelo.tools.cli.bus.node import is_command
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
+from gemelo.tools.cli.common.language import columns, reason_or, sentence, word
 from gemelo.tools.cli.common.session import own_name, require_router
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.hosts.deploy import made_here, said_folder, site_named, site_option
@@ -51,23 +53,31 @@ def run(options: Options) -> ExitCode:
     if options.json:
         print(msgspec.json.encode(found).decode())
     else:
-        print(table(HEADINGS, [_row(each) for each in found]))
+        print(table(columns(*HEADINGS), [_row(each) for each in found]))
         print(summary(found))
-        for line in certificates_told(site, found, deployment):
-            print(line)
+        for each in certificates_told(site, found, deployment):
+            print(sentence(each))
     return ExitCode.OK if is_well(found) else ExitCode.FAILED
 
 
 def summary(found: Iterable[ServiceStatus]) -> str:
     """One sentence about all, and one where hosts have different versions."""
     rows = tuple(found)
-    wrong = [f"{each.service} of {each.robot or 'the site'} is {each.standing}" for each in rows
-             if each.standing is not ServiceState.READY]  # fmt: skip
-    lines = ["; ".join(wrong) if wrong else f"all {len(rows)} are ready"]
+    wrong = [
+        because(
+            "site.status.is_not", service=each.service, of=each.robot or word("site", "site"), standing=each.standing
+        )
+        for each in rows
+        if each.standing is not ServiceState.READY
+    ]
+    lines = ["; ".join(map(sentence, wrong)) if wrong else sentence(because("site.status.all", count=len(rows)))]
     versions = {each.version: each for each in rows if each.version}
     if len(versions) > 1:
-        told = ", ".join(f"{version} ({each.service} on {each.machine})" for version, each in sorted(versions.items()))
-        lines.append(f"versions differ: {told}: install one on all hosts")
+        differ = [
+            sentence(because("site.status.version", version=version, service=each.service, machine=each.machine))
+            for version, each in sorted(versions.items())
+        ]
+        lines.append(sentence(because("site.status.versions", versions=", ".join(differ))))
     return "\n".join(lines)
 
 
@@ -82,7 +92,7 @@ def shown_certificates(site: Site, deployment: Deployment) -> dict[str, float | 
     }
 
 
-def certificates_told(site: Site, found: Iterable[ServiceStatus], deployment: Deployment) -> Iterator[str]:
+def certificates_told(site: Site, found: Iterable[ServiceStatus], deployment: Deployment) -> Iterator[Reason]:
     """How many days each host's certificates still have; those that end within a month, have ended, or are old."""
     if not deployment.router.tls:
         return
@@ -93,12 +103,14 @@ def certificates_told(site: Site, found: Iterable[ServiceStatus], deployment: De
     )  # fmt: skip
     own = Path(deployment.router.certificate)
     days = days_by_host(running)
-    told = (f"{host} {days.get(host, 'not known')}" for host in site.hosts)
-    yield f"certificates: {', '.join(told)}, yours {in_days(expiry(own))}"
+    unknown = because("site.days.unknown")
+    told = ", ".join(f"{host} {sentence(days.get(host, unknown))}" for host in site.hosts)
+    yield because("site.certificates", in_days(expiry(own)), hosts=told)
     silent = {each.host for each in rows if each.standing is ServiceState.SILENT}
     here = made_here(site)
-    near = [*endings((*running, Certificate("this host", own.stem, expiry(own))))]
-    near += [f"{each}, by the file in {said_folder(site)}" for each in endings(c for c in here if c.host in silent)]
+    near = [*endings((*running, Certificate(word("site", "this host"), own.stem, expiry(own))))]
+    by_file = endings(each for each in here if each.host in silent)
+    near += [because("site.certificate.by_file", each, folder=str(said_folder(site))) for each in by_file]
     yield from (*near, renewal(site)) if near else ()
     yield from older(running, here)
 
@@ -138,17 +150,21 @@ def _deployment(site: Site) -> Deployment:
     own, wanted = deployment.router, site.hosts[site.router.host]
     if (own.host, own.port) != (wanted.address, site.router.port):
         raise usage(
-            f"the router of {site.name} is {wanted.address}:{site.router.port}, and this deployment's is "
-            f"{own.host}:{own.port}: export GEMELO_CONFIG={site.config}/{next(iter(site.robots), 'rm1')}.toml, on a "
-            "host where people work (roles)"
+            because(
+                "site.status.other_router",
+                site=site.name,
+                wanted=f"{wanted.address}:{site.router.port}",
+                own=f"{own.host}:{own.port}",
+                file=f"{site.config}/{next(iter(site.robots), 'rm1')}.toml",
+            )
         )
     return deployment
 
 
 def _row(each: ServiceStatus) -> tuple[str, ...]:
     clock = "-" if each.clock_offset is None else str(ClockOffset(each.clock_offset, each.clock_bound))
-    certificate = "-" if each.certificate_ends is None else in_days(each.certificate_ends)
+    certificate = "-" if each.certificate_ends is None else sentence(in_days(each.certificate_ends))
     return (
-        each.host or "-", each.robot or "-", each.service, each.standing, each.machine or "-", each.version or "-",
-        clock, certificate, each.reason or "-",
+        each.host or "-", each.robot or "-", each.service, word("standing", each.standing), each.machine or "-",
+        each.version or "-", clock, certificate, reason_or(each.why, each.reason) or "-",
     )  # fmt: skip

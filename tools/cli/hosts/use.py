@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from gemelo.libraries.runtime.running import running_robots
 from gemelo.libraries.runtime.started import choose_name, chosen_name, load_started
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown, usage
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.parser import Options, Parser
 
 
@@ -21,24 +23,24 @@ def run(options: Options) -> ExitCode:
     running = sorted(running_robots(router))
     if options.robot and options.robot not in running:
         if not running:
-            raise CommandError(f"no robot runs at {router.host}:{router.port}: start it first", ExitCode.NO_STACK)
+            raise CommandError(because("cli.use.nothing", host=router.host, port=router.port), ExitCode.NO_STACK)
         raise unknown("robot that runs", options.robot, running)
     if options.robot or options.none:
         try:
             choose_name(options.robot)
         except OSError as error:
-            raise usage(f"the choice cannot be written: {error}") from error
-    print(standing(running, chosen_name()))
+            raise usage(because("cli.use.unwritten", error=str(error))) from error
+    print(sentence(standing(running, chosen_name())))
     return ExitCode.OK
 
 
-def standing(running: list[str], chosen: str) -> str:
+def standing(running: list[str], chosen: str) -> Reason:
     """What runs, and which robot commands without `--robot` are for."""
-    runs = f"{', '.join(running)} runs" if len(running) == 1 else f"{', '.join(running) or 'none'} run"
+    names = ", ".join(running)
     if len(running) == 1:
-        return f"{runs}: commands of this folder are for it"
+        return because("cli.use.one", robot=names)
     if chosen in running:
-        return f"{runs}: commands of this folder are for {chosen}"
+        return because("cli.use.chosen", robots=names, chosen=chosen)
     if not running:
-        return f"{runs}" + (f"; of several {chosen} is chosen" if chosen else "")
-    return f"{runs}, and none is chosen: `gemelo use {running[0]}`, or `gemelo --robot {running[0]} ...` with each"
+        return because("cli.use.none_but", chosen=chosen) if chosen else because("cli.use.none")
+    return because("cli.use.which", robots=names, first=running[0])

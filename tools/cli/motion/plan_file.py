@@ -13,6 +13,7 @@ from gemelo.schemas.planning import PlanResponse
 from gemelo.schemas.reasons import because, plain
 from gemelo.schemas.text_file import decode_text
 from gemelo.tools.cli.common.errors import CommandError, usage
+from gemelo.tools.cli.common.language import word
 
 if TYPE_CHECKING:
     from gemelo import Plan
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 STANDARD_INPUT = "-"
 LARGEST_FILE = 100_000_000  # [bytes] a trajectory of an hour has a tenth of it
-HOW_TO_WRITE = "`gemelo move ... --plan-only --json > plan.json` writes one"
 
 
 class PlanFile(msgspec.Struct, frozen=True, kw_only=True):
@@ -36,11 +36,11 @@ def read_plan(source: str, arm: ArmDescription) -> Plan:
     Raises `CommandError` naming the file if it holds no plan, or one that `arm` cannot follow. Whether the arm stands
     where the plan begins, and whether the scene is still the one that it was made in, is the gateway's to judge.
     """
-    name = "standard input" if source == STANDARD_INPUT else source
+    name = word("file", "standard input") if source == STANDARD_INPUT else source
     try:
         saved = msgspec.json.decode(decode_text(_read(source, name)), type=PlanFile)
     except (msgspec.MsgspecError, ValueError) as error:
-        raise usage(f"{name} holds no plan: {error}; {HOW_TO_WRITE}") from error
+        raise usage(because("cli.plan.not_one", name=name, error=str(error))) from error
     if saved.robot != arm.name:
         raise usage(because("cli.plan.other_robot", name=name, planned=saved.robot, robot=arm.name))
     _require_trajectory(saved.response, name, arm)
@@ -65,7 +65,7 @@ def _require_trajectory(plan: PlanResponse, name: str, arm: ArmDescription) -> N
         raise CommandError(because("cli.plan.refusal", plan.refusal.why or plain(plan.refusal.message), name=name))
     joints = plan.trajectory.joint_names
     if not plan.trajectory.points:
-        raise usage(f"{name} holds a plan without a trajectory; {HOW_TO_WRITE}")
+        raise usage(because("cli.plan.empty", name=name))
     if sorted(joints) != sorted(arm.joint_names):
         planned, own = ", ".join(joints) or "-", ", ".join(arm.joint_names)
         raise usage(because("cli.plan.joints", name=name, planned=planned, robot=arm.name, joints=own))

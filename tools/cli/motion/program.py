@@ -27,8 +27,9 @@ from gemelo.programs import (
     path_text,
     programs_folder,
 )
-from gemelo.schemas.reasons import because
-from gemelo.tools.cli.common.errors import ExitCode, hint_of, usage
+from gemelo.schemas.reasons import because, plain
+from gemelo.tools.cli.common.errors import ExitCode, hint_of, text_of, usage
+from gemelo.tools.cli.common.language import columns, sentence, word
 from gemelo.tools.cli.common.session import connect_arm, load_robot, reported
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option
@@ -73,9 +74,9 @@ def run_list(options: Options) -> ExitCode:
     if options.json:
         print(json.dumps({"folder": str(programs.folder), "programs": rows}))
     elif not rows:
-        print(f"no programs in {programs.folder}")
+        print(sentence(because("program.list.none", folder=str(programs.folder))))
     else:
-        print(table(("program", "steps", "robot", ""), [_cells(row) for row in rows]))
+        print(table((*columns("program", "steps", "robot"), ""), [_cells(row) for row in rows]))
     return ExitCode.OK
 
 
@@ -124,7 +125,7 @@ def run_export(options: Options) -> ExitCode:
         Path(options.file).write_text(script, encoding="utf-8")
     except OSError as error:
         raise usage(because("cli.file.unwritable", file=str(options.file), error=str(error.strerror))) from error
-    print(f"wrote {options.file}: python {options.file} runs it")
+    print(sentence(because("program.exported", file=str(options.file))))
     return ExitCode.OK
 
 
@@ -172,28 +173,35 @@ def _row(programs: Programs, name: str, robot: gemelo.Robot, points: Points) -> 
 def _cells(row: dict[str, object]) -> tuple[str, str, str, str]:
     mistakes = row["mistakes"]
     assert isinstance(mistakes, list)
-    said = f"{len(mistakes)} mistake{'s' if len(mistakes) > 1 else ''}: gemelo program check {row['name']}"
+    code = "program.list.mistakes" if len(mistakes) > 1 else "program.list.mistake"
+    said = sentence(because(code, count=len(mistakes), name=str(row["name"])))
     steps = row["steps"]
-    return str(row["name"]), "?" if steps is None else str(steps), str(row["robot"] or "any"), said if mistakes else ""
+    robot = str(row["robot"] or word("program", "any"))
+    return str(row["name"]), "?" if steps is None else str(steps), robot, said if mistakes else ""
 
 
 def _show_leg(leg: CheckedLeg) -> None:
     where = ", ".join(path_text(path) for path in leg.paths)
     if leg.refusal is not None:
-        said = str(leg.refusal)
+        said = text_of(leg.refusal)
     elif leg.margins:
         joint, margin = leg.tightest
-        said = f"{leg.duration:.2f} s, {leg.planner} in {leg.planning_time * 1e3:.0f} ms, {joint} has {margin:.0%} left"
+        times = {"duration": leg.duration, "planned": 1e3 * leg.planning_time}
+        said = sentence(because("program.leg", planner=leg.planner, joint=joint, margin=margin, **times))
     else:
-        said = f"{leg.duration:.2f} s" if leg.duration else ""
-    print(f"{where}: {leg.text}: {said or 'ok'}{f' ({leg.note})' if leg.note else ''}", flush=True)
+        said = f"{leg.duration:.2f} s" if leg.duration else word("program", "ok")
+    note = f" ({'; '.join(map(sentence, leg.notes))})" if leg.notes else ""
+    print(f"{where}: {leg.text}: {said}{note}", flush=True)
 
 
 def _verdict(check: ProgramCheck) -> str:
-    note = f"\n{check.note}" if check.note else ""
+    notes = [check.left_out] if check.left_out is not None else []
     if check.ok:
-        return f"{check.program}: it can run, {check.duration:.2f} s{note}"
-    return "\n".join([f"{check.program}: it cannot run", *map(str, check.mistakes), *map(str, check.refusals)]) + note
+        can = because("program.check.can", program=check.program, duration=check.duration)
+        return "\n".join(map(sentence, (can, *notes)))
+    cannot = because("program.check.cannot", program=check.program)
+    mistakes = (mistake.reason for mistake in check.mistakes)
+    return "\n".join(map(sentence, (cannot, *mistakes, *check.refusals, *notes)))
 
 
 def _check_fields(check: ProgramCheck) -> dict[str, object]:
@@ -222,8 +230,10 @@ def _show_steps() -> Callable[[RunState], None]:
         now = [state.steps, state.rounds]
         if state.status is RunStatus.RUNNING and state.steps and now != last:
             last[:] = now
-            rounds = f", round {'.'.join(str(each + 1) for each in state.rounds)}" if state.rounds else ""
-            print(f"step {', '.join(path_text(path) for path in state.steps)}{rounds}: {state.text}", flush=True)
+            step = {"step": ", ".join(path_text(path) for path in state.steps), "text": state.text}
+            rounds = ".".join(str(each + 1) for each in state.rounds)
+            in_round = because("program.step.in_round", round=rounds, **step)
+            print(sentence(in_round if rounds else because("program.step", **step)), flush=True)
 
     return show
 
@@ -234,14 +244,15 @@ def _await(run: ProgramRun, quiet: bool) -> RunState:
         return run.wait()
     except KeyboardInterrupt:
         if not quiet:
-            print("stopping: the arm slows down on its path (Ctrl-C again leaves without waiting)", flush=True)
+            print(sentence(because("program.stopping")), flush=True)
         run.stop()
         return run.wait(BRAKING)
 
 
 def _end_text(state: RunState, joints: dict[str, float], robot: gemelo.Robot) -> str:
     if state.status is RunStatus.DONE:
-        return f"{state.program}: done, {state.done} steps"
+        return sentence(because("program.done", program=state.program, count=state.done))
     where = ", ".join(f"{name} {value:.4f} {robot.description.joint(name).unit}" for name, value in joints.items())
     again = f"gemelo program run {shlex.quote(state.program)} --from {path_text(state.step)}"
-    return f"{state.program}: {state.status}: {state.message}; the arm is at {where}\ngo on with: {again}"
+    why, how = state.why or plain(state.message), {"program": state.program, "status": str(state.status)}
+    return sentence(because("program.ended", why, at=where, again=again, **how))

@@ -6,7 +6,9 @@ import shlex
 from argparse import ArgumentTypeError
 from pathlib import Path
 
+from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.parser import Options, Parser
 
 EXAMPLES = """examples:
@@ -47,7 +49,7 @@ def xacro_argument(text: str) -> tuple[str, str]:
     """Name and value of NAME:=VALUE; raises ArgumentTypeError."""
     name, separator, value = text.partition(":=")
     if not separator or not name:
-        raise ArgumentTypeError(f'"{text}" is not NAME:=VALUE')
+        raise ArgumentTypeError(sentence(because("cli.xacro", text=text)))
     return name, value
 
 

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.text_file import read_text
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, require_folder, usage
-from gemelo.tools.cli.common.language import sentence
+from gemelo.tools.cli.common.language import columns, sentence, word
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.common.units import positive_length
 from gemelo.tools.cli.parser import Options, Parser, positive_integer
@@ -163,13 +163,13 @@ def print_matrix(folder: Path, write: bool, always_within: float | None) -> Exit
     wanted, lines = plan_of(text, verdicts)
     print(listing(verdicts))
     for each in (verdict for verdict in verdicts if verdict.is_doubtful):
-        print(f"warning: {arm.srdf_path.name}: {doubt_of(each)}")
+        print(sentence(because("cli.matrix.warning", doubt_of(each), file=arm.srdf_path.name)))
     changed = with_pairs(text, wanted)
-    print("\n".join(lines) if lines else f"{arm.srdf_path} says the same: nothing to change")
+    print("\n".join(lines) if lines else sentence(because("cli.matrix.same", file=str(arm.srdf_path))))
     if lines and write:
         _write(arm.srdf_path, changed)
     elif lines:
-        print("nothing is written: give --write for that")
+        print(sentence(because("cli.matrix.not_written")))
     return ExitCode.OK
 
 
@@ -192,31 +192,34 @@ def plan_of(text: str, verdicts: list[LinkPairData]) -> tuple[dict[tuple[str, st
             first, *rest = sorted(pair)
             wanted[(first, rest[0] if rest else first)] = reason
         elif pair not in found or found[pair].reason is None:
-            lines.append(f"remove {' and '.join(sorted(pair))} ({reason}): {_why(found.get(pair))}")
+            first, second = sorted(pair)
+            why = _why(found.get(pair))
+            lines.append(sentence(because("cli.matrix.remove", why, first=first, second=second, reason=reason)))
     for pair, verdict in found.items():
         if verdict.reason is not None and present.get(pair, "") in (*ours, ""):
             wanted[verdict.pair] = verdict.reason
             if present.get(pair) != verdict.reason:
-                was = f", was {present[pair]}" if pair in present else ""
-                lines.append(f"add {' and '.join(verdict.pair)} ({verdict.reason}{was})")
+                first, second = verdict.pair
+                added = {"first": first, "second": second, "reason": str(verdict.reason)}
+                was = present.get(pair)
+                change = because("cli.matrix.add", **added) if was is None else because(
+                    "cli.matrix.change", was=was, **added
+                )  # fmt: skip
+                lines.append(sentence(change))
     return wanted, lines
 
 
-def doubt_of(verdict: LinkPairData) -> str:
+def doubt_of(verdict: LinkPairData) -> Reason:
     """Why a pair that is always near is checked all the same, and what would do."""
     first, second = verdict.pair
     near, far = 1000.0 * verdict.nearest, 1000.0 * verdict.farthest
-    return (
-        f"pair {first} and {second}: they are always near ({near:.1f} to {far:.1f} mm), and come to touch as they are "
-        f'drawn -> checked; if that is no collision, write <disable_collisions link1="{first}" link2="{second}" '
-        'reason="User"/>'
-    )
+    return because("cli.matrix.doubt", first=first, second=second, near=near, far=far)
 
 
-def _why(verdict: LinkPairData | None) -> str:
+def _why(verdict: LinkPairData | None) -> Reason:
     if verdict is None:
-        return "one of them has no collision shape"
-    return f"they come as near as {1000.0 * verdict.nearest:.1f} mm"
+        return because("cli.matrix.no_shape")
+    return because("cli.matrix.near", near=1000.0 * verdict.nearest)
 
 
 def listing(verdicts: list[LinkPairData]) -> str:
@@ -224,12 +227,12 @@ def listing(verdicts: list[LinkPairData]) -> str:
     rows = [
         (
             *verdict.pair,
-            verdict.reason or "checked",
+            verdict.reason or word("matrix", "checked"),
             *(f"{1000.0 * d:.1f}" for d in (verdict.nearest, verdict.farthest)),
         )
         for verdict in verdicts
     ]
-    return table(("link", "and link", "is", "nearest [mm]", "farthest [mm]"), rows)
+    return table(columns("link", "and link", "is", "nearest [mm]", "farthest [mm]"), rows)
 
 
 def _write(path: Path, text: str) -> None:
@@ -237,4 +240,4 @@ def _write(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise CommandError(because("cli.file.unwritable", file=str(path), error=str(error.strerror))) from error
-    print(f"{path} is changed; `gemelo check {path.parent}` looks at it as a whole")
+    print(sentence(because("cli.matrix.changed", file=str(path), folder=str(path.parent))))

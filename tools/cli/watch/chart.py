@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from gemelo.schemas.plain_text import escaped
+from gemelo.schemas.reasons import because
+from gemelo.tools.cli.common.language import sentence
 
 BLANK = 0x2800  # the braille character without a dot; each dot is a bit of its number
 DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # of a character, by row and column
@@ -67,8 +69,9 @@ def _headline(curve: ChartCurve, unit: str, colour: str) -> str:
     of = f" [{unit}]" if unit else ""
     values = curve.values
     if not values:
-        return f"{name}{of}: nothing has come yet"
-    return f"{name}{of}: {values[-1]:.6g}, from {min(values):.6g} to {max(values):.6g}"
+        return sentence(because("cli.plot.nothing_yet", curve=f"{name}{of}"))
+    span = {"value": values[-1], "least": min(values), "most": max(values)}
+    return sentence(because("cli.plot.curve", curve=f"{name}{of}", **span))
 
 
 def _span(low: float, high: float) -> tuple[float, float]:

@@ -26,7 +26,7 @@ from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.deployment import Deployment, MqttSection, RouterSection, Wire
 from gemelo.schemas.device import DeviceState, DeviceStatus
 from gemelo.schemas.device_faults import fault_reason
-from gemelo.schemas.device_link import state_round_trip_text, warning_of, why_not_usable
+from gemelo.schemas.device_link import state_round_trip, warning_of, why_not_usable
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.reasons import Reason, Remedy, because, remedy, say_apart
 from gemelo.schemas.system import NodeInfo
@@ -370,8 +370,8 @@ def device(status: DeviceStatus | None, state: DeviceState | None, host: str, no
         return Diagnosis(Verdict.WARNING, "device", because("doctor.device.fault", fault, remedy("reset_when_seen")))
     if state is None:
         return Diagnosis(Verdict.OK, "device", because("doctor.device", device=status.device))
-    trip = state_round_trip_text(state)
-    return Diagnosis(Verdict.OK, "device", because("doctor.device.round_trip", device=status.device, trip=trip))
+    trip = state_round_trip(state)
+    return Diagnosis(Verdict.OK, "device", because("doctor.device.round_trip", trip, device=status.device))
 
 
 def _offline(status: DeviceStatus, now: int) -> Reason:

@@ -28,6 +28,7 @@ from gemelo.tools.cli.common.forms import (
     rows_form_of,
     yaml_document,
 )
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option, positive_number
@@ -122,8 +123,7 @@ def heard(session: CommandSession) -> HeardFrames:
     known = _listen(session)
     session.node.wait(HEARD_FOR)
     if not known.links:
-        remedy = "see with `gemelo node list` that state_publisher runs"
-        raise CommandError(f"no frame has come: {remedy}", ExitCode.NO_STACK)
+        raise CommandError(because("cli.tf.silent"), ExitCode.NO_STACK)
     return known
 
 
@@ -167,8 +167,9 @@ def pose_text(found: FrameTransform) -> str:
     x, y, z = found.transform.translation
     a, b, c, w = found.transform.rotation
     roll, pitch, yaw = (math.degrees(angle) for angle in to_rpy((a, b, c, w)))
+    heading = sentence(because("cli.tf.pose", child=found.child, parent=found.parent))
     return (
-        f"{found.child} in {found.parent}\n"
+        f"{heading}\n"
         f"  point       {1000.0 * x:.2f} {1000.0 * y:.2f} {1000.0 * z:.2f} mm\n"
         f"  rpy         {roll:.3f} {pitch:.3f} {yaw:.3f} deg\n"
         f"  quaternion  {a:.6f} {b:.6f} {c:.6f} {w:.6f}"

@@ -8,11 +8,13 @@ from typing import NamedTuple
 
 import msgspec
 
+from gemelo.schemas.reasons import because
 from gemelo.schemas.system import NodeInfo, NodeStatistics
 from gemelo.schemas.topics import STATISTICS, TOPICS
 from gemelo.tools.cli.bus.node import is_command, told_information_of
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.common.forms import Form, count_options, csv_rows, form_options, json_line
+from gemelo.tools.cli.common.language import sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options, Parser
@@ -47,8 +49,8 @@ class SlowTopic(msgspec.Struct, frozen=True, kw_only=True):
     writer: str
 
     def __str__(self) -> str:
-        heard = f"{self.node} hears {self.topic} {self.heard:.1f} times a second"
-        return f"{heard}; {self.writer} promises {self.promised:g}"
+        rates = {"rate": self.heard, "promised": self.promised}
+        return sentence(because("cli.top.slow", node=self.node, topic=self.topic, writer=self.writer, **rates))
 
 
 class TopReport(msgspec.Struct, frozen=True, kw_only=True):
