@@ -11,6 +11,7 @@ import threading
 import time
 import warnings
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import viser
 
@@ -26,8 +27,10 @@ from gemelo.services.panel.model.readings import Readings
 from gemelo.services.panel.view.arm_pages import arm_pages
 from gemelo.services.panel.view.broken_connections import BrokenConnections
 from gemelo.services.panel.view.own_pages import OwnServer, own_pages_only
-from gemelo.services.panel.view.page import Page
-from gemelo.services.panel.view.world import DrawnWorld
+
+if TYPE_CHECKING:
+    from gemelo.services.panel.view.page import Page
+    from gemelo.services.panel.view.world import DrawnWorld
 
 NAME = "panel"
 APART = 0.02  # [s] at least from the beginning of one picture to the next, however much is dragged
@@ -42,17 +45,28 @@ class Panel:
         self._arm, self._log = arm, log
         self._pages: dict[int, Page] = {}
         self._arms = arm_pages(deployment)
-        self._lock = threading.Lock()
+        self._lock, self._making = threading.Lock(), threading.Lock()
+        self._world: DrawnWorld | None = None
         self._texts_at = -1.0 / TEXTS  # [s] monotonic
         self.operator = Operator(arm)
         self._broken = BrokenConnections(log.warning)
         own_pages = own_pages_only(deployment.panel.host, self._broken, deployment.panel.name)
         with contextlib.redirect_stdout(None), own_pages:  # without its own greeting
             self.server = OwnServer(deployment.panel.host, deployment.panel.port, verbose=False)
-        self.world = DrawnWorld(self.server, self.operator)
         self.server.on_client_connect(self._open)
         self.server.on_client_disconnect(self._close)
         log.info(f"page: http://{deployment.panel.host}:{deployment.panel.port}")
+
+    @property
+    def world(self) -> DrawnWorld:
+        """The picture; made for the first browser, as what draws it is more than half of this process's memory."""
+        with self._making:
+            if self._world is None:
+                from gemelo.services.panel.view.world import DrawnWorld  # slow to load: trimesh comes with it
+
+                self._world = DrawnWorld(self.server, self.operator)
+                gc.freeze()  # as in `run`
+            return self._world
 
     def run(self, stop: ShutdownRequest) -> None:
         """Draws until it is asked to stop, when something has changed; ready while the arm's state is live."""
@@ -61,7 +75,8 @@ class Panel:
             followed = 0.0  # [s] monotonic, of the last picture that somebody asked for
             while not stop.is_set:
                 self.draw(time.monotonic())
-                if self.operator.wait(min(1.0 / TEXTS, self.world.period)):
+                period = 1.0 / TEXTS if self._world is None else min(1.0 / TEXTS, self._world.period)
+                if self.operator.wait(period):
                     time.sleep(max(0.0, followed + APART - time.monotonic()))
                     followed = time.monotonic()
         finally:
@@ -73,9 +88,10 @@ class Panel:
         self._broken.report(now)
         self._arm.node.set_ready(bus.is_live, "" if bus.is_live else "no fresh joint_states")
         joints = bus.joints
-        with self.server.atomic():  # one message for all of it
-            self.world.update(joints)
-        self.server.flush()  # else viser waits for a sixtieth of a second
+        if self._world is not None:
+            with self.server.atomic():  # one message for all of it
+                self._world.update(joints)
+            self.server.flush()  # else viser waits for a sixtieth of a second
         bus.pace.drawn(tuple(joints.values()), now)
         if now - self._texts_at >= 1.0 / TEXTS:
             self._texts_at, readings = now, bus.read()
@@ -102,7 +118,13 @@ class Panel:
             return list(self._pages.values())
 
     def _open(self, client: viser.ClientHandle) -> None:
-        page = Page(client, self.operator, self.world, self._arms)
+        from gemelo.services.panel.view.page import Page  # slow to load: the picture comes with it
+
+        try:
+            page = Page(client, self.operator, self.world, self._arms)
+        except Exception as error:
+            self._log.error("the arm cannot be drawn: %s", error)
+            raise
         with self._lock:
             self._pages[client.client_id] = page
         self._log.info(f"browser {client.client_id} is here; {len(self.pages())} in all")

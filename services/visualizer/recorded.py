@@ -40,8 +40,8 @@ from gemelo.services.visualizer.feeds import feeds
 from gemelo.services.visualizer.model.mesh_files import scene_mesh
 from gemelo.services.visualizer.model.triangle_meshes import ShadedMesh
 from gemelo.services.visualizer.model.urdf import parse_urdf, tool_link
-from gemelo.services.visualizer.program.rerun_program import rerun_binary, start, stop
-from gemelo.services.visualizer.program.screenshot import LOOPBACK, free_port, save_screenshot
+from gemelo.services.visualizer.program.rerun_program import LOOPBACK, free_port, rerun_binary, start, stop
+from gemelo.services.visualizer.program.screenshot import save_screenshot
 from gemelo.services.visualizer.render.layout import ArmLayout, OpeningMoment, blueprint
 from gemelo.services.visualizer.render.sink import APPLICATION, Sink
 from gemelo.services.visualizer.viewer import address, resolved

@@ -29,8 +29,7 @@ from gemelo.libraries.runtime.process.readiness import Readiness
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.deployment import Deployment, ViewerMode, ViewerSection
 from gemelo.services.visualizer.program.host_check import HostCheck, unguessable_host
-from gemelo.services.visualizer.program.rerun_program import rerun_binary, start, stop
-from gemelo.services.visualizer.program.screenshot import free_port
+from gemelo.services.visualizer.program.rerun_program import free_port, rerun_binary, start, stop
 from gemelo.services.visualizer.program.viewer_connection import ViewerConnection
 
 PERIOD = 0.5  # [s] between two looks at the child

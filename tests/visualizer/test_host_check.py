@@ -20,7 +20,7 @@ from gemelo.services.visualizer.program.host_check import (
     refusal,
     unguessable_host,
 )
-from gemelo.services.visualizer.program.screenshot import free_port
+from gemelo.services.visualizer.program.rerun_program import free_port
 
 LOOPBACK = "127.0.0.1"
 LARGE = bytes(range(256)) * 40_000  # 10 MB: more than any buffer on its way

@@ -14,8 +14,7 @@ from gemelo.schemas.deployment import ViewerMode, ViewerSection
 from gemelo.schemas.joints import JointState
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.core import Visualizer
-from gemelo.services.visualizer.program.rerun_program import environment, rerun_binary
-from gemelo.services.visualizer.program.screenshot import free_port
+from gemelo.services.visualizer.program.rerun_program import environment, free_port, rerun_binary
 from gemelo.services.visualizer.render.arms_layout import SharedView
 from gemelo.services.visualizer.render.layout import ArmLayout
 from gemelo.services.visualizer.render.outputs import Outputs, VisualizerParameters

@@ -16,8 +16,7 @@ import pytest
 import rerun as rr
 
 from gemelo.schemas.deployment import ViewerMode, ViewerSection
-from gemelo.services.visualizer.program.rerun_program import environment, rerun_binary
-from gemelo.services.visualizer.program.screenshot import free_port
+from gemelo.services.visualizer.program.rerun_program import environment, free_port, rerun_binary
 from gemelo.services.visualizer.program.viewer_connection import ViewerConnection
 from gemelo.services.visualizer.viewer import CUT_OFF, address, command, resolved
 

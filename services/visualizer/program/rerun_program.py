@@ -5,11 +5,16 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
+
+LOOPBACK = "127.0.0.1"
+PATIENCE = 2.0  # [s] between asking and killing
+_PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
 def rerun_binary() -> Path:
@@ -28,10 +33,6 @@ def environment(inherited: Mapping[str, str]) -> dict[str, str]:
     """The environment of the program: without its usage statistics, which go to a server of its maker."""
     # Rerun 0.41 has no switch of its own for one process; where CI is set it collects and sends nothing.
     return {**inherited, "CI": "1", "RUST_LOG": inherited.get("RUST_LOG", "warn")}
-
-
-PATIENCE = 2.0  # [s] between asking and killing
-_PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
 def start(command: list[str], stderr: int | None = None) -> subprocess.Popen[bytes]:
@@ -53,3 +54,10 @@ def stop(child: subprocess.Popen[bytes]) -> None:
 def _die_with_parent() -> None:
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def free_port(host: str = LOOPBACK) -> int:
+    """A port that is free now on `host`, an address of IPv4's loopback."""
+    with socket.socket() as probe:
+        probe.bind((host, 0))
+        return int(probe.getsockname()[1])

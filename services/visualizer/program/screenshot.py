@@ -18,11 +18,10 @@ import numpy as np
 from rerun.experimental import ViewerClient
 
 from gemelo.services.visualizer.content import entities
-from gemelo.services.visualizer.program.rerun_program import environment, rerun_binary
+from gemelo.services.visualizer.program.rerun_program import LOOPBACK, environment, free_port, rerun_binary
 
 SETTLE = 6.0  # [s] until the viewer's own notices have gone and every chunk is drawn
 DRAWN = 1.5  # [s] until another time is drawn
-LOOPBACK = "127.0.0.1"
 # The viewer's words where it finds nothing that draws (Rerun 0.34: wgpu's, or its own without a render context).
 NOTHING_DRAWS = re.compile(r"(?i)render context|no suitable .*adapter|adapter.*not found|(?:create|request).*adapter")
 
@@ -101,10 +100,3 @@ def _settle(client: ViewerClient, deadline: float) -> None:
         if state.loading or not any(recording.timelines for recording in state.recordings):
             loaded_since = time.monotonic()
         time.sleep(0.25)
-
-
-def free_port(host: str = LOOPBACK) -> int:
-    """A port that is free now on `host`, an address of IPv4's loopback."""
-    with socket.socket() as probe:
-        probe.bind((host, 0))
-        return int(probe.getsockname()[1])
