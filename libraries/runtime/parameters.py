@@ -12,6 +12,7 @@ import msgspec
 
 from gemelo.libraries.runtime.errors import RequestRefused
 from gemelo.libraries.runtime.saved_parameters import SavedParameters
+from gemelo.schemas.reasons import Remedy, because, plain, remedy
 from gemelo.schemas.system import Empty, Parameter, Parameters, ParameterValue, SetParameter
 
 P = TypeVar("P", bound=msgspec.Struct)
@@ -40,18 +41,17 @@ class ParameterSet(Generic[P]):
         self._require(name)
         declared = self._declared[name]
         if strict and isinstance(value, bool) != (declared.type == "bool"):
-            raise RequestRefused(f'{self._node}: parameter "{name}" is a {declared.type}: {value!r} is not')
+            raise RequestRefused(because("parameter.type", type=str(declared.type), **self._of(name, value)))
         if isinstance(value, str) and "\0" in value:
-            raise RequestRefused(
-                f'{self._node}: parameter "{name}" cannot be {value!r}: no path and no name has a NUL in it'
-            )
+            raise RequestRefused(because("parameter.nul", **self._of(name, value)))
         values = {each: getattr(self.value, each) for each in self._declared} | {name: value}
         try:
             changed = msgspec.convert(values, self._kind, strict=strict)
         except (msgspec.ValidationError, ValueError) as error:
-            raise RequestRefused(f'{self._node}: parameter "{name}" cannot be {value!r}: {_reason(error)}') from error
+            why = because("parameter.value", plain(_reason(error)), **self._of(name, value))
+            raise RequestRefused(why) from error
         if declared.type == "float" and not math.isfinite(getattr(changed, name)):
-            raise RequestRefused(f'{self._node}: parameter "{name}" cannot be {value!r}: it must be finite')
+            raise RequestRefused(because("parameter.not_finite", **self._of(name, value)))
         self.value = changed
         return self._with_value(name)
 
@@ -61,11 +61,15 @@ class ParameterSet(Generic[P]):
             try:
                 self.set(name, value, strict)
             except RequestRefused as error:
-                raise RequestRefused(f"{origin}: {error}") from error
+                raise RequestRefused(because("parameter.from", error.reason, origin=origin)) from error
 
     def _require(self, name: str) -> None:
         if name not in self._declared:
-            raise RequestRefused(f'{self._node} has no parameter "{name}": {nearest(name, self._declared)}')
+            hint = nearest(name, self._declared)
+            raise RequestRefused(because("parameter.unknown", hint, node=self._node, name=name))
+
+    def _of(self, name: str, value: ParameterValue) -> dict[str, str]:
+        return {"node": self._node, "name": name, "value": repr(value)}
 
     def _with_value(self, name: str) -> Parameter:
         return msgspec.structs.replace(self._declared[name], value=getattr(self.value, name))
@@ -76,11 +80,13 @@ def _reason(error: Exception) -> str:
     return str(error).partition(" - at `$")[0]
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def nearest(name: str, known: Iterable[str]) -> Remedy:
     """A hint for a name that is not known."""
     names = list(known)
     near = difflib.get_close_matches(name, names, n=1)
-    return f'did you mean "{near[0]}"?' if near else f"it has {', '.join(names) or 'none'}"
+    if near:
+        return remedy("did_you_mean", name=near[0])
+    return remedy("it_has", names=", ".join(names)) if names else remedy("it_has_none")
 
 
 def _declared(field: msgspec.structs.FieldInfo, node: str) -> Parameter:
@@ -183,4 +189,6 @@ class ParameterRegistry:
                 self._log.info("parameter %s = %r%s", parameter.name, parameter.value, kept)
                 return parameter
         known = [name for declared in self._sets for name in declared.names]
-        raise RequestRefused(f'{self._node} has no parameter "{wanted.name}": {nearest(wanted.name, known)}')
+        raise RequestRefused(
+            because("parameter.unknown", nearest(wanted.name, known), node=self._node, name=wanted.name)
+        )

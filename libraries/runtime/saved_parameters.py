@@ -11,6 +11,7 @@ from pathlib import Path
 
 from gemelo.libraries.runtime.errors import RequestRefused
 from gemelo.libraries.toml_lines import Where, nearest_line, toml_lines
+from gemelo.schemas.reasons import because, plain
 from gemelo.schemas.system import ParameterValue
 from gemelo.schemas.text_file import NotUtf8, read_text
 
@@ -33,19 +34,19 @@ class SavedParameters:
         except FileNotFoundError:
             return {}
         except (OSError, NotUtf8) as error:
-            raise RequestRefused(f"{self.path} cannot be read: {error}") from error
+            why = error.reason if isinstance(error, NotUtf8) else plain(str(error))
+            raise RequestRefused(because("parameter.file.unreadable", why, file=str(self.path))) from error
         try:
             values = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             found = _LINE.search(str(error))
             where = f", line {found[1]}" if found else ""
-            raise RequestRefused(f"{self.path}{where}: {error}") from error
+            raise RequestRefused(because("parameter.from", plain(str(error)), origin=f"{self.path}{where}")) from error
         self._lines = toml_lines(text)
         for name, value in values.items():
             if not isinstance(value, bool | int | float | str):
-                raise RequestRefused(
-                    f"{self.path}{self.line(name)}: {name} is {value!r}, not one number, word or truth"
-                )
+                wrong = because("parameter.file.value", name=name, value=repr(value))
+                raise RequestRefused(because("parameter.from", wrong, origin=f"{self.path}{self.line(name)}"))
         return values
 
     def line(self, name: str) -> str:
@@ -62,7 +63,8 @@ class SavedParameters:
             beside.write_text(text, encoding="utf-8")
             os.replace(beside, self.path)
         except OSError as error:
-            raise RequestRefused(f"{self.path} cannot be written: {error.strerror or error}") from error
+            said = str(error.strerror or error)
+            raise RequestRefused(because("parameter.file.unwritable", file=str(self.path), error=said)) from error
 
 
 def toml(value: ParameterValue) -> str:

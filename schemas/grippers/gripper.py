@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from gemelo.schemas.reasons import Reason
 from gemelo.schemas.robot_record import Edges, NotNegative, Positive, RobotRecord
 
 
@@ -46,7 +47,7 @@ class GripperRecord(RobotRecord, frozen=True, kw_only=True):
     tolerance: Positive = 0.001  # [m] from the goal that counts as there
     jaw: Edges | None = None  # of one jaw, in the tool frame: along x, along y (the way it moves), beyond it along z
 
-    def fault(self) -> tuple[str, str]:
+    def fault(self) -> tuple[str, Reason | str]:
         """The key of this kind that is wrong, and why with the remedy; both empty if none is. What depends on `drive`
         alone is looked at for all kinds."""
         return "", ""

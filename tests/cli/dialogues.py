@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import io
+import re
 import shlex
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
@@ -15,7 +16,12 @@ from gemelo.tools.cli.main import run
 
 FOLDER = Path(__file__).parent / "dialogues"
 LANGUAGES = ("en", "es")
-LONGEST = 400  # characters of an answer that are kept: lists of every topic grow
+LONGEST = 1200  # characters of an answer that are kept: lists of every topic grow
+MASKED = (  # what differs from one run, or from one release, to the next
+    (re.compile(r"\d+\.\d+(?= m?s\b)"), "<time>"),
+    (re.compile(r"(?<=boot )[0-9a-f]{8}|(?<=arranque )[0-9a-f]{8}|(?<=crc32 )[0-9a-f]{8}"), "<number>"),
+    (re.compile(r"(?<=firmware )\d+\.\d+\.\d+"), "<version>"),
+)
 COMMANDS = """
 --simulate move --joints brazo_joint=400deg
 --simulate move --to 9 0 0
@@ -55,8 +61,47 @@ COMMANDS = """
 device flash --image none.zip --port x --yes
 explain plan.nothing
 explain device.estop.pressed
+explain update.nobody
+explain measure
 check nowhere
 nothing
+--simulate move --joints brazo_joint=10deg --plan-only
+--simulate move --to 0.25 0.15 0.1 --line --fraction 80% --tool-speed 50mm/s --plan-only
+--simulate home
+--simulate verify
+--simulate state
+--simulate device status
+--simulate control who
+--simulate jog
+--simulate stop --ready
+--simulate ik --to 0.25 0.15 0.10 --near q1=90deg
+--simulate scene add table --box 600mm 0.4 20mm --at 0.3 0 -0.3 --padding 5mm
+--simulate scene list
+--simulate grip
+--simulate sensors
+--simulate device press estop
+--simulate device press switch limit_q1 down
+--simulate device press slip q1 many
+--simulate device config --push
+--simulate action cancel follow_joint_trajectory abc
+--simulate tf echo base_link nothing
+move --execute nowhere.json
+bag info nowhere.mcap
+blackbox show nowhere.mcap
+bag play --rate 0 nowhere.mcap
+deploy check nowhere
+device update
+device update nowhere.bin
+device update --make-key --key my.pub
+device provision --serial no_port --device rm1
+device provision --serial no_port
+device provision --serial no_port --device rm1 --mqtt-uri 10.0.0.2
+device doctor --serial no_port
+broker secure --serial no_port --device a b
+link bench --rate 300
+camera print tags --page a4 --to nowhere/board.pdf
+import nowhere
+collision matrix nowhere
 """.strip().splitlines()
 
 
@@ -69,6 +114,8 @@ def said(command: str, language: str) -> str:
         except SystemExit as ended:  # the parser's own
             code = int(ended.code or 0)
     text = printed.getvalue().replace(str(project_root()), "<project>").rstrip()
+    for pattern, mask in MASKED:
+        text = pattern.sub(mask, text)
     text = f"{text[:LONGEST]} ..." if len(text) > LONGEST else text
     return f"$ gemelo {command}\n{text}\n[{code}]\n"
 

@@ -14,6 +14,7 @@ from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.arm.model.urdf import Triple
 from gemelo.libraries.arm.model.urdf_edit import with_collisions
+from gemelo.schemas.reasons import because
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 from gemelo.tools.collision_fitting.excess import depth_in
@@ -75,7 +76,7 @@ def write_fits(arm: ArmDescription, fits: Sequence[LinkFit]) -> ArmDescription:
     try:
         after = with_collisions(before.decode("utf-8"), wanted).encode("utf-8")
     except ValueError as error:
-        raise DescriptionError(f"{arm.urdf_path} cannot be edited: {error}") from error
+        raise DescriptionError(because("fit.urdf", file=str(arm.urdf_path), error=str(error))) from error
     with _restored(arm.urdf_path.parent / HULLS):
         _write_hulls(arm.urdf_path.parent, fits)
         arm.urdf_path.write_bytes(after)
@@ -133,12 +134,9 @@ def _require_there(arm: ArmDescription, fits: Sequence[LinkFit], wanted: dict[st
     for fit in fits:
         shapes = loaded.get(fit.link, ())
         if len(shapes) != len(wanted[fit.link]):
-            raise DescriptionError(
-                f'{arm.urdf_path}: link "{fit.link}" has {len(shapes)} collision shapes once it is loaded, not '
-                f"{len(wanted[fit.link])}"
-            )
+            counts = {"count": len(shapes), "wanted": len(wanted[fit.link])}
+            raise DescriptionError(because("fit.shapes", file=str(arm.urdf_path), link=fit.link, **counts))
         deepest = depth_in(shapes, fit.mesh.vertices)
         if deepest.min() < -OUTSIDE:
-            raise DescriptionError(
-                f'{arm.urdf_path}: link "{fit.link}" sticks {-1000.0 * deepest.min():.3g} mm out of its shapes'
-            )
+            outside = -1000.0 * float(deepest.min())
+            raise DescriptionError(because("fit.outside", file=str(arm.urdf_path), link=fit.link, distance=outside))

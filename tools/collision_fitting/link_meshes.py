@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from gemelo.libraries.arm.checks.meshes import IN_MILLIMETRES, MOST_TRIANGLES, s
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.libraries.arm.model.urdf import Geometry, UrdfLink
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.planner.collision_geometry.shapes import TriangleMesh, matrix_of
 
 Array = NDArray[np.float64]
@@ -52,17 +54,26 @@ def _joined(found: Sequence[TriangleMesh]) -> TriangleMesh:
     return TriangleMesh(np.vstack([mesh.vertices for mesh in found]), faces.astype(np.int32))
 
 
+class Where(NamedTuple):
+    """A mesh of a link."""
+
+    link: str
+    file: str
+
+    def error(self, why: Reason) -> DescriptionError:
+        """What is wrong with it, with its place."""
+        return DescriptionError(because("fit.mesh", why, link=self.link, file=self.file))
+
+
 def _placed(visual: Geometry, link: str, folder: Path) -> TriangleMesh:
     pose = matrix_of((visual.origin.xyz, from_rpy(*visual.origin.rpy)))
     if visual.mesh is None:
         solid = _solid(visual, link)
         return TriangleMesh(solid.vertices @ pose[:3, :3].T + pose[:3, 3], solid.faces)
     if visual.mesh.startswith("package://"):
-        raise DescriptionError(
-            f'link "{link}": mesh "{visual.mesh}" is a ROS package path: write one relative to {folder}'
-        )
+        raise DescriptionError(because("fit.mesh.package", link=link, mesh=visual.mesh, folder=str(folder)))
     path = folder / visual.mesh.removeprefix("file://")
-    where = f'link "{link}": mesh {path}'
+    where = Where(link, str(path))
     mesh = _read(path, where)
     scaled = mesh.vertices * np.array(visual.scale)
     _require_solid(scaled, where)
@@ -82,39 +93,37 @@ def _solid(shape: Geometry, link: str) -> TriangleMesh:
         case "sphere":
             solid = trimesh.creation.icosphere(3, wider * shape.size[0])
         case _:
-            raise DescriptionError(f'link "{link}": <{shape.shape}> in <collision> is no shape of a URDF')
+            raise DescriptionError(because("fit.shape.unknown", link=link, shape=shape.shape))
     return TriangleMesh(np.asarray(solid.vertices, dtype=float), np.asarray(solid.faces, dtype=np.int32))
 
 
-def _read(path: Path, where: str) -> TriangleMesh:
+def _read(path: Path, where: Where) -> TriangleMesh:
     """Vertices that a triangle uses, in the file's unit."""
     if not path.is_file():
-        raise DescriptionError(f"{where} is not there")
+        raise where.error(because("fit.mesh.absent"))
     try:
         whole = scene_of(path).to_mesh()
         vertices, faces = np.asarray(whole.vertices, dtype=float), np.asarray(whole.faces, dtype=np.int32)
     except Exception as error:  # whatever its many readers raise for a damaged file
-        raise DescriptionError(f"{where} cannot be read: {error}") from error
+        raise where.error(because("fit.mesh.unreadable", error=str(error))) from error
     if not len(faces):
-        raise DescriptionError(f"{where} holds no triangle")
+        raise where.error(because("fit.mesh.empty"))
     if len(faces) > MOST_TRIANGLES:
-        raise DescriptionError(
-            f"{where} has {len(faces)} triangles, more than {MOST_TRIANGLES}: `gemelo import` makes it coarser"
-        )
+        raise where.error(because("fit.mesh.fine", count=len(faces), most=MOST_TRIANGLES))
     used, numbers = np.unique(faces, return_inverse=True)
     if not np.isfinite(vertices[used]).all():
-        raise DescriptionError(f"{where}: a corner of it is not finite: export it again")
+        raise where.error(because("fit.mesh.not_finite"))
     return TriangleMesh(vertices[used], numbers.reshape(-1, 3).astype(np.int32))
 
 
-def _require_solid(vertices: Array, where: str) -> None:
+def _require_solid(vertices: Array, where: Where) -> None:
     """Raises `DescriptionError` for what has no thickness in some direction, or the size of no link."""
     longest = float(np.ptp(vertices, axis=0).max())
     if longest > LARGEST:
-        raise DescriptionError(f'{where} is {longest:.4g} m long: if it is in mm, write scale="0.001 0.001 0.001"')
+        raise where.error(because("fit.mesh.long", length=longest))
     if longest < SMALLEST:
-        raise DescriptionError(f"{where} is {1000.0 * longest:.3g} mm long: see its scale in the URDF")
+        raise where.error(because("fit.mesh.short", length=1000.0 * longest))
     across = np.linalg.svd(vertices - vertices.mean(axis=0), full_matrices=False)[2]
     thickness = float(np.ptp(vertices @ across.T, axis=0).min())
     if thickness < FLAT * longest:
-        raise DescriptionError(f"{where} is flat ({round(1000.0 * thickness, 6):.2g} mm thick): it bounds no solid")
+        raise where.error(because("fit.mesh.flat", thickness=round(1000.0 * thickness, 6)))

@@ -14,8 +14,9 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.errors import DescriptionError, nearest
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.reasons import because
 from gemelo.services.planner.collision_geometry.shapes import TriangleMesh
 from gemelo.tools.collision_fitting.excess import SHARE, Excess, excess_of
 from gemelo.tools.collision_fitting.fitted_shape import Fitted
@@ -65,15 +66,15 @@ def fit_links(
     `tell` hears of each link. Raises `DescriptionError` with what is wrong and where."""
     for name in only:
         if name not in arm.model.link_names:
-            raise DescriptionError(
-                f'{arm.urdf_path}: there is no link "{name}"{suggestion(name, arm.model.link_names)}'
-            )
+            hint = nearest(name, arm.model.link_names)
+            raise DescriptionError(because("fit.no_link", hint, file=str(arm.urdf_path), link=name))
     wanted = [link for link in arm.model.links if not only or link.name in only]
     meshes = {link.name: link_mesh(link, arm.urdf_path.parent) for link in wanted}
     bare = [name for name in only if meshes[name] is None]
     if bare or not any(meshes.values()):
-        of = f'link "{bare[0]}" has' if bare else "its links have"
-        raise DescriptionError(f"{arm.urdf_path}: {of} no visual mesh to fit shapes to: write <collision> by hand")
+        if bare:
+            raise DescriptionError(because("fit.link.no_visual", file=str(arm.urdf_path), link=bare[0]))
+        raise DescriptionError(because("fit.no_visual", file=str(arm.urdf_path)))
     drawn = {name: mesh for name, mesh in meshes.items() if mesh is not None}
     fits = []
     wanted_fits = [(name, mesh, usual_bound(mesh) if within is None else within, most) for name, mesh in drawn.items()]

@@ -24,7 +24,7 @@ def require_gripper(robot: RobotFile, path: Path, text: str) -> None:
     if gripper is None:
         return
     key, own = gripper.fault()
-    found: Fault | None = (key, plain(own)) if own else None
+    found: Fault | None = (key, own if isinstance(own, Reason) else plain(own)) if own else None
     if gripper.open <= gripper.closed:
         found = "open", because("robot.gripper.closed", open=gripper.open, closed=gripper.closed)
     elif found is None:

@@ -185,14 +185,14 @@ class ActionServer(Generic[G, F, R]):
     def _require_form(self, request: GoalRequest) -> None:
         """Raises `RequestRefused`."""
         if not request.goal_id:
-            raise RequestRefused(f"{self.action.key}: a goal needs an id", "bad request")
-        for what, text in (("its id", request.goal_id), ("the name of its client", request.client)):
+            raise RequestRefused(because("request.goal.no_id", action=self.action.key), "bad request")
+        for code, text in (("request.goal.long_id", request.goal_id), ("request.goal.long_client", request.client)):
             if len(text) > LONGEST_NAME:
-                found = f"{what} has {len(text)} characters: at most {LONGEST_NAME}"
-                raise RequestRefused(f"{self.action.key}: {found}; give a shorter one", "bad request")
+                why = because(code, action=self.action.key, size=len(text), most=LONGEST_NAME)
+                raise RequestRefused(why, "bad request")
         if request.attached and not is_token(request.client):  # whose end nobody would ever see
-            wanted_token = "an attached goal names the liveliness token of its client"
-            raise RequestRefused(f'{self.action.key}: {wanted_token}, not "{request.client[:80]}"', "bad request")
+            why = because("request.goal.no_token", action=self.action.key, client=request.client[:80])
+            raise RequestRefused(why, "bad request")
 
     def _decide(self, request: GoalRequest, wanted: G, session: str) -> GoalResponse:
         if self._cancelled_early.pop(request.goal_id, None) is not None:

@@ -15,6 +15,7 @@ from gemelo.libraries.runtime.bus.dead_links import end_dead_links
 from gemelo.libraries.runtime.bus.zenoh_config import router_config
 from gemelo.libraries.runtime.deployment import DeploymentError
 from gemelo.schemas.deployment import RouterSection
+from gemelo.schemas.reasons import because
 
 _LOCATOR = re.compile(r"(tcp|tls)/(.+):(\d+)")
 # Zenoh's own threads of the router, 2 without this. One that brings an answer to a client that does not read waits for
@@ -43,14 +44,15 @@ def router_setup(section: RouterSection) -> RouterSetup:
     """By the file `configuration` where there is one, else an open router; raises `DeploymentError`."""
     if not section.configuration:
         if section.tls:
-            raise DeploymentError("router.tls needs router.configuration, which `gemelo deploy render` writes")
+            raise DeploymentError(because("router.tls_alone"))
         return RouterSetup(router_config(*section.listening), section.listening, False)
     try:
         config = zenoh.Config.from_file(section.configuration)
         (locator,) = json.loads(config.get_json("listen/endpoints"))
         protocol, host, port = _LOCATOR.fullmatch(locator).groups()  # type: ignore[union-attr]
     except (zenoh.ZError, ValueError, AttributeError, TypeError) as error:
-        raise DeploymentError(f"router.configuration: {section.configuration} cannot be used: {error}") from error
+        why = because("router.configuration", file=section.configuration, error=str(error))
+        raise DeploymentError(why) from error
     is_asked = json.loads(config.get_json("transport/link/tls/enable_mtls")) is True
     permits = json.loads(config.get_json("access_control"))
     is_locked = is_asked and permits["enabled"] and permits["default_permission"] == "deny"

@@ -130,8 +130,9 @@ def _whole(session: CommandSession, action: Action[Any, Any, Any], begin: str) -
     goals = latest.message.goals if latest.message is not None else ()
     found = [each.goal_id for each in goals if each.goal_id.startswith(begin)]
     if len(found) != 1:
-        known = ", ".join(f"{each.goal_id} ({each.status.name})" for each in goals) or "none"
-        why = because("cli.action.known", action=action.key, goals=known)
+        known = ", ".join(f"{each.goal_id} ({each.status.name})" for each in goals)
+        none = because("cli.action.known.none", action=action.key)
+        why = because("cli.action.known", action=action.key, goals=known) if known else none
         if not found:
             raise CommandError(because("cli.action.no_goal", why, begin=begin))
         raise CommandError(because("cli.action.goals", why, begin=begin, count=len(found)))
