@@ -17,6 +17,7 @@ from gemelo.tools.cli.main import run
 FOLDER = Path(__file__).parent / "dialogues"
 LANGUAGES = ("en", "es")
 LONGEST = 1200  # characters of an answer that are kept: lists of every topic grow
+PROMPT = "$ gemelo "
 MASKED = (  # what differs from one run, or from one release, to the next
     (re.compile(r"\d+\.\d+(?= m?s\b)"), "<time>"),
     (re.compile(r"(?<=boot )[0-9a-f]{8}|(?<=arranque )[0-9a-f]{8}|(?<=crc32 )[0-9a-f]{8}"), "<number>"),
@@ -117,7 +118,7 @@ def said(command: str, language: str) -> str:
     for pattern, mask in MASKED:
         text = pattern.sub(mask, text)
     text = f"{text[:LONGEST]} ..." if len(text) > LONGEST else text
-    return f"$ gemelo {command}\n{text}\n[{code}]\n"
+    return f"{PROMPT}{command}\n{text}\n[{code}]\n"
 
 
 def golden(language: str) -> Path:

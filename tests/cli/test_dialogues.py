@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.cli.dialogues import COMMANDS, LANGUAGES, golden, said
+from tests.cli.dialogues import COMMANDS, LANGUAGES, PROMPT, golden, said
 
 pytestmark = pytest.mark.full  # a simulated arm for most commands
 
@@ -16,7 +16,7 @@ def _a_hundred_columns(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_every_answer_is_that_of_the_golden_file(language: str) -> None:
-    kept = golden(language).read_text(encoding="utf-8").split("\n\n")
+    kept = golden(language).read_text(encoding="utf-8").removeprefix(PROMPT).split(f"\n\n{PROMPT}")
     assert len(kept) == len(COMMANDS)
     for command, answer in zip(COMMANDS, kept, strict=True):
-        assert said(command, language).rstrip() == answer.rstrip(), command
+        assert said(command, language).rstrip() == f"{PROMPT}{answer}".rstrip(), command
