@@ -39,7 +39,7 @@ OF_THE_ISSUES = (
     "parse_mb_per_s", "step_time_error_us", "estop_reaction_ticks", "render_ms", "cli_start_ms",
     "import_gemelo_ms", "handshake_ms", "arms_on_one_router", "tick_instructions",
     "slot_instructions", "core_text_bytes", "core_ram_bytes", "device_static_ram",
-    "stack_idle_cpu_percent", "stack_rss_mb", "state_to_frame_ms", "image_path_ms",
+    "idle_cpu_percent", "moving_cpu_percent", "idle_pss_mb", "state_to_frame_ms", "image_path_ms",
     "move_accept_to_first_step_ms", "program_legs", "stop_ms", "chunk_ack_ms", "chunk_ack_tls_ms",
     "panel_cpu_percent", "panel_lag_ms", "stop_key_ms", "goal_drag_hz", "record_cpu_percent",
     "record_mb_per_hour", "blackbox_ms", "blackbox_cpu_percent", "ready_s", "broker_echo_ms",

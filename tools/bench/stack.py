@@ -1,4 +1,4 @@
-"""Running stacks, shared by several figures, and the figures of what they cost: CPU, memory, time to start."""
+"""Running stacks, shared by several figures, and the figures of how long a start takes."""
 
 from __future__ import annotations
 
@@ -16,11 +16,9 @@ from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.runtime.deployment import load_deployment, project_root
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.deployment import Deployment
-from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_samples, rounded
+from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_samples
 from gemelo.tools.stack.stack import Stack
 
-IDLE_GOAL = FigureGoal(median=25.0)  # [% of one core]
-SETTLE, WINDOW, WINDOWS = 3.0, 2.0, 5  # [s], [s]
 READY_GOAL = FigureGoal(median=8.0)  # [s]
 READY_ROUNDS = 3
 CLI_GOAL = FigureGoal(p99=500.0)  # [ms]
@@ -89,36 +87,6 @@ class Stacks:
 def has_mosquitto() -> bool:
     """True if mosquitto is installed, also in /usr/sbin, which Debian leaves out of a user's PATH."""
     return any(shutil.which("mosquitto", path=path) for path in (None, "/usr/sbin", "/usr/local/sbin"))
-
-
-def stack_idle_cpu_percent(stacks: Stacks) -> Figure:
-    """CPU time [% of one core] of all processes while the arm stands, at 50 states a second."""
-    running = stacks.any_broker()
-    processes = families(running.stack)
-    time.sleep(SETTLE)
-    samples, first = [], {name: cpu_seconds(family) for name, family in processes.items()}
-    before, began = first, time.monotonic()
-    for _ in range(WINDOWS):
-        started = time.monotonic()
-        time.sleep(WINDOW)
-        after = {name: cpu_seconds(family) for name, family in processes.items()}
-        samples.append(sum(after.values()) - sum(before.values()))
-        samples[-1] *= 100.0 / (time.monotonic() - started)
-        before = after
-    whole = time.monotonic() - began
-    shares = sorted(((after[name] - first[name]) / whole * 100.0, name) for name in first)
-    note = f"{len(first)} processes, broker {running.deployment.mqtt.broker}, {WINDOWS} windows of {WINDOW:g} s: " + (
-        ", ".join(f"{name} {share:.1f}" for share, name in reversed(shares))
-    )
-    return of_samples(samples, IDLE_GOAL, note=note)
-
-
-def stack_rss_mb(stacks: Stacks) -> Figure:
-    """Resident memory [MB] of each process of the stack."""
-    sizes = {name: rss_mb(family) for name, family in families(stacks.any_broker().stack).items()}
-    parts = ", ".join(f"{name} {rounded(size):g}" for name, size in sorted(sizes.items(), key=lambda item: -item[1]))
-    note = f"resident, shared libraries counted for each; together {sum(sizes.values()):.0f} MB: {parts}"
-    return of_samples(list(sizes.values()), note=note)
 
 
 def families(stack: Stack) -> dict[str, list[psutil.Process]]:
