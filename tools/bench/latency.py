@@ -30,10 +30,10 @@ from gemelo.tools.bench.figures import Figure, FigureGoal, NotMeasured, of_sampl
 from gemelo.tools.bench.stack import Running, Stacks
 
 CHUNKS = 600
-CHUNK_RATE = 25.0  # [Hz] chunks of 2 knots of 20 ms
+CHUNK_RATE = 25.0  # [Hz] targets, each of which is a chunk that replaces the path
 WARM_UP = 2.0  # [s] that is not counted
 STREAMED_SWING, STREAMED_PERIOD = 0.4, 6.0  # [rad] or [m] of the first joint, [s]
-FRAME_BYTES, KNOT_BYTES, ACK_BYTES = 36, 8, 48  # firmware/PROTOCOL.md
+FRAME_BYTES, REPLACE_BYTES, KNOT_BYTES, ACK_BYTES = 36, 16, 8, 48  # firmware/PROTOCOL.md
 ECHO_FACTOR = 1.5  # of the bare echo's p99
 TLS_FACTOR = 1.5  # of the plain connection's p99
 
@@ -86,7 +86,8 @@ def chunk_bytes(running: Running) -> int:
     swing(running, WARM_UP)
     if not chunks:
         raise NotMeasured("the gateway sent no chunk for a streamed target")
-    return FRAME_BYTES + KNOT_BYTES * len(running.arm.joints) * round(statistics.median(len(c.steps) for c in chunks))
+    knots = round(statistics.median(len(chunk.steps) for chunk in chunks))
+    return FRAME_BYTES + REPLACE_BYTES * chunks[-1].replaces + KNOT_BYTES * len(running.arm.joints) * knots
 
 
 def collect(running: Running, duration: float) -> list[CommandAck]:
@@ -100,7 +101,7 @@ def collect(running: Running, duration: float) -> list[CommandAck]:
 
 
 def swing(running: Running, duration: float) -> None:
-    """Streams a triangle wave on the first joint at 10 Hz for `duration` [s]; the gateway rounds its corners."""
+    """Streams a triangle wave on the first joint for `duration` [s]; the gateway rounds its corners."""
     targets = running.node.publisher(JOINT_TARGETS)
     joint = running.arm.joints[0].name
     began = time.monotonic()
@@ -108,7 +109,7 @@ def swing(running: Running, duration: float) -> None:
         phase = (elapsed / STREAMED_PERIOD) % 1.0
         position = STREAMED_SWING * (1.0 - 4.0 * abs(phase - 0.5))
         targets.put(JointTargets(stamp=running.node.now(), name=(joint,), position=(position,)))
-        running.node.wait(0.1)
+        running.node.wait(1.0 / CHUNK_RATE)
 
 
 def start_echo(running: Running, size: int) -> subprocess.Popen[str]:

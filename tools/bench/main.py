@@ -109,6 +109,7 @@ FIGURES = {
     "idle_pss_mb": FigureRow("light:idle_pss_mb", "MB", True),
     "state_to_frame_ms": FigureRow("frames:state_to_frame_ms", "ms", True),
     "image_path_ms": FigureRow("vision.eyes:image_path_ms", "ms", True),
+    "stream_lag_live_ms": FigureRow("stream_live:stream_lag_live_ms", "ms", on_a_stack=True),
     "move_accept_to_first_step_ms": FigureRow("latency:move_accept_to_first_step_ms", "ms", True),
     "program_legs": FigureRow("program_legs:program_legs", "ms", True),
     "stop_ms": FigureRow("stops:stop_ms", "ms", True),
