@@ -7,6 +7,7 @@ from pathlib import Path
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.deployment import MqttSection
+from gemelo.schemas.reasons import because
 from gemelo.services.broker.replacement import NotInstalled
 
 PROGRAM = ".gemelo/bin/gemelo-mqtt"  # deploy/embedded_broker.sh
@@ -17,10 +18,7 @@ def find() -> Path:
     """The path of the program; raises `NotInstalled`."""
     program = project_root() / PROGRAM
     if not program.is_file():
-        raise NotInstalled(
-            f'the deployment says mqtt.broker = "embedded", but {PROGRAM} is not there: make setup builds it '
-            '(EXTRAS="broker" on a host), or GEMELO_MQTT_BROKER=mosquitto'
-        )
+        raise NotInstalled(because("broker.none.embedded", file=PROGRAM))
     return program
 
 

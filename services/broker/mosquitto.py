@@ -9,6 +9,7 @@ from pathlib import Path
 
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.schemas.deployment import MqttSection
+from gemelo.schemas.reasons import because
 from gemelo.services.broker.replacement import NotInstalled
 
 OPEN = "allow_anonymous true"
@@ -20,10 +21,7 @@ def find() -> str:
     path = os.pathsep.join([os.environ.get("PATH", ""), "/usr/sbin", "/usr/local/sbin"])
     found = shutil.which("mosquitto", path=path)
     if found is None:
-        raise NotInstalled(
-            'the deployment says mqtt.broker = "mosquitto", but mosquitto is not installed: '
-            "sudo apt-get install mosquitto, or GEMELO_MQTT_BROKER=embedded"
-        )
+        raise NotInstalled(because("broker.none.mosquitto"))
     return found
 
 

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from gemelo.schemas.deployment import MqttSection
+from gemelo.schemas.errors import ReasonedError
 
 BEAT = 1.0  # [s]
 PATIENCE = 1.5  # [s] for the handshake, and again for the answer: with BEAT less than the watchdog of its unit
@@ -23,8 +24,8 @@ CONNACK = b"\x20"
 PINGREQ, PINGRESP = b"\xc0\x00", b"\xd0"
 
 
-class NotInstalled(Exception):
-    """The broker's program is not on this machine; one sentence with the remedy."""
+class NotInstalled(ReasonedError):
+    """The broker's program is not on this machine; the reason has the remedy."""
 
 
 def become(command: Sequence[str], section: MqttSection, beat: Callable[[], None], on_end: Callable[[], None]) -> int:

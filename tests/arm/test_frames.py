@@ -18,6 +18,7 @@ from gemelo.libraries.arm.frames.frame_buffer import (
     WaitTimeout,
 )
 from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
+from gemelo.schemas.reasons import because, remedy, say
 
 SECOND = 1_000_000_000
 T0 = 1_700_000_000 * SECOND
@@ -95,6 +96,18 @@ def test_a_single_sample_is_an_error_of_its_own_with_both_times():
         with pytest.raises(SingleSampleError, match=r"asked for 17000000.*one sample only, at 1700000001\.0"):
             b.look_up("base", "arm", at(t))
     assert b.look_up("base", "arm", at(1.0)) == b.look_up("base", "arm")
+
+
+def test_why_a_frame_is_not_known_is_data(buffer: FrameBuffer):
+    with pytest.raises(PastError) as past:
+        buffer.look_up("base", "tool", at(-0.5))
+    assert past.value.reason.code == "frame.before_oldest"
+    assert past.value.reason.values["off"] == pytest.approx(0.5)
+    with pytest.raises(UnknownFrameError) as unknown:
+        buffer.look_up("base", "tol")
+    hint, newest = remedy("did_you_mean", name="tool"), "1700000002.000000000 s"
+    assert unknown.value.reason == because("frame.unknown", hint, name="tol", time="the latest", newest=newest)
+    assert "se pidió lo más reciente" in say(unknown.value.reason, "es")
 
 
 def test_an_unknown_frame_is_named_with_the_nearest(buffer: FrameBuffer):

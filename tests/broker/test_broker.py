@@ -105,8 +105,9 @@ def test_a_taken_port_is_named_with_its_holder_and_the_setting(tmp_path, name):
 
 def test_a_missing_program_is_said_with_the_remedy(monkeypatch, tmp_path):
     monkeypatch.setattr("gemelo.services.broker.mosquitto.shutil.which", lambda *_, **__: None)
-    with pytest.raises(NotInstalled, match="sudo apt-get install mosquitto, or GEMELO_MQTT_BROKER=embedded"):
+    with pytest.raises(NotInstalled, match="sudo apt-get install mosquitto, or GEMELO_MQTT_BROKER=embedded") as missing:
         mosquitto.find()
+    assert missing.value.reason.code == "broker.none.mosquitto"
     monkeypatch.setattr("gemelo.services.broker.embedded.project_root", lambda: tmp_path)
     with pytest.raises(NotInstalled, match=r"gemelo-mqtt is not there: make setup builds it .*BROKER=mosquitto"):
         embedded.find()

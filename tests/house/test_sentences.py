@@ -40,19 +40,13 @@ FOR_DEVELOPERS = {  # exceptions that no person is shown: a traceback or a log h
 SINGLE = {  # by file and what carries it
     ("gemelo/api/homing.py", "Refused"): "two calls of a script, beside the reason",
     ("gemelo/pytest_plugin.py", "UsageError"): "of pytest, which speaks English",
-    ("libraries/arm/frames/frame_buffer.py", "UnconnectedError"): "not converted yet",
-    ("libraries/arm/frames/frame_buffer.py", "UnknownFrameError"): "not converted yet",
     ("libraries/runtime/application.py", "ArgumentTypeError"): "the command line of a service, for its supervisor",
     ("libraries/runtime/bus/wire.py", "TooLarge"): "not converted yet",
     ("libraries/runtime/process/shutdown.py", "print"): "a line of a service's log",
-    ("services/broker/embedded.py", "NotInstalled"): "not converted yet",
-    ("services/broker/mosquitto.py", "NotInstalled"): "not converted yet",
     ("services/planner/path/curve.py", "TurnsOnTheSpot"): "caught where the path is cut",
     ("services/state_publisher/main.py", "ConfigurationError"): "not converted yet",
     ("tools/cli/bus/action_watch.py", "unknown"): "a kind of thing, which the catalogue has as `word.unknown`",
     ("tools/cli/robot/import_robot.py", "print"): "a line of shell to copy",
-    ("tools/simulation/twin.py", "MissingPart"): "not converted yet",
-    ("tools/simulation/twin.py", "NotReady"): "not converted yet",
 }
 MADE = {  # of the command line, by file: what is put together there and is no sentence
     "tools/cli/bus/messages.py": "a mistake in a program",

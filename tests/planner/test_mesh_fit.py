@@ -18,6 +18,7 @@ from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.arm.model.srdf_edit import with_pairs
 from gemelo.libraries.arm.model.urdf_edit import with_collisions
+from gemelo.schemas.reasons import because
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision_geometry.coal_shapes import is_inside
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
@@ -313,12 +314,15 @@ def test_a_mesh_that_bounds_no_link_is_refused_with_its_file(
 
 def test_a_link_without_a_mesh_and_one_that_is_not_there_are_said(copied: Path):
     arm = load_arm(copied)
-    with pytest.raises(DescriptionError, match="there is no link"):
+    with pytest.raises(DescriptionError, match="there is no link") as absent:
         fit_links(arm, only=["nowhere"])
+    assert absent.value.reason.code == "fit.no_link"
+    assert absent.value.reason.values == {"file": str(arm.urdf_path), "link": "nowhere"}
     text = arm.urdf_path.read_text()
     arm.urdf_path.write_text(text.replace("<visual>", "<!--").replace("</visual>", "-->"))
-    with pytest.raises(DescriptionError, match="its links have no visual mesh"):
+    with pytest.raises(DescriptionError, match="its links have no visual mesh") as bare:
         fit_links(load_arm(copied))
+    assert bare.value.reason == because("fit.no_visual", file=str(arm.urdf_path))
     with pytest.raises(DescriptionError, match=f'link "{arm.base_frame}" has no visual mesh'):
         fit_links(load_arm(copied), only=[arm.base_frame])
 

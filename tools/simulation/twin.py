@@ -16,9 +16,11 @@ from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Deployment, PathsSection, RouterSection
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.robot import Motor
 from gemelo.schemas.simulation import WireConditions
-from gemelo.schemas.system import ParameterValue
+from gemelo.schemas.system import NodeInfo, ParameterValue
 from gemelo.tools.simulation.board import SimulatedBoard, keep_position
 from gemelo.tools.simulation.memory_wire import MemoryWire
 from gemelo.tools.simulation.virtual_clock import VirtualClock
@@ -28,12 +30,12 @@ UNRECORDED: dict[str, ParameterValue] = {"record_inputs": False}  # nobody repla
 READY = 10.0  # [s] of virtual time in which gateway and planner must be ready
 
 
-class NotReady(Exception):
-    """The twin does not become ready; the text is what its services say."""
+class NotReady(ReasonedError):
+    """The twin does not become ready; the reason is what its services say."""
 
 
-class MissingPart(Exception):
-    """A library is not installed; the text names the extra that has it."""
+class MissingPart(ReasonedError):
+    """A library is not installed; the reason names the extra that has it."""
 
 
 class Start(NamedTuple):
@@ -111,8 +113,8 @@ class Twin:
             return all(node.is_ready for node in self._nodes)
 
         if not self.clock.wait_until(are_ready, READY):
-            problems = "; ".join(f"{node.name}: {node.info().problem}" for node in self._nodes if not node.is_ready)
-            raise NotReady(f"the simulated {self.arm.name} is not ready after {READY:g} s: {problems}")
+            problems = [_problem(node.info()) for node in self._nodes if not node.is_ready]
+            raise NotReady(because("lost.simulated", *problems, robot=self.arm.name, time=READY))
         self.clock.sleep(device_config(self.arm).enable_lead_ms * 1e-3)  # the drivers have just been switched on
 
 
@@ -130,14 +132,17 @@ def _within(deployment: Deployment, folder: Path) -> Deployment:
     )
 
 
+def _problem(info: NodeInfo) -> Reason:
+    return because("lost.simulated.node", info.why or plain(info.problem), node=info.node)
+
+
 def _shell(name: str) -> Any:
     """The module of a service's shell; raises `MissingPart` where a library is not installed."""
     try:
         return import_module(f"gemelo.services.{name}.main")
     except ModuleNotFoundError as error:
         extra = EXTRAS.get(name, "")
+        part = {"library": str(error.name), "service": name}
         raise MissingPart(
-            f'{error.name} is not installed, which a simulated {name} needs: pip install "gemelo[{extra}]"'
-            if extra
-            else f"{error.name} is not installed, which a simulated {name} needs"
+            because("extra.simulated", extra=extra, **part) if extra else because("extra.simulated.part", **part)
         ) from error

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from threading import Condition
 
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.frames.time_cache import (
     FrameError,
     FutureError,
@@ -19,6 +19,7 @@ from gemelo.libraries.arm.frames.time_cache import (
 )
 from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
 from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
+from gemelo.schemas.reasons import Reason, because
 
 __all__ = [
     "FrameBuffer",
@@ -106,7 +107,7 @@ class FrameBuffer:
                 except FrameError as error:
                     left = deadline - time.monotonic()
                     if left <= 0.0:
-                        raise WaitTimeout(f"waited {timeout:g} s for {source} in {target}: {error}") from error
+                        raise WaitTimeout(_waited(timeout, source, target, error)) from error
                     self._changed.wait(left)
 
     def _insert(self, frame: FrameTransform, is_static: bool) -> bool:
@@ -134,16 +135,12 @@ class FrameBuffer:
     def _find_chain(self, target: str, source: str, stamp: int) -> _Chain:
         for name in (target, source):
             if name not in self._frames:
-                raise UnknownFrameError(
-                    f'asked for {seconds(stamp)}: there is no frame "{name}"{suggestion(name, self._frames)}; '
-                    f"newest sample of any frame is at {self._newest()}"
-                )
+                times = {"time": seconds(stamp), "newest": self._newest()}
+                raise UnknownFrameError(because("frame.unknown", nearest(name, self._frames), name=name, **times))
         up, down = self._to_root(source, stamp), self._to_root(target, stamp)
         if (up[-1].parent if up else source) != (down[-1].parent if down else target):
-            raise UnconnectedError(
-                f'asked for {seconds(stamp)}: "{source}" and "{target}" are in different trees; '
-                f"newest sample of any frame is at {self._newest()}"
-            )
+            times = {"time": seconds(stamp), "newest": self._newest()}
+            raise UnconnectedError(because("frame.unconnected", source=source, target=target, **times))
         while up and down and up[-1] is down[-1]:
             up.pop()
             down.pop()
@@ -155,10 +152,8 @@ class FrameBuffer:
         while (cache := self._caches.get(frame)) is not None:
             if cache in caches:
                 ring = " in ".join(each.child for each in caches)
-                raise UnconnectedError(
-                    f'asked for {seconds(stamp)}: "{frame}" is its own ancestor: {ring}; '
-                    f"newest sample of any frame is at {self._newest()}"
-                )
+                times = {"time": seconds(stamp), "newest": self._newest()}
+                raise UnconnectedError(because("frame.ring", name=frame, ring=ring, **times))
             caches.append(cache)
             frame = cache.parent
         return caches
@@ -187,3 +182,7 @@ def _chain_pose(caches: tuple[TimeCache, ...], stamp: int, window: int) -> Rigid
     for cache in caches[1:]:
         pose = compose(cache.at(stamp, window), pose)
     return pose
+
+
+def _waited(timeout: float, source: str, target: str, error: FrameError) -> Reason:
+    return because("frame.timeout", error.reason, time=timeout, source=source, target=target)

@@ -6,11 +6,13 @@ from __future__ import annotations
 from bisect import bisect_left
 
 from gemelo.libraries.arm.frames.transforms import Rigid, interpolate
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import because
 
 _TRIM = 64  # samples that may be too old before they are cut off together
 
 
-class FrameError(LookupError):
+class FrameError(ReasonedError, LookupError):
     """A look-up that cannot be answered."""
 
 
@@ -86,24 +88,20 @@ class TimeCache:
         if self.is_static or stamp == stamps[-1]:
             return self.poses[-1]
         if stamp > stamps[-1]:
-            raise self._outside(FutureError, stamp, "newest", stamps[-1])
+            raise self._outside(FutureError, stamp, "frame.after_newest", stamps[-1])
         if stamp < stamps[-1] - window:
-            raise self._outside(PastError, stamp, "oldest", self.oldest(window))
+            raise self._outside(PastError, stamp, "frame.before_oldest", self.oldest(window))
         index = bisect_left(stamps, stamp)
         if stamps[index] == stamp:
             return self.poses[index]
         if index == 0 or stamps[index - 1] < stamps[-1] - window:
-            raise self._outside(PastError, stamp, "oldest", stamps[index])
+            raise self._outside(PastError, stamp, "frame.before_oldest", stamps[index])
         before = stamps[index - 1]
         share = (stamp - before) / (stamps[index] - before)
         return interpolate(self.poses[index - 1], self.poses[index], share)
 
-    def _outside(self, kind: type[FrameError], stamp: int, which: str, bound: int) -> FrameError:
-        where = f"{self.parent} to {self.child}"
+    def _outside(self, kind: type[FrameError], stamp: int, code: str, bound: int) -> FrameError:
+        where = {"parent": self.parent, "child": self.child, "time": seconds(stamp), "bound": seconds(bound)}
         if len(self.stamps) == 1:
-            return SingleSampleError(
-                f"{where}: asked for {seconds(stamp)}, but there is one sample only, at {seconds(bound)}"
-            )
-        off = abs(stamp - bound) / 1e9
-        side = "after" if kind is FutureError else "before"
-        return kind(f"{where}: asked for {seconds(stamp)}, {off:.6f} s {side} the {which} sample at {seconds(bound)}")
+            return SingleSampleError(because("frame.single", **where))
+        return kind(because(code, off=abs(stamp - bound) / 1e9, **where))

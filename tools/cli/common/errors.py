@@ -29,17 +29,16 @@ class ExitCode(IntEnum):
 class CommandError(Exception):
     """Ends a command: one sentence for a person in his language, one exit code for the shell."""
 
-    def __init__(self, cause: Reason | BaseException | str, code: ExitCode = ExitCode.FAILED) -> None:
-        """`cause`: why, as data; another's error, with its reason where it has one; or a sentence."""
+    def __init__(self, cause: Reason | BaseException, code: ExitCode = ExitCode.FAILED) -> None:
+        """`cause`: why, as data; or another's error, with its reason where it has one."""
         from gemelo.schemas.reasons import plain  # 30 ms, where something is refused
 
-        super().__init__(cause if isinstance(cause, str) else text_of(cause))
-        found = None if isinstance(cause, str) else reason_of(cause)
-        self.reason = plain(str(self)) if found is None else found
+        super().__init__(text_of(cause))
+        self.reason = reason_of(cause) or plain(str(cause))
         self.code = code
 
 
-def usage(cause: Reason | BaseException | str) -> CommandError:
+def usage(cause: Reason | BaseException) -> CommandError:
     """The error of a command line that cannot be understood; exit code 2."""
     return CommandError(cause, ExitCode.USAGE)
 

@@ -15,7 +15,7 @@ import msgspec
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.device import EchoRequest, EchoResponse
 from gemelo.schemas.joints import JointTargets
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import because, plain
 from gemelo.schemas.topics import DEVICE_ECHO, JOINT_STATES, JOINT_TARGETS
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, usage
 from gemelo.tools.cli.common.language import columns, sentence, word
@@ -98,7 +98,7 @@ def measure(session: CommandSession, rate: float, count: int, swing: Callable[[f
 def _trip(answer: EchoResponse, is_first: bool) -> float | None:
     is_lost = answer.why is not None and answer.why.code == "echo.unanswered"
     if is_first and not answer.answered and not is_lost:
-        raise CommandError(answer.why or answer.reason)
+        raise CommandError(answer.why or plain(answer.reason))
     return answer.round_trip if answer.answered else None
 
 
