@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.services.planner.collision.pair_tables import pair_tables
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.native import compiled
 from gemelo.services.planner.native.compiled import where_built
@@ -30,9 +31,11 @@ Array = NDArray[np.float64]
 
 @where_built(lambda _: None)
 def native_planner(arm: ArmDescription) -> NativePlanner | None:
-    """The native planner of an arm, in a second, in which spheres are fitted to its links; None where it is not
-    built."""
-    return compiled.NativePlanner(arm)
+    """The native planner of an arm, in a second, in which spheres are fitted to its links, and coal is asked about
+    links that are always near; None where it is not built."""
+    planner = compiled.NativePlanner(arm)
+    planner.set_tables(pair_tables(arm, planner))
+    return planner
 
 
 @where_built(threading.Event)

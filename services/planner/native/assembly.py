@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import math
 import time
@@ -20,6 +21,7 @@ from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.collision_geometry.shapes import Attachment, CollisionShape, ShapeKind, TriangleMesh
 from gemelo.services.planner.native.binding import motion
 from gemelo.services.planner.native.chain import frames_of, transform_row
+from gemelo.services.planner.native.distance_tables import JointsBetween, PairTable
 from gemelo.services.planner.native.sphere_cover import BULGE, SphereCover, cover_shapes, link_cover, longest_side
 
 Array = NDArray[np.float64]
@@ -95,9 +97,27 @@ class Assembly:
         self._chain = motion.chain(self._frames.links, self._frames.numbers, len(arm.joints))
         self._links: dict[str, motion.Part] = {}
         self._cores: dict[str, motion.Part | None] = {}
+        self.contents = {link: _digest(shapes[link]) for link in shapes}
+        self._tables: tuple[PairTable, ...] = ()
         self._standing: dict[int, StandingObstacle] = {}  # of the newest scene, by the shape's identity
         for link, cover in self.covers.items():
             self._links[link], self._cores[link] = self._part_and_core(link, shapes[link], cover)
+        self._alone = self._bodies({})
+
+    @property
+    def joints_between(self) -> list[JointsBetween]:
+        """Of every pair of links that is checked."""
+        names = self._alone.names
+        return [
+            JointsBetween(
+                names[one], names[other], {drive: reach for drive, reach in enumerate(reaches) if reach > 0.0}
+            )
+            for one, other, reaches in motion.reaches_between(self._alone.whole)
+        ]
+
+    def set_tables(self, tables: Sequence[PairTable]) -> None:
+        """What links keep at least, read before their spheres from the next scene on."""
+        self._tables = tuple(tables)
         self._alone = self._bodies({})
 
     def hold(self, attachment: Attachment) -> HeldPart:
@@ -141,9 +161,20 @@ class Assembly:
         cores = [NamedPart(link, link, core) for link, core in self._cores.items() if core is not None]
         cores += [NamedPart(name, one.attachment.link, one.core) for name, one in held.items() if one.core is not None]
         names, core_names = tuple(part.name for part in parts), tuple(core.name for core in cores)
-        return Bodies(names, self._body(parts, held), core_names, self._body(cores, held) if cores else None)
+        tables = [
+            motion.pair_table(
+                names.index(table.first), names.index(table.second), np.array([axis.row for axis in table.axes]),
+                np.ascontiguousarray(table.bounds),
+            )
+            for table in self._tables
+        ]  # fmt: skip
+        return Bodies(
+            names, self._body(parts, held, tables), core_names, self._body(cores, held, []) if cores else None
+        )
 
-    def _body(self, parts: Sequence[NamedPart], held: Mapping[str, HeldPart]) -> motion.Body:
+    def _body(
+        self, parts: Sequence[NamedPart], held: Mapping[str, HeldPart], tables: list[motion.PairTable]
+    ) -> motion.Body:
         """With the pairs, places of the parts, that are checked against each other."""
         pairs = [
             (first, second)
@@ -152,7 +183,7 @@ class Assembly:
             if self._is_checked(parts[first], parts[second], held)
         ]
         both = np.array(pairs, dtype=np.int32).reshape(-1, 2)
-        return motion.body(self._chain, [part.part for part in parts], both)
+        return motion.body(self._chain, [part.part for part in parts], both, tables)
 
     def _part_and_core(
         self, link: str, shapes: Sequence[CollisionShape], cover: SphereCover
@@ -227,6 +258,16 @@ def wide_spheres(
         would_do = remedy("fit_wider", **named, within=f"{wider}mm")
         return because("trial.link.shapes", would_do, **figures, shapes=len(shapes))
     return because("trial.link.shapes", remedy("fewer_shapes"), **figures, shapes=len(shapes))
+
+
+def _digest(shapes: Sequence[CollisionShape]) -> bytes:
+    """The hash of a link's shapes."""
+    digest = hashlib.sha256()
+    for shape in shapes:
+        digest.update(repr((shape.kind, shape.size, shape.pose, shape.padding)).encode())
+        for array in shape.mesh.arrays if shape.mesh is not None else ():
+            digest.update(array.tobytes())
+    return digest.digest()
 
 
 def _require_distinct(shapes: Sequence[CollisionShape]) -> None:

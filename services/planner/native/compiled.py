@@ -11,6 +11,7 @@ from typing import TypeVar, cast
 
 try:
     from gemelo.services.planner.native.binding import CancelFlag, motion
+    from gemelo.services.planner.native.model_cache import cached_rows
     from gemelo.services.planner.native.native_planner import NativePlanner
     from gemelo.services.planner.native.tool_descent import NativeDescent
 except ImportError:  # not built for this interpreter, or hidden
@@ -20,7 +21,7 @@ IN_PYTHON = motion is None
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
-__all__ = ["IN_PYTHON", "CancelFlag", "NativeDescent", "NativePlanner", "motion", "where_built"]
+__all__ = ["IN_PYTHON", "CancelFlag", "NativeDescent", "NativePlanner", "cached_rows", "motion", "where_built"]
 
 
 def where_built(in_python: Callable[..., object]) -> Callable[[Function], Function]:

@@ -16,6 +16,7 @@ from gemelo.services.planner.collision_geometry.shapes import Attachment, Collis
 from gemelo.services.planner.native.assembly import Assembly, wide_spheres
 from gemelo.services.planner.native.binding import CancelFlag as NativeCancelFlag
 from gemelo.services.planner.native.binding import motion
+from gemelo.services.planner.native.distance_tables import JointsBetween, PairTable
 from gemelo.services.planner.native.paths import Effort, FailureReason, FreePath, NoPath
 from gemelo.services.planner.native.sphere_cover import BULGE, SphereCover
 from gemelo.services.planner.request.deadline import CancelFlag
@@ -81,6 +82,21 @@ class NativePlanner:
             link: wide_spheres(self.arm, link, shapes[link], cover, self._bulge) for link, cover in self.covers.items()
         }
         return {link: each for link, each in said.items() if each is not None}
+
+    @property
+    def contents(self) -> Mapping[str, bytes]:
+        """A hash of each link's shapes."""
+        return self._assembly.contents
+
+    @property
+    def joints_between(self) -> list[JointsBetween]:
+        """Of every pair of links that is checked, which joints move them against one another."""
+        return self._assembly.joints_between
+
+    def set_tables(self, tables: Sequence[PairTable]) -> None:
+        """From now on read before the spheres of these pairs of links."""
+        self._assembly.set_tables(tables)
+        self._scene = self._assembly.compiled_scene(self._scene.shapes, self._scene.held)
 
     @property
     def sphere_count(self) -> int:

@@ -1,9 +1,9 @@
 """Arms that do not ship, written as robot folders: kinematics from published tables, collision shapes of our own.
 
 `six` is a UR5 by its Denavit-Hartenberg table (Universal Robots, "DH parameters for calculations"), with cylinders,
-boxes and spheres; `six_mesh` the same with the hulls of its long links as
-meshes. `seven` is a Panda by its table after Craig (Franka Emika,
-"Robot and interface specifications"), of spheres alone; `eight` the same on a rail.
+boxes and spheres; `six_mesh` the same with the hulls of its long links as meshes; `six_raw` as a stranger has it, each
+link one raw mesh, and no two links excused that are always near. `seven` is a Panda by its table after Craig (Franka
+Emika, "Robot and interface specifications"), of spheres alone; `eight` the same on a rail.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import atexit
 import math
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -26,6 +26,7 @@ HALF = math.pi / 2.0
 RAIL, RAIL_SPEED = 0.4, 0.5  # [m] either way, [m/s]
 SECTIONS, BALL_DIVISIONS = 40, 3  # of a mesh's cylinders and balls
 MESHED = (2, 3)  # links of which meshes are made: the upper arm and the forearm
+ALWAYS_TOUCHING = ((0, 2),)  # links of `six`
 
 
 @dataclass(frozen=True)
@@ -176,21 +177,24 @@ def eight_joints() -> ArmSketch:
 
 @cache
 def generated_arm(name: str) -> ArmDescription:
-    """`six`, `six_mesh`, `seven` or `eight`; its folder lasts as long as the process."""
+    """`six`, `six_mesh`, `six_raw`, `seven` or `eight`; its folder lasts as long as the process."""
     folder = tempfile.TemporaryDirectory(prefix="gemelo_bench_")
     atexit.register(folder.cleanup)
     sketch = {"seven": seven_joints, "eight": eight_joints}.get(name, lambda: six_joints(name))()
-    return load_arm(written(sketch, Path(folder.name) / name, with_meshes=name.endswith("mesh")))
+    if name == "six_raw":
+        return load_arm(written(replace(sketch, excused=ALWAYS_TOUCHING), Path(folder.name) / name, range(7), False))
+    return load_arm(written(sketch, Path(folder.name) / name, MESHED if name == "six_mesh" else ()))
 
 
 ARMS = ("six", "six_mesh", "seven")
 
 
-def written(sketch: ArmSketch, folder: Path, with_meshes: bool) -> Path:
-    """The robot's folder with robot.urdf, robot.srdf, robot.toml, and meshes where asked."""
+def written(sketch: ArmSketch, folder: Path, meshed: Container[int] = (), as_hulls: bool = True) -> Path:
+    """The robot's folder with robot.urdf, robot.srdf, robot.toml, and the `meshed` links as meshes, of their hulls or
+    of their solids as they are."""
     folder.mkdir(parents=True)
     solids = [sketch.base, *(link.solids for link in sketch.links)]
-    links = [_link(folder, number, shapes, with_meshes and number in MESHED) for number, shapes in enumerate(solids)]
+    links = [_link(folder, number, shapes, number in meshed, as_hulls) for number, shapes in enumerate(solids)]
     joints = [_joint(number, link) for number, link in enumerate(sketch.links, 1)]
     tool = f'{_origin(sketch.tool, (sketch.tool_twist, 0.0, 0.0))}<parent link="link_{len(sketch.links)}"/>'
     mount = f'<joint name="mount" type="fixed">{tool}<child link="tool"/></joint>'
@@ -216,15 +220,16 @@ def _joint(number: int, link: MovingLink) -> str:
     )
 
 
-def _link(folder: Path, number: int, solids: Sequence[SketchSolid], with_meshes: bool) -> str:
-    if not with_meshes:
+def _link(folder: Path, number: int, solids: Sequence[SketchSolid], is_mesh: bool, as_hull: bool) -> str:
+    if not is_mesh:
         shapes = "".join(
             f"<collision>{_origin(solid.at, solid.turn)}<geometry>{_form(solid)}</geometry></collision>"
             for solid in solids
         )
         return f'<link name="link_{number}">{shapes}</link>'
     name = f"link_{number}.stl"
-    mesh = trimesh.util.concatenate([_meshed(solid) for solid in solids]).convex_hull
+    mesh = trimesh.util.concatenate([_meshed(solid) for solid in solids])
+    mesh = mesh.convex_hull if as_hull else mesh
     (folder / name).write_bytes(trimesh.exchange.stl.export_stl(mesh))
     return f'<link name="link_{number}"><collision><geometry><mesh filename="{name}"/></geometry></collision></link>'
 

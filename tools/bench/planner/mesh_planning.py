@@ -26,7 +26,10 @@ from gemelo.schemas.scene import MeshShape, PlanningScene, SceneObject
 from gemelo.services.planner.collision.clearance import CLEARANCE
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.core import Planner
-from gemelo.tools.bench.figures import Figure, of_samples
+from gemelo.tools.bench.any_arm.drawn_problems import problems
+from gemelo.tools.bench.any_arm.generated_arms import generated_arm
+from gemelo.tools.bench.figures import Figure, of_samples, quantile
+from gemelo.tools.bench.planner.any_planning import planned
 from gemelo.tools.bench.planner.trials import spread
 from gemelo.tools.bench.problems.problem_sets import ALLOWED
 from gemelo.tools.bench.scenes import TABLE, parol6
@@ -38,6 +41,7 @@ RADIUS, DENTS = 0.08, 0.02  # [m]
 PLACE = (0.28, 0.12, 0.16)  # [m] in front of the arm
 PROBLEMS, WARMING, SEED = 40, 2, 4
 STARTS = 3  # warm ones
+IMPORTED, FEW = ("table pick", "box", "three shelves"), 12  # families, and problems of each
 LINKS = ("base_link", "brazo_link", "efector_link")
 HEIGHTS = (-2.0, 2.0, 0.9)  # [m] of the rocks in their links, where they touch nothing
 LINK = """
@@ -82,10 +86,32 @@ def plan_mesh_ms() -> Figure:
     reference = {"the scene taken in": loaded, "the first plan in it": done[0][0]}
     reference |= spread("searched", searched, 0.5, 0.99)
     reference["solved %"] = 100.0 * sum(answer.refusal is None for _, answer in answers) / len(answers)
+    reference |= as_imported()
     note = (
         f"parol6, a table and a rock of {triangles()} triangles, {PROBLEMS} random problems, {len(searched)} searched"
     )
     return of_samples([took for took, _ in answers], None, reference, note)
+
+
+def as_imported() -> dict[str, float]:
+    """Times of the CPU [ms] of plans for an arm with hand-made solids and for the same as a stranger imports it, whose
+    links are raw meshes; and how many times as long."""
+    reference: dict[str, float] = {}
+    samples: dict[str, list[float]] = {}
+    for name in ("six", "six_raw"):
+        planner = Planner(generated_arm(name))
+        planner.prepare()
+        some = [problem for family in IMPORTED for problem in problems(planner.arm, planner.kinematics, family, FEW)]
+        for problem in some[:WARMING]:
+            planned(planner, problem)
+        done = [planned(planner, problem) for problem in some]
+        samples[name] = [worked for response, worked, _ in done if response.refusal is None]
+        reference |= spread(name, samples[name], 0.5, 0.99)
+        reference[f"{name}, solved %"] = 100.0 * len(samples[name]) / len(some)
+    for share in (0.5, 0.99):
+        ratio = quantile(samples["six_raw"], share) / quantile(samples["six"], share)
+        reference[f"six_raw as a share of six, p{100 * share:.0f}"] = ratio
+    return reference
 
 
 def first_plan_s() -> Figure:

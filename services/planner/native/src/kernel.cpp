@@ -4,6 +4,7 @@
 // Spheres in trees: what is far from the sphere around a whole link is far from the link. `near` asks the same question
 // with the path added that a part may move within the stretch that a lane stands for: a lane that is not near is free
 // on its whole stretch.
+#include "apart.h"
 #include "gaps.h"
 
 namespace gemelo {
@@ -68,7 +69,12 @@ class CollisionCheck {
             const Descent down{part.nodes, &frames_[part.frame], world_.obstacles, first, -1};
             descend(down, 0, centre_of(frames_[part.frame], part.nodes[0]), obstacle, 1);
         } else {
+            const int32_t pair = pair_of({first, second});
+            if (pair >= 0) ask_table(world_.pairs[pair], query_.pair_motion[pair]);
             against_solids(first, second);
+            known_ = {};
+            // What is only near, as the table knows, is not noted: the whole question comes to it again.
+            if (result_.hits == 0) result_ = {0, 0, -1, -1};
         }
         return result_.hits != 0;
     }
@@ -82,12 +88,13 @@ class CollisionCheck {
     // The lanes that could still learn something from a squared distance of which `limit` is the least that is free.
     uint32_t within(const Lanes& gap, float limit) const {
         const Lanes wide = open_ + limit;
-        return not_beyond(gap, wide * wide) & query_.lanes & (query_.marks != nullptr ? kAllLanes : ~result_.hits);
+        return not_beyond(gap, wide * wide) & query_.lanes & ~known_.throughout &
+               (query_.marks != nullptr ? kAllLanes : ~result_.hits);
     }
 
     void note(const Lanes& gap, float limit, uint32_t near, int32_t first, int32_t second) {
         const Lanes narrow(limit * limit);
-        const uint32_t hits = not_beyond(gap, narrow) & near;
+        const uint32_t hits = not_beyond(gap, narrow) & near & ~known_.here;
         result_.hits |= hits;
         if ((near & ~result_.near) != 0 || hits != 0) {
             result_.first = first;
@@ -151,6 +158,7 @@ class CollisionCheck {
 
     void against_itself(int32_t pair) {
         const PairView& both = world_.pairs[pair];
+        if (both.table != nullptr && query_.ways != nullptr && both.table->least > query_.margin) return;
         const PartView &first = world_.parts[both.first], &second = world_.parts[both.second];
         begin(half_ * query_.pair_motion[pair].travel);
         const float limit = first.nodes[0].radius + second.nodes[0].radius + query_.margin;
@@ -161,7 +169,17 @@ class CollisionCheck {
             begin(bounded(query_.pair_motion[pair], straight));
             if (within(gap, limit) == 0) return;
         }
-        against_solids(both.first, both.second);
+        ask_table(both, query_.pair_motion[pair]);
+        if (within(gap, limit) != 0) against_solids(both.first, both.second);
+        known_ = {};
+    }
+
+    // What is known of this pair from here on, until it is done with.
+    void ask_table(const PairView& pair, const MotionView& most) {
+        if (pair.table == nullptr) return;
+        float limits[kLanes];
+        store(query_.ways != nullptr ? Lanes(query_.margin) : half_ * most.travel + query_.margin, limits);
+        known_ = apart(*pair.table, query_.joints, query_.ways, limits, query_.lanes);
     }
 
     // The spheres of the one part against the solids of the other.
@@ -216,6 +234,7 @@ class CollisionCheck {
     Lanes motion_;  // [m] the present part or pair may move within a lane's stretch
     Lanes open_;    // the same, and 0 in lanes that are known to be near
     Lanes slack_;
+    Apart known_;  // of the present pair, by its table
     Placement frames_[kMaxFrames];
     Twist twists_[kMaxFrames];
     Point roots_[kMaxParts];

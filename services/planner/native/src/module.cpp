@@ -289,11 +289,32 @@ Obstacle make_placed_obstacle(int shape, const Vector& place, const std::array<d
     return obstacle;
 }
 
-std::shared_ptr<const Body> make_body(std::shared_ptr<const Chain> chain, Parts parts, const Integers& pairs) {
+// `axes` are two rows: the joint value, its low and high end, 1 for a whole turn; `bounds` (rows, columns) [m].
+std::shared_ptr<const PairTable> make_pair_table(int first, int second, const Rows& axes, const Rows& bounds) {
+    require(axes.shape(0) == 2 && axes.shape(1) == 4, "a table has two axes of four numbers");
+    const auto axis = [&](size_t i) {
+        return TableAxis{static_cast<int32_t>(axes(i, 0)), axes(i, 1), axes(i, 2), axes(i, 3) != 0.0};
+    };
+    return std::make_shared<const PairTable>(first, second, axis(0), axis(1), static_cast<int32_t>(bounds.shape(0)),
+                                             static_cast<int32_t>(bounds.shape(1)), bounds.data());
+}
+
+// Of every pair its parts, and how far each joint value moves these at most against one another.
+nb::list reaches_between(const Body& body) {
+    nb::list found;
+    for (size_t pair = 0; pair < body.pairs().size(); ++pair) {
+        const PairView& both = body.pairs()[pair];
+        found.append(nb::make_tuple(both.first, both.second, body.reaches_between(pair)));
+    }
+    return found;
+}
+
+std::shared_ptr<const Body> make_body(std::shared_ptr<const Chain> chain, Parts parts, const Integers& pairs,
+                                      Tables tables) {
     require_columns(pairs.shape(1), 2, "pairs");
     std::vector<PairView> both;
-    for (size_t i = 0; i < pairs.shape(0); ++i) both.push_back({pairs(i, 0), pairs(i, 1), 0});
-    return std::make_shared<const Body>(std::move(chain), std::move(parts), std::move(both));
+    for (size_t i = 0; i < pairs.shape(0); ++i) both.push_back({pairs(i, 0), pairs(i, 1), 0, nullptr});
+    return std::make_shared<const Body>(std::move(chain), std::move(parts), std::move(both), std::move(tables));
 }
 
 std::shared_ptr<const Surroundings> make_surroundings(std::vector<Obstacle> obstacles) {
@@ -501,6 +522,7 @@ NB_MODULE(_motion, module) {
     nb::class_<Part>(module, "Part");
     nb::class_<TriangleMesh>(module, "TriangleMesh");
     nb::class_<Obstacle>(module, "Obstacle");
+    nb::class_<PairTable>(module, "PairTable");
     nb::class_<Body>(module, "Body");
     nb::class_<Surroundings>(module, "Surroundings");
     nb::class_<World>(module, "World");
@@ -551,7 +573,9 @@ NB_MODULE(_motion, module) {
     module.def("obstacle", &make_obstacle, "shape"_a, "pose"_a, "size"_a, "rounding"_a, "touching"_a, "mesh"_a.none());
     module.def("placed_obstacle", &make_placed_obstacle, "shape"_a, "place"_a, "quaternion"_a, "size"_a, "rounding"_a,
                "touching"_a, "mesh"_a.none());
-    module.def("body", &make_body, "chain"_a, "parts"_a, "pairs"_a);
+    module.def("body", &make_body, "chain"_a, "parts"_a, "pairs"_a, "tables"_a);
+    module.def("pair_table", &make_pair_table, "first"_a, "second"_a, "axes"_a, "bounds"_a);
+    module.def("reaches_between", &reaches_between, "body"_a);
     module.def("surroundings", &make_surroundings, "obstacles"_a);
     module.def("world", &make_world, "body"_a, "surroundings"_a);
     module.def("are_free", &are_free, "world"_a, "kernel"_a, "rows"_a, "margin"_a);

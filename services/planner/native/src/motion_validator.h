@@ -209,6 +209,7 @@ class MotionValidator {
     template <class Path>
     uint32_t check(const Path& path, size_t next, size_t count, bool is_one_enough = true, uint8_t* marks = nullptr) {
         float joints[kMaxDof * kLanes], half[kLanes], steps[kMaxDof * kLanes], slack[kLanes];
+        float ways[kMaxDof * kLanes];
         double row[kMaxDof], rates[kMaxDof];
         const size_t dof = this->dof();
         const bool is_moving = !slowness_.empty();
@@ -219,14 +220,19 @@ class MotionValidator {
             half[lane] = raised(stretch.half * (is_moving ? slowness_[stretch.span] : 0.0));
             if (!is_moving) continue;
             const double off = path.rate(stretch.span, stretch.middle, stretch.half, speed(stretch.span), rates);
-            for (size_t i = 0; i < dof; ++i) steps[i * kLanes + lane] = static_cast<float>(stretch.half * rates[i]);
+            const double* most = speed(stretch.span);
+            for (size_t i = 0; i < dof; ++i) {
+                steps[i * kLanes + lane] = static_cast<float>(stretch.half * rates[i]);
+                ways[i * kLanes + lane] = raised(stretch.half * most[i]);
+            }
             slack[lane] = raised(off * static_cast<double>(half[lane]));
         }
         const uint32_t lanes = (1u << count) - 1;
         const float margin = static_cast<float>(tolerances_.margin);
         kernel_.check(world_.view(),
                       {joints, half, is_moving ? steps : nullptr, slack, part_motion_.data(), pair_motion_.data(),
-                       margin, lanes, is_one_enough, marks, is_one_enough ? touching_pair_ : ContactView{}, near_pair_},
+                       margin, lanes, is_one_enough, marks, is_one_enough ? touching_pair_ : ContactView{}, near_pair_,
+                       is_moving ? ways : nullptr},
                       result_);
         checks_ += count;
         if (is_learning_ && result_.first >= 0) {

@@ -80,10 +80,29 @@ struct PartView {
     int32_t frame;
 };
 
+constexpr int kMostLevels = 12;
+
+// `count` cells along one joint's values, from `low` on, `scale` for each unit; with `is_turn` they go around.
+struct TableAxisView {
+    int32_t drive, count, is_turn;
+    float low, scale;
+};
+
+// How far two parts are apart at least, by the cell that both joint values are in; every level has the least of two by
+// two cells of the one before, by rows.
+struct TableView {
+    const float* cells;
+    TableAxisView axes[2];
+    int32_t offsets[kMostLevels];
+    int32_t level_count;
+    float least;  // of all
+};
+
 // Parts that may not touch: the spheres of the first against the solids of the second.
 struct PairView {
     int32_t first, second;
-    int32_t common = 0;  // the last frame that carries both
+    int32_t common = 0;                // the last frame that carries both
+    const TableView* table = nullptr;  // null: only the spheres can tell
 };
 
 // How far at most a part, or two together, move [m] while the path's parameter goes on by 1.
@@ -120,6 +139,9 @@ struct CheckQuery {
     uint8_t* marks;  // null, or [parts][kMaxParts + obstacles]: all pairs near in a lane that matters are set to 1
     // What is asked about first, for it has mostly been found before: whether these touch, and what is near these.
     ContactView touching = {}, near = {};
+    // [dof][kLanes]: how far at most each joint value goes within a lane's stretch, to either side; null where none
+    // moves.
+    const float* ways = nullptr;
 };
 
 struct CheckResult {

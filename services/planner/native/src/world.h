@@ -3,11 +3,13 @@
 
 #include <array>
 
+#include "pair_table.h"
 #include "robot.h"
 
 namespace gemelo {
 
 using Parts = std::vector<std::shared_ptr<const Part>>;
+using Tables = std::vector<std::shared_ptr<const PairTable>>;
 
 // What stands around an arm: the obstacles, and spheres around them in a tree. Never changed once built.
 struct Surroundings {
@@ -42,12 +44,15 @@ struct Surroundings {
 // An arm and what it holds, without what stands around it. Never changed once built.
 class Body {
   public:
-    Body(std::shared_ptr<const Chain> chain, Parts parts, std::vector<PairView> pairs)
-        : chain_(std::move(chain)), parts_(std::move(parts)), pairs_(std::move(pairs)) {
+    Body(std::shared_ptr<const Chain> chain, Parts parts, std::vector<PairView> pairs, Tables tables)
+        : chain_(std::move(chain)), parts_(std::move(parts)), pairs_(std::move(pairs)), tables_(std::move(tables)) {
         require_sound();
         for (PairView& pair : pairs_) {
             if (cost(pair.second, pair.first) < cost(pair.first, pair.second)) std::swap(pair.first, pair.second);
             pair.common = common_frame(pair);
+            for (const auto& table : tables_) {
+                if (table->is_of(pair.first, pair.second)) pair.table = &table->view();
+            }
         }
         for (const auto& part : parts_) {
             part_views_.push_back(
@@ -68,6 +73,17 @@ class Body {
         for (const auto& part : parts_) sum += part->spheres.size();
         return sum;
     }
+
+    // How far each joint value moves a pair of parts at most against one another, (dof,) [m/rad] or [m/m]; 0 where it
+    // does not.
+    std::vector<double> reaches_between(size_t pair) const {
+        std::vector<double> sums(static_cast<size_t>(dof()), 0.0);
+        for (const Carriers& each : pair_carriers_.at(pair)) {
+            for (const Carrier& carrier : each) sums[static_cast<size_t>(carrier.drive)] += carrier.reach;
+        }
+        return sums;
+    }
+    const std::vector<PairView>& pairs() const { return pairs_; }
 
     WorldView among(const Surroundings& around) const {
         return {chain_->frames.data(), part_views_.data(),      pairs_.data(),           around.obstacles.data(),
@@ -100,6 +116,11 @@ class Body {
         }
         for (const auto& part : parts_) {
             if (part->frame < 0 || part->frame >= count(chain_->frames)) throw BadModel("a part's frame must exist");
+        }
+        for (const auto& table : tables_) {
+            for (const TableAxisView& axis : table->view().axes) {
+                if (axis.drive < 0 || axis.drive >= chain_->dof) throw BadModel("a table's joint value must exist");
+            }
         }
         for (const PairView& pair : pairs_) {
             const bool is_sound = pair.first >= 0 && pair.first < count(parts_) && pair.second >= 0 &&
@@ -168,6 +189,7 @@ class Body {
     std::shared_ptr<const Chain> chain_;
     Parts parts_;
     std::vector<PairView> pairs_;
+    Tables tables_;
     std::vector<PartView> part_views_;
     std::vector<std::vector<double>> reaches_;  // of every part by frame: [m/rad] or [m/m]
     std::vector<Carriers> carriers_;
