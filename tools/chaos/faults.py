@@ -64,6 +64,7 @@ from gemelo.tools.chaos.replays import (
     replayed_during_another_move,
     replayed_later,
 )
+from gemelo.tools.chaos.streams import dying_stream, replayed_stream, stalling_stream, stream_of_two
 
 READY = 20.0  # [s] after the heal in which every process is ready again: docs/inside/failures.md, on a busy machine
 
@@ -172,6 +173,10 @@ FAULTS: tuple[Fault, ...] = (
     Fault("flutter of holds", "many holds and resumes", fluttering_holds, heal=resumed),
     Fault("flutter of stops", "many moves, each stopped soon", fluttering_stops),
     Fault("goal and stop", "in one breath", goal_and_stop),
+    Fault("stream dies", "no target follows the last one", dying_stream),
+    Fault("stream stalls", "targets come in bursts", stalling_stream),
+    Fault("stream replayed", "older targets between the newer", replayed_stream),
+    Fault("stream of two", "two clients send targets", stream_of_two),
     Fault("goal replayed", "by its client, after its end", replayed_later(by_the_same_client)),
     Fault("goal replayed by another", "after its end", replayed_later(by_another_client)),
     Fault("goal replayed after a restart", "of the gateway", replayed_after_a_restart),

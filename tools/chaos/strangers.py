@@ -17,7 +17,8 @@ from gemelo.libraries.runtime.bus.branches import is_of_many
 from gemelo.libraries.runtime.bus.interface import BusReply
 from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
 from gemelo.schemas.deployment import RouterSection
-from gemelo.schemas.topics import ACTIONS, CAMERA_TOPICS, TOPICS, Delivery
+from gemelo.schemas.message import M, encode
+from gemelo.schemas.topics import ACTIONS, CAMERA_TOPICS, TOPICS, Delivery, Topic
 
 KEPT = 200  # frames of the wire that can be said again
 STRANGER = "stranger"  # its name where each node has a key of its own
@@ -85,6 +86,12 @@ class BusStranger:
         with suppress(Empty):
             return answers.get(timeout=timeout + 1.0)
         return None
+
+    def publish(self, topic: Topic[M], message: M) -> None:
+        """One message, as a client of its own."""
+        publication = self._bus.publish(topic.key, topic.message.__name__, topic.delivery, STRANGER)
+        publication.put(encode(message))
+        publication.close()
 
     def noise(self, random: Random) -> None:
         """Random bytes on every key, under its own schema's name or another."""
