@@ -238,6 +238,7 @@ class Planner:
                         context.deadline,
                         context.watch,
                         motion.attempts,
+                        are_lines_blocked=True,
                     )
                 return context.builder.path(path), path.planner_id
             except (PathNotFound, DeadlinePassed) as not_found:

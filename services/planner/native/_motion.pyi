@@ -131,6 +131,7 @@ def plan(
     seconds: float,
     cancel: CancelFlag | None,
     enough: int,
+    are_lines_blocked: bool,
 ) -> Plan: ...
 def quintics(
     stamps: Array,

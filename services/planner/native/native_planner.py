@@ -200,12 +200,14 @@ class NativePlanner:
         time_limit: float = math.inf,
         cancel: CancelFlag | None = None,
         enough: int = 0,
+        are_lines_blocked: bool = False,
     ) -> FreePath | NoPath:
         """A path from `start` (n,) to one of `goals` (n,) or (m, n), by RRT-Connect, shortened and smoothed.
 
         The same seed gives the same path, unless `time_limit` [s] cuts the shortening off. Distances are counted in
         time at full speed. Other searches look for a shorter path until `enough` configurations have been checked, or
-        fewer where it is not half as long again as the straight line: in proportion to what is to be gained. The
+        fewer where it is not half as long again as the straight line: in proportion to what is to be gained. With
+        `are_lines_blocked` the straight lines to all goals are known not to be free, and not looked at. The
         interpreter's lock is released; `cancel` may be set from another thread.
         """
         rows = self._rows(np.atleast_2d(np.asarray(goals, dtype=np.float64)))
@@ -213,7 +215,9 @@ class NativePlanner:
         bounds = np.array((*self._span(at, rows), self._weights))
         flag = cancel if isinstance(cancel, NativeCancelFlag) else None  # another kind is only seen by the caller
         world, margin = self._scene.world, self.margin
-        done = motion.plan(world, self._kernel, bounds, at, rows, seed, margin, time_limit, flag, enough)
+        done = motion.plan(
+            world, self._kernel, bounds, at, rows, seed, margin, time_limit, flag, enough, are_lines_blocked
+        )
         effort = Effort(done.search_s, done.shorten_s, done.smooth_s, done.iterations, done.checks)
         if done.outcome != FOUND:
             return NoPath(FailureReason(done.outcome), effort)

@@ -60,9 +60,11 @@ class Search:
         deadline: Deadline,
         watch: Stopwatch,
         attempts: int = 1,
+        are_lines_blocked: bool = False,
     ) -> Path:
         """A smooth path from `start` (n,) to one of `goals` (m, n) that keeps `margin` [m], after as many `attempts` as
-        usual for a shorter one; raises `PathNotFound`, `PlanRefused`."""
+        usual for a shorter one; with `are_lines_blocked` no straight line is free. Raises `PathNotFound`,
+        `PlanRefused`."""
         require_known(planner_id)
         core, seed = self._checker.native(margin), seed % SEEDS
         if core is None and planner_id == NATIVE:
@@ -70,13 +72,14 @@ class Search:
         sought = Sought(self._arm, start, goals, ValidityChecker(self._checker, margin), seed, attempts, watch)
         if core is not None and planner_id in ("", NATIVE):
             try:
-                return self._native(core, sought, deadline if planner_id else deadline.share(PATIENCE))
+                until = deadline if planner_id else deadline.share(PATIENCE)
+                return self._native(core, sought, until, are_lines_blocked)
             except PathNotFound:
                 if planner_id or deadline.has_passed():
                     raise
         return self._sampled(planner_id or DEFAULT, sought, deadline)
 
-    def _native(self, core: NativePlanner, sought: Sought, deadline: Deadline) -> Path:
+    def _native(self, core: NativePlanner, sought: Sought, deadline: Deadline, are_lines_blocked: bool) -> Path:
         """By the native planner, between where it lets the arm be; from the start and to a goal by straight lines."""
         start, *goals = nearby_free(
             self._arm, core, [sought.start, *sought.goals], sought.validity, sought.seed, deadline
@@ -86,7 +89,10 @@ class Search:
         ends = [(goal, near) for goal, near in zip(sought.goals, goals, strict=True) if near is not None]
         if not ends:
             raise PathNotFound(SearchFailure.GOAL_TOUCHES)
-        path = native_path(core, start, np.array([near for _, near in ends]), sought.seed, sought.attempts, deadline)
+        is_moved = start is not sought.start or any(near is not goal for goal, near in ends)
+        nears = np.array([near for _, near in ends])
+        blocked = are_lines_blocked and not is_moved
+        path = native_path(core, start, nears, sought.seed, sought.attempts, deadline, blocked)
         reached = path.corners[-1].tolist()
         goal = next(goal for goal, near in ends if near.tolist() == reached)
         return self._joined(sought, start, path, goal, deadline)
@@ -127,16 +133,22 @@ def _search_of(planner_id: str) -> Corners:
 
 
 def native_path(
-    core: NativePlanner, start: Array, goals: Array, seed: int, attempts: int, deadline: Deadline
+    core: NativePlanner,
+    start: Array,
+    goals: Array,
+    seed: int,
+    attempts: int,
+    deadline: Deadline,
+    are_lines_blocked: bool = False,
 ) -> FreePath:
     """A path from `start` (n,) to one of `goals` (m, n), [rad] or [m]: the shortest of as many as `ENOUGH` checks find,
     times `attempts`, and fewer where it is nearly as short as any can be; raises `PathNotFound`.
 
-    Searched, shortened and smoothed by the native planner. The same seed gives the same path where the time does not
-    end it.
+    Searched, shortened and smoothed by the native planner; no straight line is looked at where `are_lines_blocked`. The
+    same seed gives the same path where the time does not end it.
     """
     enough = attempts * ENOUGH
-    path = core.plan(start, goals, seed=seed, time_limit=deadline.left, cancel=deadline.cancel, enough=enough)
+    path = core.plan(start, goals, seed, deadline.left, deadline.cancel, enough, are_lines_blocked)
     if isinstance(path, NoPath):
         raise PathNotFound(REASONS.get(path.reason.name, SearchFailure.TIMED_OUT))
     return path

@@ -178,6 +178,16 @@ def test_every_build_of_the_check_finds_the_same_path(arm, configurations):
         assert np.array_equal(plain.control, best.control)
 
 
+def test_lines_that_are_known_to_be_blocked_are_not_looked_at_again(core, configurations):
+    core.set_scene(SHELF)
+    start, goal = _bent(core, configurations(400, 3))
+    looked, known = (core.plan(start, goal, seed=7, are_lines_blocked=blocked) for blocked in (False, True))
+    assert isinstance(looked, FreePath)
+    assert isinstance(known, FreePath)
+    assert np.array_equal(looked.control, known.control)
+    assert known.effort.checks < looked.effort.checks
+
+
 def test_any_of_several_goals_will_do():
     core = NativePlanner(load("rm1"))
     core.set_scene([crate("crate", (0.1, 0.1, 0.3), (0.4, 0.0, 0.15))])

@@ -13,6 +13,7 @@ from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.services.planner.collision import pair_tables
 from gemelo.services.planner.collision.sphere_check import native_planner
 from gemelo.services.planner.collision.world import World
+from gemelo.services.planner.native import model_cache
 from gemelo.services.planner.native.distance_tables import Axis, PairTable
 from gemelo.services.planner.native.native_planner import NativePlanner
 from gemelo.tools.bench.any_arm.generated_arms import HALF, ArmSketch, MovingLink, SketchSolid, written
@@ -91,7 +92,8 @@ def test_with_a_table_more_is_free_and_all_that_is_free_is_so_by_coal(near: ArmD
     assert planner.distance(rows[int(distances.argmax())]) <= distances.max() + UNSURE
 
 
-def test_a_table_is_made_once_for_an_arm(near: ArmDescription, monkeypatch: pytest.MonkeyPatch):
+def test_a_table_is_made_once_for_an_arm(near: ArmDescription, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv(model_cache.FOLDER, str(tmp_path))
     planner = native_planner(near)
     assert planner is not None
     once = pair_tables.pair_tables(near, planner)

@@ -462,11 +462,11 @@ std::vector<Joints> each_row(const Rows& rows, const World& world, const char* w
 }
 
 Plan find(const World& world, const Kernel& kernel, const Rows& bounds, const Row& start, const Rows& goals,
-          uint64_t seed, double margin, double seconds, Flag cancel, uint64_t enough) {
+          uint64_t seed, double margin, double seconds, Flag cancel, uint64_t enough, bool are_lines_blocked) {
     const auto limits = each_row(bounds, world, "bounds (lower, upper, weights)");
     require(limits.size() == 3, "bounds are three rows: lower, upper, weights");
     const Space space{limits[0], limits[1], limits[2]};
-    PlanQuery query{joints_of(start, world), each_row(goals, world, "goals"), seed, enough};
+    PlanQuery query{joints_of(start, world), each_row(goals, world, "goals"), seed, enough, are_lines_blocked};
     require(!query.goals.empty(), "a plan needs at least one goal");
     nb::gil_scoped_release release;
     Tolerances tolerances;
@@ -586,7 +586,7 @@ NB_MODULE(_motion, module) {
                "cancel"_a.none());
     module.def("unresolved", &unresolved, "world"_a, "kernel"_a, "rows"_a, "margin"_a, "finest"_a);
     module.def("plan", &find, "world"_a, "kernel"_a, "bounds"_a, "start"_a, "goals"_a, "seed"_a, "margin"_a,
-               "seconds"_a, "cancel"_a.none(), "enough"_a);
+               "seconds"_a, "cancel"_a.none(), "enough"_a, "are_lines_blocked"_a);
     add_trajectories(module);
     module.def("centres", &centres, "world"_a, "kernel"_a, "rows"_a);
     module.def("nearest_rows", &nearest_rows, "rows"_a, "weights"_a, "points"_a);

@@ -21,8 +21,9 @@ struct PlanQuery {
     Joints start;
     std::vector<Joints> goals;  // any of them will do
     uint64_t seed = 0;
-    uint64_t enough = 0;  // configurations to check at most before no other search is begun; 0: one search
-    int patience = 6;     // of the shortener; measured
+    uint64_t enough = 0;             // configurations to check at most before no other search is begun; 0: one search
+    bool are_lines_blocked = false;  // known of the straight lines from the start to all goals
+    int patience = 6;                // of the shortener; measured
 };
 
 constexpr double kMuchLonger = 0.5;      // more than the least possible length: all of `enough` is spent; measured
@@ -63,7 +64,7 @@ inline void find_shortest(const Space& space, MotionValidator& searching, Motion
         Search search(space, searching, random, stop);
         const uint64_t worth = worth_checking(query.enough, least, bound);
         const uint64_t most = worth - std::min(worth, shortening.checks());
-        std::vector<Joints> path = result.path.empty() ? search.find(query.start, goals)
+        std::vector<Joints> path = result.path.empty() ? search.find(query.start, goals, query.are_lines_blocked)
                                                        : search.find_shorter(query.start, goals, least, most);
         const double found = stop.elapsed();
         result.search_s += found - began;

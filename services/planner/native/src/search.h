@@ -18,10 +18,11 @@ class Search {
 
     size_t iterations() const { return iterations_; }
 
-    // A path from `start` to one of `goals`, all of which must be free; none when it was stopped.
-    std::vector<Joints> find(const Joints& start, const std::vector<Joints>& goals) {
+    // A path from `start` to one of `goals`, all of which must be free; none when it was stopped. The straight lines
+    // are not looked at where none is known to be free.
+    std::vector<Joints> find(const Joints& start, const std::vector<Joints>& goals, bool are_lines_blocked) {
         for (const Joints& goal : goals) {
-            if (validator_.is_free_line(start.data(), goal.data(), stop_)) return {start, goal};
+            if (!are_lines_blocked && validator_.is_free_line(start.data(), goal.data(), stop_)) return {start, goal};
         }
         const double everything = std::numeric_limits<double>::infinity();
         nearest_ = everything;
