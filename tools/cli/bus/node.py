@@ -12,7 +12,7 @@ from gemelo.schemas.system import Empty, NodeInfo
 from gemelo.tools.cli.bus.messages import dump
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown
 from gemelo.tools.cli.common.forms import print_value
-from gemelo.tools.cli.common.language import reason_or
+from gemelo.tools.cli.common.language import columns, reason_or, word
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options, Parser, json_option
@@ -107,7 +107,7 @@ def standings(session: CommandSession) -> list[NodeState]:
 
 def listing(found: Sequence[NodeState]) -> str:
     """The table for a person."""
-    headings = ("node", "robot", "host", "pid", "version", "started [local time]", "ready", "clock")
+    headings = columns("node", "robot", "host", "pid", "version", "started [local time]", "ready", "clock")
     return table(headings, [_cells(each) for each in found])
 
 
@@ -116,6 +116,7 @@ def _cells(each: NodeState) -> Sequence[str]:
     if info is None:
         return (each.node, "-", "-", "-", "-", "-", "does not answer", "-")
     started = datetime.datetime.fromtimestamp(info.started / 1e9).strftime("%H:%M:%S")
-    ready = "yes" if info.ready else reason_or(info.why, info.problem) or "no"
+    yes, no = word("device_line", "yes"), word("device_line", "no")
+    ready = yes if info.ready else reason_or(info.why, info.problem) or no
     clock = "-" if each.clock is None else str(each.clock)
     return (each.node, info.robot, info.host, str(info.pid), info.version, started, ready, clock)

@@ -13,7 +13,7 @@ from gemelo.tools.cli.bus.messages import dump
 from gemelo.tools.cli.bus.node import TIMEOUT, living, node_option, require_alive
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, hint_of, usage
 from gemelo.tools.cli.common.forms import print_value
-from gemelo.tools.cli.common.language import sentence
+from gemelo.tools.cli.common.language import columns, sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options, Parser, json_option
@@ -95,7 +95,7 @@ def parameter_table(found: Iterable[NodeParameters]) -> str:
         for name, declared in found
         for each in declared
     ]
-    return table(("node", "parameter", "type", "value", "default", "range", "about, with unit"), rows)
+    return table(columns("node", "parameter", "type", "value", "default", "range", "about, with unit"), rows)
 
 
 def written(value: ParameterValue) -> str:

@@ -28,7 +28,7 @@ from gemelo.tools.cli.common.forms import (
     rows_form_of,
     yaml_document,
 )
-from gemelo.tools.cli.common.language import sentence
+from gemelo.tools.cli.common.language import columns, sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option, positive_number
@@ -312,4 +312,4 @@ def monitor_table(rates: Sequence[FrameRate]) -> str:
         (each.frame, f"{each.rate:.1f}", f"{1000.0 * each.delay_mean:.1f}", f"{1000.0 * each.delay_max:.1f}")
         for each in rates
     ]
-    return table(("frame", "rate [Hz]", "mean delay [ms]", "most [ms]"), rows)
+    return table(columns("frame", "rate [Hz]", "mean delay [ms]", "most [ms]"), rows)

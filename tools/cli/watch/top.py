@@ -14,7 +14,7 @@ from gemelo.schemas.topics import STATISTICS, TOPICS
 from gemelo.tools.cli.bus.node import is_command, told_information_of
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.common.forms import Form, count_options, csv_rows, form_options, json_line
-from gemelo.tools.cli.common.language import sentence
+from gemelo.tools.cli.common.language import columns, sentence
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options, Parser
@@ -60,7 +60,9 @@ class TopReport(msgspec.Struct, frozen=True, kw_only=True):
     slow_topics: tuple[SlowTopic, ...]
 
     def __str__(self) -> str:
-        return "\n".join([table(HEADINGS, [_cells(each) for each in self.nodes]), *map(str, self.slow_topics)])
+        return "\n".join(
+            [table(columns(*HEADINGS), [_cells(each) for each in self.nodes]), *map(str, self.slow_topics)]
+        )
 
 
 class Figures(NamedTuple):
