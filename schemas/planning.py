@@ -263,7 +263,7 @@ class PlanProgress(Message, frozen=True, kw_only=True):
 
 
 class PlannedPath(Message, frozen=True, kw_only=True):
-    """The way the tool will take in the base frame, for eyes."""
+    """The way the tool will take in the base frame, for display."""
 
     stamp: int = 0  # [ns] UNIX time
     frame: str = ""

@@ -127,7 +127,7 @@ STATIC_FRAMES = Topic(
     "static_frames", frames.FrameTransforms, LATCHED, None, True, STATE_PUBLISHER, "poses of the fixed links",
 )
 PLANNED_PATH = Topic(
-    "planned_path", planning.PlannedPath, LATCHED, None, True, PLANNER, "the tool's planned way", (VISUALIZER,),
+    "planned_path", planning.PlannedPath, LATCHED, None, True, PLANNER, "the tool's planned path", (VISUALIZER,),
 )
 PLAN_PROGRESS = Topic(  # EVERY: several plans share the key, and the newest of one must not push out another's
     "plan/progress", planning.PlanProgress, EVERY, None, True, PLANNER,

@@ -41,7 +41,7 @@ def expiries(file: Path) -> tuple[float, ...]:
 
 
 def not_after(der: bytes) -> float:
-    """[s] UNIX time after which a certificate is not valid; raises `ValueError` for what is none."""
+    """[s] UNIX time after which a certificate is not valid; raises `ValueError` for bytes that are no certificate."""
     try:
         (_, signed), *_ = elements(next(elements(der))[1])
         _, _, _, (_, validity), *_ = (each for each in elements(signed) if each[0] != VERSION)

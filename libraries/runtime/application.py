@@ -10,7 +10,7 @@ from typing import NoReturn
 from gemelo.libraries.runtime.deployment import load_deployment
 from gemelo.libraries.runtime.errors import BusError, RequestRefused
 from gemelo.libraries.runtime.node import Node
-from gemelo.libraries.runtime.process.freed_memory import give_back_freed_memory
+from gemelo.libraries.runtime.process.freed_memory import return_freed_memory
 from gemelo.libraries.runtime.process.leaving import end_process
 from gemelo.libraries.runtime.process.logs import LEVELS, line_logger
 from gemelo.libraries.runtime.process.shutdown import (
@@ -37,7 +37,7 @@ def service(name: str, run: Run, arguments: Sequence[str] | None = None, grace: 
     read_early()
     stop = ShutdownRequest()
     end_with_any_thread(line_logger(name, options.log_level), lambda: stop.is_set)
-    give_back_freed_memory()
+    return_freed_memory()
     with stop_on_signals(stop, grace):
         code = _run(name, run, options, stop)
     end_soon(code)  # whatever an exit handler does

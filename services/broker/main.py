@@ -17,7 +17,7 @@ from gemelo.libraries.runtime.certificate_watch import CertificateWatch
 from gemelo.libraries.runtime.deployment import DeploymentError, exposure, load_deployment
 from gemelo.libraries.runtime.process.logs import LEVELS, line_logger
 from gemelo.libraries.runtime.process.ports import PortTaken, require_free
-from gemelo.libraries.runtime.process.priority import step_ahead
+from gemelo.libraries.runtime.process.priority import raise_priority
 from gemelo.libraries.runtime.process.readiness import Readiness
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.deployment import Broker, Deployment, MqttSection
@@ -75,7 +75,7 @@ def run(deployment: Deployment, log: logging.Logger) -> int:
 
     is_embedded = section.broker is Broker.EMBEDDED
     command = embedded.command(section) if is_embedded else mosquitto.command(section, folder)
-    step_ahead()  # the device's heartbeats pass through here
+    raise_priority()  # the device's heartbeats pass through here
     return become(command, section, beat, readiness.not_ready)
 
 

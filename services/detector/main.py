@@ -19,7 +19,7 @@ from gemelo.libraries.runtime.application import service
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.node_clock import NodeClock
-from gemelo.libraries.runtime.process.priority import step_behind
+from gemelo.libraries.runtime.process.priority import lower_priority
 from gemelo.schemas.camera import CameraImage, CameraInfo
 from gemelo.schemas.cell import OnnxThing
 from gemelo.schemas.deployment import Deployment
@@ -174,7 +174,7 @@ class CameraWatch:
 
 def main() -> None:
     """Console script `gemelo-detector`."""
-    step_behind()
+    lower_priority()
     service("detector", run)
 
 

@@ -13,7 +13,7 @@ from gemelo.libraries.recordings.subscriptions import Subscriptions
 from gemelo.libraries.runtime.application import service
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.node import Node
-from gemelo.libraries.runtime.process.priority import step_behind
+from gemelo.libraries.runtime.process.priority import lower_priority
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.message import Message
 from gemelo.schemas.topics import Topic
@@ -87,7 +87,7 @@ def _folder(deployment: Deployment, parameters: LoggerParameters) -> Path:
 
 def main() -> None:
     """Entry point."""
-    step_behind()
+    lower_priority()
     service("logger", run, grace=GRACE)
 
 

@@ -121,7 +121,7 @@ class Planner:
             self.checker.deadline = self.checker.world.deadline = NEVER
 
     def planned_path(self, trajectory: JointTrajectory, stamp: int) -> PlannedPath:
-        """The path of the tool, for eyes; `stamp` [ns] UNIX."""
+        """The path of the tool, for display; `stamp` [ns] UNIX."""
         rows = trajectory.points
         chosen = {round(index * (len(rows) - 1) / (PATH_POINTS - 1)) for index in range(PATH_POINTS)}
         shown = [rows[index] for index in sorted(chosen)]

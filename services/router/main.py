@@ -12,7 +12,7 @@ from gemelo.libraries.runtime.certificate_watch import CertificateWatch
 from gemelo.libraries.runtime.deployment import DeploymentError, exposure, load_deployment
 from gemelo.libraries.runtime.process.logs import LEVELS, line_logger
 from gemelo.libraries.runtime.process.ports import PortTaken, require_free
-from gemelo.libraries.runtime.process.priority import step_ahead
+from gemelo.libraries.runtime.process.priority import raise_priority
 from gemelo.libraries.runtime.process.readiness import Readiness
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest, stop_on_signals
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with stop_on_signals(stop):
             require_free(host, port, "router", "listen_port" if deployment.router.listen_port else "port")
             with open_router(setup):
-                step_ahead()  # a stop passes through here
+                raise_priority()  # a stop passes through here
                 locked = " with TLS, for certificates of its authority" if setup.is_locked else ""
                 log.info("listening on %s port %d%s", host, port, locked)
                 certificate = CertificateWatch(setup.certificate, log.warning)

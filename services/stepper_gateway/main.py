@@ -10,7 +10,7 @@ from gemelo.libraries.arm.model.description import ArmDescription, load_arm, req
 from gemelo.libraries.runtime.application import service
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.node import Node
-from gemelo.libraries.runtime.process.priority import step_ahead
+from gemelo.libraries.runtime.process.priority import raise_priority
 from gemelo.schemas.deployment import Deployment, DeviceKind, Wire
 from gemelo.schemas.robot import Dialect
 from gemelo.services.stepper_gateway.core import GatewayCore
@@ -57,7 +57,7 @@ def run(node: Node, deployment: Deployment, open_wire: OpenDevice | None = None)
 def run_ahead(node: Node, deployment: Deployment) -> None:
     """As `run`, in a process of its own, which heartbeats and stops go through."""
     sys.setswitchinterval(SWITCH_INTERVAL)
-    if not step_ahead():
+    if not raise_priority():
         node.log.info(NO_PRIORITY)
     run(node, deployment)
 

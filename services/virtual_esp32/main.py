@@ -29,7 +29,7 @@ from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt.access import device_access
 from gemelo.libraries.runtime.deployment import DeploymentError, load_deployment, project_root
 from gemelo.libraries.runtime.process.logs import LEVELS, line_logger
-from gemelo.libraries.runtime.process.priority import step_ahead
+from gemelo.libraries.runtime.process.priority import raise_priority
 from gemelo.libraries.runtime.process.readiness import Readiness
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest, end_with_any_thread
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
@@ -70,7 +70,7 @@ def run(deployment: Deployment, has_line: bool = False) -> None:
     end_with_any_thread(log, lambda: stop.is_set)
     if deployment.device is DeviceKind.BOARD:
         return idle(inbox, Readiness(folder, NAME, unwritten))
-    step_ahead()  # a board has its processor for itself
+    raise_priority()  # a board has its processor for itself
     access = device_access(deployment.mqtt, arm.device.name)
     if arm.device.dialect is Dialect.RA:
         return VirtualSketch(arm, access, inbox, Readiness(folder, NAME, unwritten)).run()

@@ -14,7 +14,7 @@ from gemelo.libraries.runtime.application import service
 from gemelo.libraries.runtime.deployment import deployments_beside, project_root, robot_name
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.node_clock import NodeClock
-from gemelo.libraries.runtime.process.priority import step_behind
+from gemelo.libraries.runtime.process.priority import lower_priority
 from gemelo.libraries.runtime.scene_meshes import SceneMeshes
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.frames import RobotDescription
@@ -113,7 +113,7 @@ def by_own_clock(clock: NodeClock, take: Callable[[Any], object]) -> Callable[[A
 
 def main() -> None:
     """Entry point."""
-    step_behind()
+    lower_priority()
     service("visualizer", run)
 
 

@@ -24,7 +24,7 @@ from msgspec.structs import replace
 from gemelo.libraries.runtime.deployment import DeploymentError, exposure, load_deployment, project_root
 from gemelo.libraries.runtime.process.own_names import own_names
 from gemelo.libraries.runtime.process.ports import PortTaken, require_free
-from gemelo.libraries.runtime.process.priority import step_behind
+from gemelo.libraries.runtime.process.priority import lower_priority
 from gemelo.libraries.runtime.process.readiness import Readiness
 from gemelo.libraries.runtime.process.unwritten import UnwrittenFiles
 from gemelo.schemas.deployment import Deployment, ViewerMode, ViewerSection
@@ -180,7 +180,7 @@ def main() -> None:
     parser.add_argument("--memory-limit", default="1GB", help="of the viewer's store, for example 1GB or 25%%")
     parser.add_argument("--log-level", default="INFO", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
-    step_behind()
+    lower_priority()
     stopping = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopping.set())

@@ -271,7 +271,7 @@ def test_only_what_a_stop_or_a_heartbeat_goes_through_may_take_a_real_time_prior
         for process in processes(lab, host):
             unit = directives(files[f"systemd/{process.unit}.service"])
             module = project_root() / f"{entries[process.program].partition(':')[0].replace('.', '/')}.py"
-            asks = "step_ahead()" in module.read_text()
+            asks = "raise_priority()" in module.read_text()
             assert values(unit, "LimitRTPRIO") == (["1"] if asks else []), process
             assert values(unit, "RestrictRealtime") == ([] if asks else ["yes"]), process
 

@@ -239,7 +239,7 @@ def test_a_defect_costs_the_plan_and_not_the_process():
         def plan(self, *_args: object) -> PlanResponse:
             raise ZeroDivisionError("nothing divides")
 
-    response = worker.plan_at_hand(Broken(load_arm(PROJECT / "urdf/rm1")), worker.AtHand(Job(request=EASY)))
+    response = worker.run_plan(Broken(load_arm(PROJECT / "urdf/rm1")), worker.RunningJob(Job(request=EASY)))
     assert response.code is PlanCode.FAILURE
     assert response.refusal is not None
     assert "ZeroDivisionError: nothing divides" in response.refusal.message

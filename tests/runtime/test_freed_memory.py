@@ -9,7 +9,7 @@ import pytest
 
 HOLES = """
 import resource, time
-from gemelo.libraries.runtime.process.freed_memory import give_back_freed_memory
+from gemelo.libraries.runtime.process.freed_memory import return_freed_memory
 
 def resident():
     with open("/proc/self/statm") as file:
@@ -19,7 +19,7 @@ kept = [bytes(20_000) for _ in range(2_000)]  # of the heap, not mapped each for
 full = resident()
 del kept[:-1:2]  # no hole is at the heap's end, from where it would be given back anyhow
 assert resident() > 0.9 * full, "the holes were given back at once: nothing is tested"
-give_back_freed_memory(every=0.01)
+return_freed_memory(every=0.01)
 end = time.monotonic() + 20.0
 while resident() > full - 10_000_000:
     assert time.monotonic() < end, f"{resident()} bytes are still resident of {full}"
@@ -33,7 +33,7 @@ def test_holes_of_the_heap_are_given_back_while_the_process_goes_on() -> None:
 
 CIRCLES = """
 import gc, time, weakref
-from gemelo.libraries.runtime.process.freed_memory import give_back_freed_memory
+from gemelo.libraries.runtime.process.freed_memory import return_freed_memory
 
 class Circle:
     def __init__(self):
@@ -42,7 +42,7 @@ class Circle:
 gc.disable()  # so seldom does it come of itself where little is made
 gone = weakref.ref(Circle())
 assert gone() is not None, "the circle went by itself: nothing is tested"
-give_back_freed_memory(every=0.01)
+return_freed_memory(every=0.01)
 end = time.monotonic() + 20.0
 while gone() is not None:
     assert time.monotonic() < end, "the circle is still there"
@@ -56,10 +56,10 @@ def test_circles_that_nobody_holds_are_freed_while_the_process_goes_on() -> None
 
 HEAPS = """
 import ctypes, sys, threading
-from gemelo.libraries.runtime.process.freed_memory import give_back_freed_memory
+from gemelo.libraries.runtime.process.freed_memory import return_freed_memory
 
 if "shared" in sys.argv:
-    give_back_freed_memory()
+    return_freed_memory()
 together = threading.Barrier(8)
 
 def work():

@@ -393,9 +393,8 @@ def test_importing_the_node_is_fast_and_light() -> None:
 @pytest.mark.parametrize(("before", "after"), [(0, BEHIND), (BEHIND + 4, BEHIND + 4)])
 def test_what_may_wait_steps_behind_and_never_ahead(before: int, after: int) -> None:
     asked = max(0, before - os.nice(0))
-    code = (
-        "import os; from gemelo.libraries.runtime.process.priority import step_behind; step_behind(); print(os.nice(0))"
-    )
+    module = "gemelo.libraries.runtime.process.priority"
+    code = f"import os; from {module} import lower_priority; lower_priority(); print(os.nice(0))"
     command = [sys.executable, "-c", f"import os; os.nice({asked}); {code}"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert int(done.stdout) == max(after, os.nice(0))
@@ -404,10 +403,10 @@ def test_what_may_wait_steps_behind_and_never_ahead(before: int, after: int) -> 
 def test_every_thread_of_what_steps_ahead_has_a_real_time_priority_where_the_system_allows_it() -> None:
     program = """
 import os, threading
-from gemelo.libraries.runtime.process.priority import AHEAD, step_ahead
+from gemelo.libraries.runtime.process.priority import AHEAD, raise_priority
 before = threading.Thread(target=threading.Event().wait, daemon=True)
 before.start()
-has = step_ahead()
+has = raise_priority()
 threading.Thread(target=threading.Event().wait, daemon=True).start()
 threads = [int(each) for each in os.listdir("/proc/self/task")]
 policies = {(os.sched_getscheduler(each), os.sched_getparam(each).sched_priority) for each in threads}

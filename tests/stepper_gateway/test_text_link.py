@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gemelo.libraries.arm.model.description import ArmDescription, heard_by_the_board, load_arm
+from gemelo.libraries.arm.model.description import ArmDescription, as_its_board_drives_it, load_arm
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.deployment import Deployment, SerialSection
 from gemelo.schemas.device import DeviceCommandKind
@@ -35,7 +35,7 @@ END = (0.1, -0.2, 0.01)
 
 def text_arm() -> ArmDescription:
     arm = rm1()
-    return heard_by_the_board(replace(arm, device=msgspec.structs.replace(arm.device, dialect=Dialect.TEXT)))
+    return as_its_board_drives_it(replace(arm, device=msgspec.structs.replace(arm.device, dialect=Dialect.TEXT)))
 
 
 @contextmanager

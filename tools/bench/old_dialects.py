@@ -24,7 +24,7 @@ from gemelo.firmware.bindings.device import CoreDevice
 from gemelo.firmware.bindings.motor import VirtualMotor
 from gemelo.firmware.platform.host.sketch import AustinStepper
 from gemelo.libraries.arm.device.device_config import device_config
-from gemelo.libraries.arm.model.description import ArmDescription, heard_by_the_board
+from gemelo.libraries.arm.model.description import ArmDescription, as_its_board_drives_it
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.schemas.robot import Dialect
 from gemelo.services.stepper_gateway.links.foreign.text_exchange import TextExchange
@@ -45,7 +45,7 @@ PUBLISHED = 29.8  # [ms] mean of the old driver, at 12.5 Hz
 def text_link_ms() -> Figure:
     """From a line `<SEQ,...>` to its ACK [ms], at 25 Hz over a pseudo-terminal to the firmware's text mode."""
     device = msgspec.structs.replace(rm1().device, dialect=Dialect.TEXT)
-    arm = heard_by_the_board(replace(rm1(), device=device))
+    arm = as_its_board_drives_it(replace(rm1(), device=device))
     with closing(PacedBoard(arm)) as board:
         trips = round_trips(arm, board.path)
     note = (

@@ -9,7 +9,7 @@ from dataclasses import replace
 import msgspec
 
 from gemelo.firmware.platform.host.sketch import PASS, HostSketch
-from gemelo.libraries.arm.model.description import ArmDescription, heard_by_the_board
+from gemelo.libraries.arm.model.description import ArmDescription, as_its_board_drives_it
 from gemelo.libraries.arm.motors.relative_moves import ramp_of
 from gemelo.schemas.device import DeviceCommandKind
 from gemelo.schemas.robot import Dialect
@@ -27,7 +27,7 @@ def ra_arm(message_time: float = 2.0) -> ArmDescription:
     """rm1 behind a sketch that takes `message_time` [s] for a message."""
     arm = rm1()
     device = msgspec.structs.replace(arm.device, dialect=Dialect.RA, message_time=message_time)
-    return heard_by_the_board(replace(arm, device=device))
+    return as_its_board_drives_it(replace(arm, device=device))
 
 
 class SketchArm(ForeignArm):

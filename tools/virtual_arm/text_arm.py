@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import msgspec
 
-from gemelo.libraries.arm.model.description import ArmDescription, heard_by_the_board
+from gemelo.libraries.arm.model.description import ArmDescription, as_its_board_drives_it
 from gemelo.schemas.device import DeviceCommandKind
 from gemelo.schemas.reasons import Reason
 from gemelo.schemas.robot import Dialect
@@ -28,7 +28,7 @@ _LINE = re.compile(rb"<(\d+),([-+0-9.,]+)>\n")
 def text_arm() -> ArmDescription:
     """rm1 behind a board that reads `<SEQ,J1,...>`."""
     arm = rm1()
-    return heard_by_the_board(replace(arm, device=msgspec.structs.replace(arm.device, dialect=Dialect.TEXT)))
+    return as_its_board_drives_it(replace(arm, device=msgspec.structs.replace(arm.device, dialect=Dialect.TEXT)))
 
 
 class TextArm(ForeignArm):

@@ -177,19 +177,19 @@ def load_arm(folder: Path) -> ArmDescription:
         clearance=robot.clearance,
         gripper=robot.gripper,
     )
-    return heard_by_the_board(arm)
+    return as_its_board_drives_it(arm)
 
 
-def heard_by_the_board(arm: ArmDescription) -> ArmDescription:
+def as_its_board_drives_it(arm: ArmDescription) -> ArmDescription:
     """Without what the board's dialect has no words for: switches, homing, motor current; as slow as it can follow."""
     if arm.device.dialect is Dialect.GEMELO:
         return arm
     device = msgspec.structs.replace(arm.device, enable_pin=None, armed_at_boot=True)
-    joints = tuple(_heard_joint(joint, device) for joint in arm.joints)
+    joints = tuple(_driven_joint(joint, device) for joint in arm.joints)
     return replace(arm, device=device, joints=joints, inputs=())
 
 
-def _heard_joint(joint: Joint, device: DeviceRecord) -> Joint:
+def _driven_joint(joint: Joint, device: DeviceRecord) -> Joint:
     joint = replace(joint, drive=msgspec.structs.replace(joint.drive, homing=None))
     if device.dialect is not Dialect.RA:
         return joint

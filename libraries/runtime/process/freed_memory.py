@@ -13,7 +13,7 @@ EVERY = 60.0
 ARENA_MAX = -8  # `M_ARENA_MAX` of glibc's malloc.h
 
 
-def give_back_freed_memory(every: float = EVERY) -> None:
+def return_freed_memory(every: float = EVERY) -> None:
     """Does so every `every` [s] until the process ends, as far as the C library can (`malloc_trim`).
 
     First it frees the circles of objects that nobody holds: a node that says little makes so few that Python looks for

@@ -11,14 +11,14 @@ BEHIND = 5  # niceness of what may wait: plans, recordings, pictures
 AHEAD = 1  # chosen: the lowest real-time priority, which is above everything that has none
 
 
-def step_behind() -> None:
+def lower_priority() -> None:
     """Lets the processes that a stop goes through (gateway, router, broker) run first, where the OS allows it."""
     with suppress(OSError):
         os.nice(max(0, BEHIND - os.nice(0)))
 
 
-def may_step_ahead() -> bool:
-    """True if the OS would let `step_ahead` do so; nothing stays changed."""
+def may_raise_priority() -> bool:
+    """True if the OS would let `raise_priority` do so; nothing stays changed."""
     if sys.platform != "linux":
         return False
     policy, share = os.sched_getscheduler(0), os.sched_getparam(0)
@@ -30,7 +30,7 @@ def may_step_ahead() -> bool:
     return True
 
 
-def step_ahead() -> bool:
+def raise_priority() -> bool:
     """Gives all threads of this process a real-time priority, so that a busy machine delays no heartbeat; true if so.
 
     The OS allows it to root and to whom `ulimit -r` does; without it the process runs on as it was. Linux keeps 5 % of

@@ -20,7 +20,13 @@ from gemelo.schemas.planning import JogCommand, JogLimit, JogStatus
 from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.jog.braking import Braking
-from gemelo.services.planner.jog.jog_command import BadJog, JogInterpreter, JogRefused, Wanted, standing_position
+from gemelo.services.planner.jog.jog_command import (
+    BadJog,
+    DesiredVelocity,
+    JogInterpreter,
+    JogRefused,
+    standing_position,
+)
 from gemelo.services.planner.jog.jog_limits import no_command, singularity, worded
 from gemelo.services.planner.jog.velocity_limiter import VelocityLimiter
 
@@ -151,18 +157,18 @@ class Jog:
         regularity = self._interpreter.twists.singularity_on(self._positions, displacement)
         return None if regularity is None else singularity(regularity)
 
-    def _wanted(self, positions: Array) -> tuple[Wanted, str]:
+    def _wanted(self, positions: Array) -> tuple[DesiredVelocity, str]:
         """A command that cannot be followed is a stop; each reason is said once."""
         try:
             return self._interpreter.wanted(self._command, positions), ""
         except BadJog as error:
             said = "" if str(error) in self._known or len(self._known) >= MOST_SAID else str(error)
             self._known |= {said} - {""}
-            return Wanted(np.zeros(len(positions)), 0.0, (no_command(error.reason),)), said
+            return DesiredVelocity(np.zeros(len(positions)), 0.0, (no_command(error.reason),)), said
 
-    def _fading(self, positions: Array, now: float) -> Wanted:
+    def _fading(self, positions: Array, now: float) -> DesiredVelocity:
         """Less of the last twist, so that the tool brakes on its line; of joints, and after a while, nothing."""
-        standing = Wanted(np.zeros(len(positions)))
+        standing = DesiredVelocity(np.zeros(len(positions)))
         if now - self._heard > DEAD_MAN + FADING:
             return standing
         wanted, _ = self._wanted(positions)
@@ -173,7 +179,7 @@ class Jog:
         share = float(braked @ wanted.velocity) / size
         if share < LAST:
             return standing
-        return Wanted(min(1.0, share) * wanted.velocity, is_twist=True)
+        return DesiredVelocity(min(1.0, share) * wanted.velocity, is_twist=True)
 
     def _require_followed(
         self, present: JointState | None, age: float, goal_is_active: bool, not_ready: Reason | None, now: float

@@ -30,7 +30,7 @@ class BadJog(ReasonedError, ValueError):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class DesiredVelocity:
     """(n,) [rad/s] or [m/s] within the limits, the share of the commanded speed that it is, and what took the rest."""
 
     velocity: Array
@@ -48,7 +48,7 @@ class JogInterpreter:
         self.twists = TwistSolver(kinematics)
         self._speeds = np.array([joint.velocity for joint in self._arm.joints])
 
-    def wanted(self, command: JogCommand, positions: Array) -> Wanted:
+    def wanted(self, command: JogCommand, positions: Array) -> DesiredVelocity:
         """The joint velocities [rad/s] or [m/s] of the command, for the arm at `positions` (n,) [rad] or [m]; raises
         `BadJog`."""
         has_twist = bool(command.linear or command.angular)
@@ -56,7 +56,7 @@ class JogInterpreter:
             raise BadJog(because("jog.command.both", remedy("one_of_both")))
         return self._of_twist(command, positions) if has_twist else self._of_joints(command)
 
-    def _of_joints(self, command: JogCommand) -> Wanted:
+    def _of_joints(self, command: JogCommand) -> DesiredVelocity:
         names = self._arm.joint_names
         if len(command.name) != len(command.velocity):
             counts = {"joints": len(command.name), "velocities": len(command.velocity)}
@@ -70,14 +70,14 @@ class JogInterpreter:
             velocity[names.index(name)] = value
         return self._clamped(velocity, 1.0, ())
 
-    def _of_twist(self, command: JogCommand, positions: Array) -> Wanted:
+    def _of_twist(self, command: JogCommand, positions: Array) -> DesiredVelocity:
         twist = self._in_base(command, positions)
         notes: tuple[JogLimit, ...] = ()
         if not self.twists.turns and np.any(twist[3:]):
             notes = (no_command(because("jog.command.no_turn", robot=self._arm.name)),)
             twist[3:] = 0.0
         if not np.any(twist):
-            return Wanted(np.zeros(len(self._speeds)), limits=notes)
+            return DesiredVelocity(np.zeros(len(self._speeds)), limits=notes)
         motion = self.twists.solve(positions, twist)
         if motion.scale < 1.0:
             notes = (*notes, singularity(motion.regularity))
@@ -98,15 +98,15 @@ class JogInterpreter:
         rotation = self._kinematics.tool(positions).rotation
         return np.concatenate((rotation @ twist[:3], rotation @ twist[3:]))
 
-    def _clamped(self, velocity: Array, scale: float, notes: tuple[JogLimit, ...]) -> Wanted:
+    def _clamped(self, velocity: Array, scale: float, notes: tuple[JogLimit, ...]) -> DesiredVelocity:
         """All joints slowed together until the last one keeps its limit."""
         shares = np.abs(velocity) / self._speeds
         worst = int(np.argmax(shares))
         most = float(shares[worst])
         if most <= 1.0:
-            return Wanted(velocity, scale, notes)
+            return DesiredVelocity(velocity, scale, notes)
         limit = speed_limit(self._arm.joints[worst], float(velocity[worst]))
-        return Wanted(velocity / most, scale / most, (*notes, limit))
+        return DesiredVelocity(velocity / most, scale / most, (*notes, limit))
 
 
 class JogRefused(ReasonedError, ValueError):

@@ -15,7 +15,7 @@ T = TypeVar("T")
 LENGTH = struct.Struct("<I")
 
 
-class Show(msgspec.Struct, frozen=True, tag=True):
+class SetScene(msgspec.Struct, frozen=True, tag=True):
     """The scene of later plans: seconds of work where there is a large mesh, and none of a plan's time."""
 
     scene: PlanningScene
@@ -30,23 +30,23 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 
 
 class CancelPlan(msgspec.Struct, frozen=True, tag=True):
-    """The plan at hand is wanted no more; whatever answer it has by now will do."""
+    """The running plan is not needed any more; whatever answer it has by now will do."""
 
 
-class Ask(msgspec.Struct, frozen=True, tag=True):
-    """What is the plan at hand at? A short plan is never asked, and so pays nothing for it."""
+class PhaseQuestion(msgspec.Struct, frozen=True, tag=True):
+    """A request for the phase of the running plan; a short plan is never asked, and so pays nothing for it."""
 
 
 class Ready(msgspec.Struct, frozen=True, tag=True):
     """The worker's first word: from now on it plans."""
 
 
-class Shown(msgspec.Struct, frozen=True, tag=True):
-    """What is answered to `Show`."""
+class SceneIsSet(msgspec.Struct, frozen=True, tag=True):
+    """What is answered to `SetScene`."""
 
 
-class At(msgspec.Struct, frozen=True, tag=True):
-    """What is answered to `Ask`."""
+class PhaseReport(msgspec.Struct, frozen=True, tag=True):
+    """What is answered to `PhaseQuestion`."""
 
     phase: PlanPhase
 
@@ -57,8 +57,8 @@ class Planned(msgspec.Struct, frozen=True, tag=True):
     response: PlanResponse
 
 
-Order = Show | Job | CancelPlan | Ask
-Report = Ready | Shown | At | Planned
+Order = SetScene | Job | CancelPlan | PhaseQuestion
+Report = Ready | SceneIsSet | PhaseReport | Planned
 
 ORDERS: msgspec.msgpack.Decoder[Order] = msgspec.msgpack.Decoder(Order)
 REPORTS: msgspec.msgpack.Decoder[Report] = msgspec.msgpack.Decoder(Report)

@@ -18,15 +18,15 @@ from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.scene import PlanningScene
 from gemelo.services.planner.workers.jobs import (
     REPORTS,
-    Ask,
-    At,
     CancelPlan,
     Job,
     Order,
+    PhaseQuestion,
+    PhaseReport,
     Planned,
     Ready,
-    Show,
-    Shown,
+    SceneIsSet,
+    SetScene,
     receive,
     send,
 )
@@ -37,11 +37,11 @@ STOPS_WITHIN = 0.2  # [s] from a cancel to the answer of a process that lives on
 TICK = 0.05  # [s] between two looks whether the plan is still wanted; chosen: short beside STOPS_WITHIN
 CHILD = "gemelo.services.planner.workers.worker"
 
-R = TypeVar("R", Ready, Shown, Planned)
+R = TypeVar("R", Ready, SceneIsSet, Planned)
 
 
 def nothing(*_: object) -> None:
-    """Nobody wants to know."""
+    """The callback of a caller that needs none."""
 
 
 class Late(Exception):
@@ -75,12 +75,12 @@ class PlannerProcess:
                 self._hear(Ready, START, on_tick)
                 self._is_ready = True
 
-    def show(self, scene: PlanningScene, on_tick: Callable[[], None] = nothing) -> None:
+    def set_scene(self, scene: PlanningScene, on_tick: Callable[[], None] = nothing) -> None:
         """Waits until it has the scene; raises as `be_ready`."""
         with self._replaced_where_it_fails():
             if self._told is not scene:
-                self._send(Show(scene))
-                self._hear(Shown, START, on_tick)
+                self._send(SetScene(scene))
+                self._hear(SceneIsSet, START, on_tick)
                 self._told = scene
 
     def settle(self, seconds: float) -> None:
@@ -123,7 +123,7 @@ class PlannerProcess:
 
     def _look_after(self, pending_plan: PendingPlan) -> None:
         pending_plan.require_wanted()
-        self._send(Ask())
+        self._send(PhaseQuestion())
 
     def _send(self, order: Order) -> None:
         send(_pipe(self._process.stdin), order)
@@ -141,7 +141,7 @@ class PlannerProcess:
             left = end - time.monotonic()
             if select.select([pipe], [], [], max(0.0, min(left, TICK)))[0]:
                 report = receive(pipe, REPORTS)
-                if isinstance(report, At):
+                if isinstance(report, PhaseReport):
                     on_phase(report.phase)
                 elif isinstance(report, kind):
                     return report

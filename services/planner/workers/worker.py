@@ -16,7 +16,7 @@ from queue import SimpleQueue
 from typing import IO
 
 from gemelo.libraries.arm.model.description import load_arm
-from gemelo.libraries.runtime.process.priority import step_behind
+from gemelo.libraries.runtime.process.priority import lower_priority
 from gemelo.schemas.planning import PlanPhase, PlanResponse, Timing
 from gemelo.schemas.reasons import because, remedy
 from gemelo.services.planner.collision.sphere_check import cancel_flag
@@ -28,21 +28,21 @@ from gemelo.services.planner.timing.profile import NoProfile
 from gemelo.services.planner.timing.toppra_speeds import load_toppra
 from gemelo.services.planner.workers.jobs import (
     ORDERS,
-    Ask,
-    At,
     CancelPlan,
     Job,
+    PhaseQuestion,
+    PhaseReport,
     Planned,
     Ready,
     Report,
-    Show,
-    Shown,
+    SceneIsSet,
+    SetScene,
     receive,
     send,
 )
 
 
-class AtHand:
+class RunningJob:
     """A job, and what is said about it while it is done."""
 
     def __init__(self, job: Job) -> None:
@@ -69,12 +69,12 @@ class Answers:
 
 def main() -> None:
     """`python -m gemelo.services.planner.workers.worker ROBOT_FOLDER PROJECT_FOLDER`."""
-    step_behind()
+    lower_priority()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the planner, which closes this one's input
     answers = Answers(os.fdopen(os.dup(1), "wb"))
     os.dup2(2, 1)  # what a library prints is no answer
     folder, project = Path(sys.argv[1]), Path(sys.argv[2])
-    jobs: SimpleQueue[AtHand | Show] = SimpleQueue()
+    jobs: SimpleQueue[RunningJob | SetScene] = SimpleQueue()
     threading.Thread(target=_read, args=(sys.stdin.buffer, jobs, answers), daemon=True).start()
     logging.basicConfig(format="planner worker: %(message)s", level=logging.INFO)
     planner = Planner(load_arm(folder))
@@ -83,22 +83,22 @@ def main() -> None:
     answers.put(Ready())
     while True:
         match jobs.get():
-            case Show(scene):
+            case SetScene(scene):
                 planner.set_world(World(planner.arm, planner.kinematics, scene, (project, folder)))
                 planner.prepare()
-                answers.put(Shown())
-            case AtHand() as at_hand:
-                if at_hand.job.request.timing is Timing.TIME_OPTIMAL:
+                answers.put(SceneIsSet())
+            case RunningJob() as running:
+                if running.job.request.timing is Timing.TIME_OPTIMAL:
                     with suppress(NoProfile):  # which the plan itself will say
                         load_toppra()  # seconds, the first time, which are not the plan's
-                answers.put(Planned(plan_at_hand(planner, at_hand)))
+                answers.put(Planned(run_plan(planner, running)))
 
 
-def plan_at_hand(planner: Planner, at_hand: AtHand) -> PlanResponse:
+def run_plan(planner: Planner, running: RunningJob) -> PlanResponse:
     """The plan; a defect is a refusal, and its traceback goes to the log; the process goes on."""
-    job = at_hand.job
+    job = running.job
     try:
-        return planner.plan(job.request, job.present, job.age, time.monotonic, at_hand.cancel, at_hand.watch)
+        return planner.plan(job.request, job.present, job.age, time.monotonic, running.cancel, running.watch)
     except Exception as error:
         with suppress(OSError):  # a disk that is full takes no words
             traceback.print_exc()
@@ -106,21 +106,21 @@ def plan_at_hand(planner: Planner, at_hand: AtHand) -> PlanResponse:
         return failed(because("plan.defect", *would_do, kind=type(error).__name__, detail=str(error)))
 
 
-def _read(pipe: IO[bytes], jobs: SimpleQueue[AtHand | Show], answers: Answers) -> None:
+def _read(pipe: IO[bytes], jobs: SimpleQueue[RunningJob | SetScene], answers: Answers) -> None:
     """Ends the process at the end of its input, whatever it is planning."""
-    at_hand: AtHand | None = None
+    running: RunningJob | None = None
     try:
         while True:
             match receive(pipe, ORDERS):
-                case Show() as show:
-                    jobs.put(show)
+                case SetScene() as scene_order:
+                    jobs.put(scene_order)
                 case Job() as job:
-                    at_hand = AtHand(job)
-                    jobs.put(at_hand)
-                case CancelPlan() if at_hand is not None:
-                    at_hand.cancel.set()
-                case Ask() if at_hand is not None:
-                    answers.put(At(at_hand.phase))
+                    running = RunningJob(job)
+                    jobs.put(running)
+                case CancelPlan() if running is not None:
+                    running.cancel.set()
+                case PhaseQuestion() if running is not None:
+                    answers.put(PhaseReport(running.phase))
     finally:
         os._exit(0)
 

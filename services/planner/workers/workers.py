@@ -127,7 +127,7 @@ class Workers:
         """Waits for it and its scene, before a plan would have to; what keeps it from that the next plan says."""
         with suppress(TimeoutError, WorkerDied):
             process.be_ready()
-            process.show(scene)
+            process.set_scene(scene)
 
     def _answer(self, process: PlannerProcess, pending_plan: PendingPlan) -> bool:
         """True if the process is still at a plan that has been answered because its time was over."""
@@ -146,7 +146,7 @@ class Workers:
             try:
                 process.be_ready(pending_plan.require_wanted)
                 scene = self._scene()
-                process.show(scene, pending_plan.require_wanted)
+                process.set_scene(scene, pending_plan.require_wanted)
                 present, age = self._present()
                 job = Job(request=for_process(request), present=present, age=age)
                 began = time.monotonic()

@@ -25,7 +25,7 @@ def fields_of(message: type[Message]) -> dict[str, str]:
 
 
 def message_of(kind: type[Message], text: str) -> Any:
-    """Decodes `text` (JSON) as a `kind`; raises `CommandError` for what is none, unknown fields included."""
+    """Decodes `text` (JSON) as a `kind`; raises `CommandError` for a text that is not one, unknown fields included."""
     try:
         raw = msgspec.json.decode(text)
         if not isinstance(raw, dict):

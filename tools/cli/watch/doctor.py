@@ -20,7 +20,7 @@ from gemelo.libraries.credentials.private_files import AccessError
 from gemelo.libraries.mqtt.access import gateway_access
 from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.libraries.runtime.deployment import project_root, remedy_when_silent
-from gemelo.libraries.runtime.process.priority import may_step_ahead
+from gemelo.libraries.runtime.process.priority import may_raise_priority
 from gemelo.libraries.runtime.process.unwritten import remedy_for
 from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.deployment import Deployment, MqttSection, RouterSection, Wire
@@ -191,7 +191,7 @@ def _machine() -> Iterator[Diagnosis]:
 
 def _priority() -> Diagnosis:
     """Of gateway, broker, router and virtual device; without it a twin works, as long as the machine has time left."""
-    if may_step_ahead():
+    if may_raise_priority():
         return Diagnosis(Verdict.OK, "priority", because("doctor.priority"))
     return Diagnosis(Verdict.OK, "priority", because("doctor.priority.none", remedy("real_time_limit")))
 

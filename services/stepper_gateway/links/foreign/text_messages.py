@@ -38,7 +38,7 @@ def read_answer(frame: bytes) -> LineAnswer | None:
 
 
 class AnswerReader:
-    """Cuts a stream of bytes into answers, and counts what is none: boot messages, torn lines, noise."""
+    """Cuts a stream of bytes into answers, and counts what is no answer: boot messages, torn lines, noise."""
 
     def __init__(self) -> None:
         self.rest = b""  # of an answer that is not there yet
