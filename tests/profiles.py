@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
 PROFILE = os.environ.get("HYPOTHESIS_PROFILE", "quick")
@@ -15,10 +15,11 @@ ALL = 100
 
 def load() -> None:
     """The same examples everywhere; HYPOTHESIS_PROFILE=explore looks for new ones."""
-    # No deadline: two cores, shared; time is measured by the bench.
-    settings.register_profile("quick", derandomize=True, deadline=None, max_examples=QUICK)
-    settings.register_profile("full", derandomize=True, deadline=None, max_examples=ALL)
-    settings.register_profile("explore", deadline=None, max_examples=ALL)
+    # No deadline, and no example is drawn too slowly: two cores, shared; time is measured by the bench.
+    untimed: dict[str, Any] = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+    settings.register_profile("quick", derandomize=True, max_examples=QUICK, **untimed)
+    settings.register_profile("full", derandomize=True, max_examples=ALL, **untimed)
+    settings.register_profile("explore", max_examples=ALL, **untimed)
     settings.load_profile(PROFILE)
     if PROFILE != "explore":  # not those with the numbers of whatever modules happen to be loaded
         providers._get_local_constants = lambda: providers._local_constants
