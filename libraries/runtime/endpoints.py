@@ -112,7 +112,6 @@ def read_version() -> str:
     return version("gemelo")
 
 
-@cache
 def _interface(topic: Topic[Any]) -> TopicInterface:
     fields = [field.name for field in msgspec.structs.fields(topic.message)]
     types = {name: kind for base in reversed(topic.message.__mro__) for name, kind in _annotations(base).items()}

@@ -11,11 +11,17 @@ import msgspec
 import pytest
 from msgspec import Meta
 
+from gemelo.libraries.recordings.living_topic import living_topic
 from gemelo.libraries.runtime import topics
 from gemelo.libraries.runtime.bus.interface import BusReply
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from gemelo.libraries.runtime.bus.zenoh_bus import ZenohBus
-from gemelo.libraries.runtime.endpoints import info_request, parameter_request, parameters_request
+from gemelo.libraries.runtime.endpoints import (
+    info_request,
+    interfaces_request,
+    parameter_request,
+    parameters_request,
+)
 from gemelo.libraries.runtime.errors import NoAnswer, NodeNameTaken, RequestRefused
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.requests.client import call
@@ -25,7 +31,7 @@ from gemelo.schemas.joints import JointState, JointTargets
 from gemelo.schemas.message import BadMessage, encode
 from gemelo.schemas.planning import PlanCode, PlanRequest, PlanResponse
 from gemelo.schemas.scene import PlanningScene
-from gemelo.schemas.system import Empty, LogRecord, NodeStatistics, SetParameter, TopicStatistics
+from gemelo.schemas.system import Empty, LogRecord, NodeStatistics, SetParameter, TopicInterface, TopicStatistics
 from gemelo.schemas.topics import COMMAND_ACKS, DESCRIPTION, JOINT_STATES, LOG, PLAN, SCENE, STATISTICS, Request
 from tests.runtime.support import Buses, hear, spinning, until
 
@@ -449,6 +455,17 @@ def test_nodes_know_one_another(buses: Buses) -> None:
     assert (info.node, info.robot, info.serves) == ("planner", "rm1", ("plan",))
     planner.close()
     assert until(lambda: client.alive() == {"client"})
+
+
+def test_a_reader_of_a_topic_of_which_it_has_only_the_fields_names_it_among_its_interfaces(buses: Buses) -> None:
+    fields = (("value", "float"),)
+    own = living_topic(TopicInterface(key="own/value", message="Own", fields=fields, delivery="every", writer="user"))
+    logger, client = buses.node("logger"), buses.node("client")
+    logger.subscribe(own, lambda message: None)
+    assert until(lambda: client.alive() == {"logger", "client"})
+    with spinning(logger):
+        answer = client.call(interfaces_request("logger"), Empty())
+    assert [each.fields for each in answer.topics if each.key == "own/value"] == [(("value", "Any"),)]
 
 
 def test_a_name_has_one_bearer(buses: Buses) -> None:
