@@ -10,23 +10,32 @@ from typing import NamedTuple
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.reasons import Reason, Remedy, because, plain, remedy
 
+PAIR, NAMED = "pair", ("joint", "link")  # a pair is of links; what has a name, though that may be a number
+
 
 class DescriptionError(ConfigurationError):
     """A robot's folder is wrong."""
 
 
 class Subject(NamedTuple):
-    """What a finding is of: a joint or link with its name, or the robot, the tree, a key, which have none."""
+    """What a finding is of: a joint or link with its name, or the robot, the tree, a key, which have none; of two links
+    a `PAIR`, whose second is its part."""
 
-    kind: str  # a word of the catalogue; empty where the line says it
+    kind: str = ""  # a word of the catalogue; empty where the line says it
     name: str = ""
     part: str = ""  # the element of it, as "<mimic>"
+    within: str = ""  # a file that belongs to that of the finding, as its SRDF
 
     def around(self, what: Reason) -> Reason:
         """What is wrong, with what it is wrong with."""
+        if self.within:
+            inner = self._replace(within="")
+            return because("finding.within", inner.around(what), within=self.within)
+        if self.kind == PAIR and self.part:
+            return because("finding.pair", what, first=self.name, second=self.part)
         if self.part:
             return because("finding.part", what, kind=self.kind, name=self.name, part=self.part)
-        if self.name.isdecimal():
+        if self.name.isdecimal() and self.kind not in NAMED:
             return because("finding.numbered", what, kind=self.kind, number=self.name)
         if self.name:
             return because("finding.named", what, kind=self.kind, name=self.name)

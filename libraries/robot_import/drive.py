@@ -13,7 +13,8 @@ from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
 from gemelo.libraries.arm.motors.speed import fastest_steps, speed_limits
 from gemelo.libraries.arm.motors.steps import exact_ratio
 from gemelo.libraries.robot_import.parts import PINS, SWITCH_PINS, DriverPart, MotorPart, driver_named, motor_named
-from gemelo.libraries.robot_import.questions import Questions, above_zero, one_of, whole, yes_or_no
+from gemelo.libraries.robot_import.questions import BadAnswer, Questions, above_zero, one_of, whole, yes_or_no
+from gemelo.schemas.reasons import Reason, Value, because
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 PINION_RADIUS = 0.01  # [m]
@@ -66,8 +67,8 @@ def ask_drives(joints: Sequence[UrdfJoint], questions: Questions, motor: str, dr
 def _ask(joint: UrdfJoint, number: int, questions: Questions, motor: str, driver: str) -> JointDrive:
     place = (number - 1) % len(PINS)
 
-    def key(word: str) -> tuple[str, str]:
-        return f"{joint.name}.{word}", f'joint "{joint.name}": {word.replace("_", " ")}'
+    def key(word: str) -> tuple[str, Reason]:
+        return f"{joint.name}.{word}", because("import.ask.drive", joint=joint.name, what=word)
 
     part = questions.ask(*key("motor"), motor, motor_named)
     board = questions.ask(*key("driver"), driver, driver_named)
@@ -86,14 +87,15 @@ def _ask(joint: UrdfJoint, number: int, questions: Questions, motor: str, driver
 def _microsteps(text: str, driver: DriverPart) -> int:
     value = whole(text)
     if value not in driver.microsteps:
-        raise ValueError(f"{driver.name} does {', '.join(map(str, driver.microsteps))}")
+        known = tuple(map(str, driver.microsteps))
+        raise BadAnswer(because("import.answer.microsteps", driver=driver.name, known=known))
     return value
 
 
 def _pin(text: str) -> int:
     value = whole(text)
     if not 0 <= value <= 63:
-        raise ValueError("a GPIO is 0 to 63")
+        raise BadAnswer(because("import.answer.gpio"))
     return value
 
 
@@ -179,18 +181,19 @@ def _homing_toml(drive: JointDrive) -> str:
     )
 
 
-def speed_lines(arm: ArmDescription) -> list[str]:
+def speed_lines(arm: ArmDescription) -> list[Reason]:
     """The step rate of every joint at full speed, and its share of what driver and tick allow."""
     tick = arm.device.tick_hz
-    lines = [f"step rates at a tick of {1e6 / tick:g} us ({tick / 1000:g} kHz, chosen from these):"]
+    lines = [because("import.speed", tick=1.0 / tick, kilohertz=tick / 1000)]
     for joint in arm.joints:
         speed = speed_limits(joint.drive)
         rate = float(speed.step_rate)
         driver = 1e6 / (joint.driver.step_high_us + joint.driver.step_low_us)
         fastest = fastest_steps(joint.driver, tick)
-        lines.append(
-            f'  joint "{joint.name}": {joint.drive.max_speed_rpm:.4g} RPM are {rate:.0f} steps/s, '
-            f"{float(speed.step_acceleration):.0f} steps/s^2; {joint.driver.name} takes {driver:.0f} steps/s "
-            f"({rate / driver:.0%} used), the tick {fastest:.0f} ({rate / fastest:.0%} used)"
-        )
+        values: dict[str, Value] = {
+            "joint": joint.name, "rpm": joint.drive.max_speed_rpm, "rate": rate,
+            "acceleration": float(speed.step_acceleration), "driver": joint.driver.name, "most": driver,
+            "share": rate / driver, "tick_most": float(fastest), "tick_share": float(rate / fastest),
+        }  # fmt: skip
+        lines.append(because("import.speed.joint", **values))
     return lines

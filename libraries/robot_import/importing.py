@@ -4,7 +4,7 @@ source does the same in a folder that is removed, so that both find the same."""
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -23,7 +23,7 @@ from gemelo.libraries.robot_import.robot_folder import Description, step, write_
 from gemelo.libraries.robot_import.source import RobotSource, find_source
 from gemelo.libraries.robot_import.survey import Survey, surveyed
 from gemelo.libraries.robot_import.trial import trial_findings
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import Reason, because
 
 ANSWERS_FILE = "import.toml"
 XACRO = "xacro."  # before the names of its arguments, in a file of answers
@@ -42,16 +42,17 @@ class ImportOptions:
     motor: str = ""
     driver: str = ""
     xacro: Mapping[str, str] = field(default_factory=dict)  # arguments by name
+    say: Callable[[Reason], str] = str  # the sentence of a reason, in the language of the command line
 
 
 def import_robot(options: ImportOptions) -> Path:
     """Writes the robot's folder and returns it; raises `DescriptionError`, and leaves what was there as it was."""
     questions = _questions(options)
-    with step("reading the source and its meshes"):
+    with step(because("import.step.source"), options.say):
         source = _source(options, questions)
-        _require_importable(_surveyed(source, options, questions.rehearsal()).findings)
+        _require_importable(_surveyed(source, options, questions.rehearsal()).findings, options)
     survey = _surveyed(source, options, questions)
-    _show(survey.findings)
+    _show(survey.findings, options)
     description = survey.description
     if description is None:
         raise DescriptionError(because("import.ended.answers"))
@@ -61,11 +62,14 @@ def import_robot(options: ImportOptions) -> Path:
         building = Path(temporary) / description.name
         findings = built(building, description)
         _require_all_asked(questions, options)
-        _require_well([_in_folder(each, building, folder) for each in findings])
+        _require_well([_in_folder(each, building, folder) for each in findings], options)
         (building / ANSWERS_FILE).write_text(answers_text(questions.answers), encoding="utf-8")
         _publish(building, folder)
     arm = load_arm(folder)
-    print("\n".join(speed_lines(arm) if arm.has_motors else [f"{description.name}: {NO_MOTORS}"]))
+    if arm.has_motors:
+        print("\n  ".join(map(options.say, speed_lines(arm))))
+    else:
+        print(f"{description.name}: {options.say(NO_MOTORS)}")
     return folder
 
 
@@ -98,7 +102,7 @@ def built(building: Path, description: Description) -> list[Finding]:
         return [_in_folder(found, building, Path(source.label).parent)]
     if any(each.severity is Severity.ERROR for each in findings):
         return findings
-    with step("gemelo check, with plans between random configurations"):
+    with step(because("import.step.check"), description.mended.questions.say):
         findings += [
             each
             for each in check(building)
@@ -111,11 +115,13 @@ def built(building: Path, description: Description) -> list[Finding]:
 
 def _questions(options: ImportOptions) -> Questions:
     answers = read_answers(options.answers) if options.answers else {}
-    return Questions({**answers, **{f"{XACRO}{name}": value for name, value in options.xacro.items()}}, options.yes)
+    arguments = {f"{XACRO}{name}": value for name, value in options.xacro.items()}
+    return Questions({**answers, **arguments}, options.yes, options.say)
 
 
 def _source(options: ImportOptions, questions: Questions) -> RobotSource:
-    return find_source(options.source, questions.given_below(XACRO), partial(_ask_before_expanding, questions))
+    ask = partial(_ask_before_expanding, questions)
+    return find_source(options.source, questions.given_below(XACRO), ask, options.say)
 
 
 def _surveyed(source: RobotSource, options: ImportOptions, questions: Questions) -> Survey:
@@ -124,7 +130,7 @@ def _surveyed(source: RobotSource, options: ImportOptions, questions: Questions)
 
 def _ask_before_expanding(questions: Questions, xacro: Path) -> None:
     """Raises `DescriptionError` where the person does not want a xacro file to be expanded."""
-    question = f"{xacro.name} is a xacro file, which is a program: expand it, in a sandbox?"
+    question = because("import.ask.xacro", file=xacro.name)
     if not questions.ask_somebody("expand_xacro", question, "yes", yes_or_no):
         raise wrong_file(xacro, because("import.xacro.not_wanted"))
 
@@ -142,11 +148,11 @@ def _publish(building: Path, folder: Path) -> None:
         shutil.rmtree(beside, ignore_errors=True)
 
 
-def _require_importable(findings: Sequence[Finding]) -> None:
+def _require_importable(findings: Sequence[Finding], options: ImportOptions) -> None:
     """Raises `DescriptionError` after all findings are said, where one of them is an error."""
     errors = [each for each in findings if each.severity is Severity.ERROR]
     if errors:
-        _show(findings)
+        _show(findings, options)
         why = because("import.ended.error") if len(errors) == 1 else because("import.ended.errors", count=len(errors))
         raise DescriptionError(why)
 
@@ -158,10 +164,10 @@ def _require_all_asked(questions: Questions, options: ImportOptions) -> None:
         raise wrong_file(str(options.answers), because("import.answers.unused", *unused))
 
 
-def _require_well(findings: Sequence[Finding]) -> None:
+def _require_well(findings: Sequence[Finding], options: ImportOptions) -> None:
     """Raises `DescriptionError` where the finished folder has an error; says all of them."""
     for each in findings:
-        print(each)
+        print(options.say(each.reason))
     if any(each.severity is Severity.ERROR for each in findings):
         raise DescriptionError(because("import.ended.finished"))
 
@@ -172,10 +178,12 @@ def _in_folder(finding: Finding, building: Path, folder: Path) -> Finding:
     return msgspec.json.decode(msgspec.json.encode(finding).replace(old, new), type=Finding)
 
 
-def _show(findings: Sequence[Finding]) -> None:
+def _show(findings: Sequence[Finding], options: ImportOptions) -> None:
     for finding in findings:
-        mends = finding.severity is Severity.NOTE
-        print(str(finding).replace("note: ", "mended: ", 1) if mends else finding)
+        reason = finding.reason
+        if finding.severity is Severity.NOTE:
+            reason = msgspec.structs.replace(reason, values={**reason.values, "severity": "mended"})
+        print(options.say(reason))
 
 
 def _require_free(folder: Path, options: ImportOptions) -> None:

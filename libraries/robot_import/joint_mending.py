@@ -7,16 +7,18 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping
 
+from gemelo.libraries.arm.errors import Subject
 from gemelo.libraries.arm.frames.transforms import from_axis_angle, from_rpy, multiply, rotate, to_rpy
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
 from gemelo.libraries.arm.model.xml_reader import XmlReader
 from gemelo.libraries.robot_import.limits import MOST_TRAVEL, TURN
-from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.mended import Mended, subject_of
+from gemelo.schemas.reasons import Reason, because, remedy
 
-FREE = {"planar": "drives", "floating": "is free to move"}
+FREE = {"planar": "mend.base.drives", "floating": "mend.base.free"}  # what is said of a base by its joint's type
 LEFT_BY_FIXING = ("axis", "limit", "dynamics", "mimic", "safety_controller", "calibration")
 
-Say = Callable[[ET.Element, str, str, str], None]  # of `Mended`
+Say = Callable[[ET.Element, Subject, Reason], None]  # of `Mended`
 
 
 def fix_free_base(xml: XmlReader, warn: Say) -> None:
@@ -35,9 +37,7 @@ def fix_free_base(xml: XmlReader, warn: Say) -> None:
             front.remove(joint)
             still.add(_link(joint, "child"))
             if joint.get("type") in FREE:
-                message = f"the base {FREE[joint.get('type', '')]}, and no motor of an arm does that"
-                remedy = 'type="fixed": the arm is planned where its base stands'
-                warn(joint, f'joint "{joint.get("name")}"', message, remedy)
+                warn(joint, subject_of(joint), because(FREE[joint.get("type", "")], remedy("base_stands")))
                 fix(joint)
 
 
@@ -86,9 +86,8 @@ def fix_locked(mended: Mended) -> None:
         name = element.get("name", "")
         if name in places:
             unit = "m" if element.get("type") == JointKind.PRISMATIC else "rad"
-            message = f"its limits hold it at {places[name]:.6g} {unit}"
-            remedy = 'type="fixed" there: write another `lower` or `upper` where it moves'
-            mended.warn(element, f'joint "{name}"', message, remedy)
+            locked = because("mend.joint.locked", remedy("fixed_there"), place=places[name], unit=unit)
+            mended.warn(element, subject_of(element), locked)
     stand_at(mended, places)
 
 
@@ -100,13 +99,14 @@ def _is_locked(joint: UrdfJoint) -> bool:
 
 def follow_the_motor(xml: XmlReader, say: Say) -> None:
     """Followers of a joint that follows another itself follow that other, with the product of the multipliers."""
-    mimics = {joint.get("name"): found for joint in xml.root.findall("joint") for found in joint.findall("mimic")}
+    joints = {joint.get("name"): joint for joint in xml.root.findall("joint")}
+    mimics = {name: found for name, joint in joints.items() for found in joint.findall("mimic")}
     for name, (between, text) in {name: _composed(name, mimics) for name in mimics}.items():
         if not between or text["joint"] in mimics:
             continue  # a follower of a motor's joint, or followers in a ring, which is an error
-        message = f'follows joint "{between[0]}", which follows "{text["joint"]}"'
-        remedy = " ".join(f'{key}="{value}"' for key, value in text.items())
-        say(mimics[name], f'joint "{name}"', message, remedy)
+        mend = remedy("written", text=" ".join(f'{key}="{value}"' for key, value in text.items()))
+        follows = because("mend.mimic.chain", mend, between=str(between[0]), leader=text["joint"])
+        say(mimics[name], subject_of(joints[name]), follows)
         mimics[name].attrib.update(text)
 
 

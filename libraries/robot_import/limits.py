@@ -6,8 +6,9 @@ import math
 import xml.etree.ElementTree as ET
 
 from gemelo.libraries.arm.model.urdf import JointKind, Limit, UrdfJoint
-from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.mended import Mended, subject_of
 from gemelo.libraries.robot_import.questions import Questions, above_zero, number
+from gemelo.schemas.reasons import because, remedy
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 MOST_TRAVEL = {JointKind.REVOLUTE: 8.02 * math.pi, JointKind.PRISMATIC: 5.0}  # [rad], [m]: beyond it is another unit
@@ -32,7 +33,7 @@ def _complete(joint: UrdfJoint, element: ET.Element, mended: Mended, questions: 
     wanted: dict[str, float] = {}
 
     def ask(key: str, default: float, positive: bool = True) -> None:
-        question = f'joint "{joint.name}": {key} [{_unit_of(key, unit)}]'
+        question = because("import.ask.limit", joint=joint.name, limit=key, unit=_unit_of(key, unit))
         reader = above_zero if positive else number
         wanted[key] = questions.ask(f"{joint.name}.{key}", question, f"{default:.6g}", reader)
 
@@ -73,13 +74,13 @@ def _write(joint: UrdfJoint, element: ET.Element, wanted: dict[str, float], mend
     if limit is None:
         limit = ET.SubElement(element, "limit")
         mended.xml.lines[limit] = joint.line
-    was = ", ".join(f"{key} {limit.get(key, 'missing')}" for key in wanted)
+    was = tuple(f"{key} {limit.get(key)}" if key in limit.attrib else key for key in wanted)  # else it is missing
     now = " ".join(f'{key}="{value:.9g}"' for key, value in wanted.items())
-    subject, message = f'joint "{joint.name}"', f"its limits lack sense ({was})"
     if is_given:
-        mended.say(limit, subject, message, now)
+        mended.say(limit, subject_of(element), because("mend.limits", remedy("written", text=now), was=was))
     else:
-        mended.warn(limit, subject, message, f"{now} by default: correct it in robot.urdf")
+        mend = remedy("written_by_default", text=now)
+        mended.warn(limit, subject_of(element), because("mend.limits", mend, was=was))
     for key, value in wanted.items():
         limit.set(key, f"{value:.9g}")
 

@@ -9,12 +9,13 @@ from gemelo.libraries.arm.checks.findings import Finding, error, note
 from gemelo.libraries.arm.checks.meshes import SMALLEST, Facts, MeshFacts, facts_of, link_volume
 from gemelo.libraries.arm.checks.units import LARGEST_GYRATION, gyration
 from gemelo.libraries.arm.checks.urdf import UNTOUCHED, principal_moments
+from gemelo.libraries.arm.errors import Subject
 from gemelo.libraries.arm.model.urdf import UrdfLink
-from gemelo.libraries.robot_import.mended import Mended, links_of, meshes_of, subject_of
+from gemelo.libraries.robot_import.mended import LEFT_OUT, Mended, links_of, meshes_of, subject_of, with_remedy
 from gemelo.libraries.robot_import.questions import Questions, yes_or_no
-from gemelo.schemas.reasons import Reason
+from gemelo.schemas.reasons import Reason, Value, because, remedy
 
-MOST_NAMED = 3
+AS_COLLISION = remedy("left_out_drawn_with_collision")
 
 
 def references(mended: Mended) -> None:
@@ -27,21 +28,20 @@ def references(mended: Mended) -> None:
         found = _found(mended, link, mesh, reference)
         if found is None and reference and (link, reference) not in missing:
             missing.add((link, reference))
-            message = f'mesh "{reference}" is not there'
             if item.tag == "visual" and _touches_wholly(mended, link):
                 link.remove(item)
-                mended.warn(mesh, subject_of(link), message, "left out: it is drawn with its <collision>")
+                mended.warn(mesh, subject_of(link), because("mesh.none", AS_COLLISION, mesh=reference))
                 continue
-            message += mended.source.near(reference)
-            mended.fail(mesh, subject_of(link), message, f"put it below {mended.source.root}")
+            mend = remedy("put_below", folder=str(mended.source.root))
+            mended.fail(mesh, subject_of(link), with_remedy(mended.source.missing(reference), mend))
         elif found is not None:
             mended.files[reference] = found
             if reference.startswith("package://"):
                 package = reference.split("/")[2]
                 by_package[package] = by_package.get(package, 0) + 1
     for package, count in by_package.items():
-        message = f"{count} meshes are named by the ROS package path package://{package}"
-        mended.notes.append(note(mended.source.label, "meshes", message, "relative paths, the files copied"))
+        named = because("mend.mesh.package", remedy("relative_and_copied"), count=count, package=package)
+        mended.notes.append(note(mended.source.label, Subject("meshes"), named))
 
 
 def _found(mended: Mended, link: ET.Element, mesh: ET.Element, reference: str) -> Path | None:
@@ -51,8 +51,8 @@ def _found(mended: Mended, link: ET.Element, mesh: ET.Element, reference: str) -
         return found
     other = mended.source.in_another_format(reference)
     if other is not None and reference not in mended.files:
-        message = f'mesh "{reference}" is not there, but {other.name} is'
-        mended.say(mesh, subject_of(link), message, f'filename="{other.name}"')
+        mend = remedy("written", text=f'filename="{other.name}"')
+        mended.say(mesh, subject_of(link), because("mend.mesh.format", mend, mesh=reference, other=other.name))
     return other
 
 
@@ -69,8 +69,7 @@ def unreadable(mended: Mended) -> None:
         known = mended.facts(geometry)
         if isinstance(known, Reason) and item.tag == "visual" and _touches_wholly(mended, link):
             link.remove(item)
-            message = f'mesh "{geometry.mesh}": {known}'
-            mended.warn(mesh, subject_of(link), message, "left out: it is drawn with its <collision>")
+            mended.warn(mesh, subject_of(link), because("mesh.wrong", known, AS_COLLISION, mesh=geometry.mesh or ""))
 
 
 def flat(mended: Mended) -> None:
@@ -78,9 +77,9 @@ def flat(mended: Mended) -> None:
     for link, _, item, geometry, mesh in meshes_of(mended):
         known = mended.facts(geometry)
         if isinstance(known, MeshFacts) and known.is_flat:
-            message = f'mesh "{geometry.mesh}" in <{item.tag}> bounds no volume'
             link.remove(item)
-            mended.say(mesh, subject_of(link), message, "left out")
+            no_volume = because("mend.mesh.flat", LEFT_OUT, mesh=geometry.mesh or "", tag=item.tag)
+            mended.say(mesh, subject_of(link), no_volume)
 
 
 def tiny(mended: Mended) -> None:
@@ -90,14 +89,13 @@ def tiny(mended: Mended) -> None:
         scale = max(map(abs, geometry.scale))
         if not isinstance(known, MeshFacts) or not 0.0 < known.longest * scale < SMALLEST:
             continue
-        message = f'mesh "{geometry.mesh}" is {1000.0 * known.longest * scale:.3g} mm long'
+        size: dict[str, Value] = {"mesh": geometry.mesh or "", "length": known.longest * scale}
         if scale == 1.0:
             link.remove(item)
-            mended.say(mesh, subject_of(link), f"{message}: it stands for nothing", "left out")
+            mended.say(mesh, subject_of(link), because("mend.mesh.placeholder", LEFT_OUT, **size))
         else:
-            line = mended.xml.lines.get(mesh, 0)
-            remedy = f'correct scale="{mesh.get("scale")}"'
-            mended.errors.append(error(mended.source.label, subject_of(link), message, remedy, line))
+            mend = remedy("correct_scale", scale=mesh.get("scale", ""))
+            mended.fail(mesh, subject_of(link), because("mend.mesh.tiny", mend, **size))
 
 
 def frames(mended: Mended) -> None:
@@ -106,7 +104,7 @@ def frames(mended: Mended) -> None:
         inertial = link.find("inertial")
         if inertial is not None and model.inertial is not None and model.inertial.mass == 0.0:
             link.remove(inertial)
-            mended.say(inertial, subject_of(link), "its mass is 0 kg: it is a mere frame", "<inertial> left out")
+            mended.say(inertial, subject_of(link), because("mend.link.frame", remedy("inertial_left_out")))
 
 
 def inertias(mended: Mended) -> None:
@@ -119,15 +117,14 @@ def inertias(mended: Mended) -> None:
         far = gyration(known, high) > LARGEST_GYRATION
         if low > 0.0 and low + middle >= high * (1.0 - 1e-6) and not far:
             continue
-        unit = " of that mass: they are in another unit" if far else ""
-        message = f"its principal moments {low:.3g}, {middle:.3g}, {high:.3g} kg m^2 are of no body{unit}"
         link.remove(inertial)
         even = _even_density(model, known.mass, mended.facts)
         if even is not None:
             link.insert(0, even)
             mended.xml.lines[even] = mended.xml.lines.get(inertial, 0)
-        remedy = "left out" if even is None else f"that of its mesh at {known.mass:g} kg of even density"
-        mended.say(inertial, subject_of(link), message, remedy)
+        mend = LEFT_OUT if even is None else remedy("inertia_of_mesh", mass=known.mass)
+        code = "mend.inertia.unit" if far else "mend.inertia"
+        mended.say(inertial, subject_of(link), because(code, mend, low=low, middle=middle, high=high))
 
 
 def unseen(mended: Mended) -> None:
@@ -141,17 +138,14 @@ def unseen(mended: Mended) -> None:
             visual.tag = "visual"
             link.insert(0, visual)
         if collisions:
-            mended.say(
-                collisions[0], subject_of(link), "has a <collision>, but no <visual>", "drawn with the same shape"
-            )
+            mended.say(collisions[0], subject_of(link), because("mend.link.unseen", remedy("drawn_with_the_same")))
 
 
 def shapeless(mended: Mended) -> list[Finding]:
     """A robot without any shape, or a length to draw: an error for who would import it."""
     if any(link.find("visual") is not None for link in mended.xml.root.findall("link")):
         return []
-    message = "no link has a <visual> or <collision>: nothing could be drawn, nothing would ever touch"
-    return [error(mended.source.label, "robot", message, "give the links meshes, boxes or cylinders")]
+    return [error(mended.source.label, Subject("robot"), because("mend.robot.nothing", remedy("give_shapes")))]
 
 
 def _even_density(link: UrdfLink, mass: float, facts: Facts) -> ET.Element | None:
@@ -179,18 +173,16 @@ def untouched(mended: Mended, questions: Questions) -> None:
     bare = [(element, link) for element, link in links_of(mended) if link.visuals and not link.collisions]
     if not bare:
         return
-    names = ", ".join(link.name for _, link in bare[:MOST_NAMED])
-    names += f" and {len(bare) - MOST_NAMED} more" if len(bare) > MOST_NAMED else ""
+    names = tuple(link.name for _, link in bare)
     has_some = any(link.collisions for link in mended.model.links)
-    question = f"fit collision shapes to what is only drawn ({names})?"
+    question = because("import.ask.shapes", links=names)
     mended.fits_bare = not has_some or questions.ask("shapes_for_drawn", question, "no", yes_or_no)
     for element, _ in bare if not mended.fits_bare else ():
-        remedy = 'nothing will touch it; shapes_for_drawn = "yes" in --answers fits shapes to it'
-        mended.warn(element, subject_of(element), UNTOUCHED, remedy)
+        mended.warn(element, subject_of(element), with_remedy(UNTOUCHED, remedy("shapes_for_drawn")))
     if mended.fits_bare:
         element, _ = bare[0]
-        message = f"{len(bare)} links are drawn and have no <collision> ({names})"
-        mended.say(element, subject_of(element), message, "shapes are fitted to what is drawn")
+        what = because("mend.links.drawn", remedy("shapes_fit_drawn"), count=len(bare), links=names)
+        mended.say(element, subject_of(element), what)
 
 
 def own_collisions(mended: Mended) -> None:
@@ -199,5 +191,5 @@ def own_collisions(mended: Mended) -> None:
     other = [each for each in own if {s.mesh for s in each[1].collisions} != {s.mesh for s in each[1].visuals}]
     if other:
         element, _ = other[0]
-        message = f"{len(other)} links have <collision> meshes of their own"
-        mended.say(element, subject_of(element), message, "collision shapes are fitted to these, not to the <visual>")
+        what = because("mend.links.own", remedy("shapes_fit_own"), count=len(other))
+        mended.say(element, subject_of(element), what)

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
+import msgspec
+
 from gemelo.libraries.arm.checks.findings import Finding, Severity, error, note, once, warning
 from gemelo.libraries.arm.checks.meshes import MeshFacts, check_meshes, facts_of
 from gemelo.libraries.arm.checks.urdf import check_urdf, fault_finding
@@ -16,7 +18,10 @@ from gemelo.libraries.arm.model.urdf import Geometry, UrdfLink, UrdfModel, model
 from gemelo.libraries.arm.model.xml_reader import XmlReader
 from gemelo.libraries.robot_import.questions import Questions, one_of
 from gemelo.libraries.robot_import.source import RobotSource
-from gemelo.schemas.reasons import Reason
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import Reason, Remedy, because, remedy
+
+LEFT_OUT = remedy("left_out")
 
 
 @dataclass
@@ -78,29 +83,28 @@ class Mended:
         file = self.files.get(geometry.mesh or "")
         return None if file is None else _facts(file)
 
-    def say(self, element: ET.Element, subject: Subject | str, message: Reason | str, remedy: str) -> None:
-        """Notes what is mended."""
-        self.notes.append(note(self.source.label, subject, message, remedy, self.xml.lines.get(element, 0)))
+    def say(self, element: ET.Element, subject: Subject, what: Reason) -> None:
+        """Notes what is mended; its remedy is what was done."""
+        self.notes.append(note(self.source.label, subject, what, self.xml.lines.get(element, 0)))
 
-    def fail(self, element: ET.Element, subject: Subject | str, message: Reason | str, remedy: str) -> None:
+    def fail(self, element: ET.Element, subject: Subject, what: Reason) -> None:
         """Says what has no one answer: an error."""
-        self.errors.append(error(self.source.label, subject, message, remedy, self.xml.lines.get(element, 0)))
+        self.errors.append(error(self.source.label, subject, what, self.xml.lines.get(element, 0)))
 
-    def choose(
-        self, key: str, element: ET.Element, subject: Subject | str, message: Reason | str, words: Sequence[str]
-    ) -> str | None:
+    def choose(self, key: str, element: ET.Element, subject: Subject, what: Reason, words: Sequence[str]) -> str | None:
         """Which of the words a person says to what has no one answer; None, after an error, where nobody is there."""
-        question = f"{subject}: {message}: {' or '.join(words)}?"
+        question = because("import.ask.choice", subject.around(what), words=tuple(words))
         said = self.questions.ask_without_default(key, question, one_of(*words))
         if said is None:
-            remedy = f'correct it in the source, or write {key} = "{words[0]}"'
-            others = f" ({', '.join(words)})" if words[1:] else ""
-            self.fail(element, subject, message, f"{remedy}{others} into a file for `gemelo import --answers`")
+            mend = remedy("correct_or_answer", key=key, answer=words[0])
+            if words[1:]:
+                mend = remedy("correct_or_answer_one", key=key, answer=words[0], answers=tuple(words))
+            self.fail(element, subject, with_remedy(what, mend))
         return said
 
-    def warn(self, element: ET.Element, subject: Subject | str, message: Reason | str, remedy: str) -> None:
+    def warn(self, element: ET.Element, subject: Subject, what: Reason) -> None:
         """Warns of what a default stands for that nobody has given."""
-        self.notes.append(warning(self.source.label, subject, message, remedy, self.xml.lines.get(element, 0)))
+        self.notes.append(warning(self.source.label, subject, what, self.xml.lines.get(element, 0)))
 
 
 @lru_cache(maxsize=256)
@@ -125,9 +129,21 @@ def meshes_of(mended: Mended) -> Iterator[tuple[ET.Element, UrdfLink, ET.Element
                 yield link, model, item, geometry, mesh
 
 
-def subject_of(link: ET.Element) -> str:
-    """What a finding about a <link> names."""
-    return f'link "{link.get("name")}"'
+def subject_of(element: ET.Element) -> Subject:
+    """What a finding about a <link> or <joint> names."""
+    return Subject(element.tag, element.get("name", ""))
+
+
+def with_remedy(what: Reason, mend: Remedy) -> Reason:
+    """The reason with what would do, or what was done."""
+    return msgspec.structs.replace(what, remedies=(mend,))
+
+
+def unreadable(error: Exception) -> Reason:
+    """Why a file beside the source cannot be read."""
+    if isinstance(error, ReasonedError):
+        return because("mend.file.unreadable.as", error.reason)
+    return because("mend.file.unreadable", problem=" ".join(str(error).split()))
 
 
 def numbers_in(text: str) -> list[float] | None:

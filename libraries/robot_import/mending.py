@@ -7,17 +7,18 @@ import re
 import unicodedata
 import xml.etree.ElementTree as ET
 
-from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import DescriptionError, Subject, wrong_file
 from gemelo.libraries.arm.model.urdf import JointKind, model_of
 from gemelo.libraries.arm.model.xml_reader import XmlReader, parse_xml
 from gemelo.libraries.robot_import import link_mending, mesh_places, motion_limits, unit_mending
 from gemelo.libraries.robot_import.joint_mending import fix_free_base, fix_locked, follow_the_motor
-from gemelo.libraries.robot_import.mended import Mended, numbers_in
+from gemelo.libraries.robot_import.mended import LEFT_OUT, Mended, numbers_in, subject_of
 from gemelo.libraries.robot_import.mesh_units import mesh_units
 from gemelo.libraries.robot_import.moveit_limits import joint_limits
 from gemelo.libraries.robot_import.questions import Questions
 from gemelo.libraries.robot_import.source import RobotSource
 from gemelo.libraries.robot_import.stick_figure import sticks
+from gemelo.schemas.reasons import because, remedy
 
 FOREIGN = ("gazebo", "transmission", "ros2_control", "sensor")
 MOVES = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
@@ -32,7 +33,7 @@ def mend(source: RobotSource, questions: Questions | None = None) -> Mended:
         xml = parse_xml(source.text)
         model_of(xml)
     except DescriptionError as said:
-        raise DescriptionError(f"{source.urdf}: {said}") from said
+        raise wrong_file(source.urdf, said.reason) from said
     _require_links(xml, source)
     xml.faults.clear()
     mended = Mended(source, xml, {}, questions=questions or Questions({}, takes_defaults=True))
@@ -74,8 +75,8 @@ def mend(source: RobotSource, questions: Questions | None = None) -> Mended:
 def _require_links(xml: XmlReader, source: RobotSource) -> None:
     """Raises `DescriptionError` for a robot without any link, as of a xacro file of macros that others call."""
     if xml.root.find("link") is None:
-        remedy = "name the file that calls its macros" if source.is_expanded else "export it again"
-        raise DescriptionError(f"{source.urdf}: it has no <link>: {remedy}")
+        code = "import.source.macros_alone" if source.is_expanded else "import.source.no_link"
+        raise wrong_file(source.urdf, because(code))
 
 
 def safe_name(text: str, known: set[str], allowed: str = r"[^A-Za-z0-9_.-]+") -> str:
@@ -97,11 +98,12 @@ def _foreign(mended: Mended) -> None:
         for element in elements:
             root.remove(element)
         if elements:
-            mended.say(elements[0], f"<{tag}>", f"{len(elements)} of these say nothing that is used here", "left out")
+            mended.say(elements[0], Subject(f"<{tag}>"), because("mend.unused", LEFT_OUT, count=len(elements)))
     for material in root.iter("material"):
         for texture in material.findall("texture"):
             material.remove(texture)
-            mended.say(texture, "<texture>", f'"{texture.get("filename")}" is not drawn', "left out")
+            picture = because("mend.texture", LEFT_OUT, file=texture.get("filename", ""))
+            mended.say(texture, Subject("<texture>"), picture)
     _colours(mended)
 
 
@@ -117,7 +119,7 @@ def _prefixed(mended: Mended) -> None:
             found.setdefault(name, []).append(parent)
     for name, elements in found.items():
         if not name.startswith("xmlns:"):
-            mended.say(elements[0], f'"{name}"', f"{len(elements)} of these say nothing that is used here", "left out")
+            mended.say(elements[0], Subject(f'"{name}"'), because("mend.unused", LEFT_OUT, count=len(elements)))
 
 
 def _colours(mended: Mended) -> None:
@@ -136,7 +138,7 @@ def _colours(mended: Mended) -> None:
                 continue
             parent.remove(material)
             if name not in said:
-                mended.say(material, f'material "{name}"', "nothing gives it a colour", "left out")
+                mended.say(material, subject_of(material), because("mend.colour", LEFT_OUT))
             said.add(name)
 
 
@@ -151,7 +153,7 @@ def _names(mended: Mended) -> None:
                 continue
             new = mended.renamed[old] = safe_name(old, known)
             element.set("name", new)
-            mended.say(element, f'{tag} "{old}"', "its name has blanks or letters that commands do not take", f"{new}")
+            mended.say(element, Subject(tag, old), because("mend.name", remedy("written", text=new)))
             for joint in mended.xml.root.findall("joint"):
                 for role in (joint.find(word) for word in roles or ("mimic",)):
                     if role is not None and role.get(tag) == old:
@@ -168,21 +170,20 @@ def _endless(mended: Mended) -> None:
         for limit in joint.findall("limit"):
             named = [key for key, text in limit.items() if any(not math.isfinite(x) for x in numbers_in(text) or ())]
             if named:
-                where, message = f'joint "{joint.get("name")}"', f"its {', '.join(named)} in <limit> is not finite"
-                mended.say(limit, where, message, "left out")
+                mended.say(limit, subject_of(joint), because("mend.endless", LEFT_OUT, limits=tuple(named)))
             for key in named:
                 del limit.attrib[key]
 
 
 def _axes(mended: Mended) -> None:
-    harmless: list[tuple[ET.Element, str]] = []
+    harmless: list[tuple[ET.Element, Subject]] = []
     for joint in mended.xml.root.findall("joint"):
         axis = joint.find("axis")
         numbers = None if axis is None else numbers_in(axis.get("xyz", "1 0 0"))
         if axis is None or numbers is None:
             continue
         length = math.sqrt(sum(value * value for value in numbers))
-        where = f'joint "{joint.get("name")}"'
+        where = subject_of(joint)
         if joint.get("type") not in MOVES:
             if length < 1e-9:
                 harmless.append((axis, where))
@@ -190,11 +191,14 @@ def _axes(mended: Mended) -> None:
         elif length >= 1e-9 and abs(length - 1.0) > 1e-6:
             text = " ".join(f"{value / length:.9g}" for value in numbers)
             if abs(length - 1.0) > ROUNDED_AXIS:
-                mended.say(axis, where, f'its axis "{axis.get("xyz")}" is {length:.4g} long, not 1', f'xyz="{text}"')
+                mend = remedy("written", text=f'xyz="{text}"')
+                mended.say(axis, where, because("mend.axis", mend, axis=axis.get("xyz", ""), length=length))
             axis.set("xyz", text)
     for axis, where in harmless[:1]:  # some exporters write it for every frame
-        more = f", and of {len(harmless) - 1} more" if harmless[1:] else ""
-        mended.say(axis, where, f"a fixed joint's axis is zero, which is harmless{more}", "left out")
+        what = because("mend.axis.fixed", LEFT_OUT)
+        if harmless[1:]:
+            what = because("mend.axis.fixed.more", LEFT_OUT, more=len(harmless) - 1)
+        mended.say(axis, where, what)
 
 
 def _mimics(mended: Mended) -> None:
@@ -204,5 +208,5 @@ def _mimics(mended: Mended) -> None:
         if mimic is not None and joint.get("type") == JointKind.FIXED:
             joint.remove(mimic)  # some readers wonder aloud at it
         elif mimic is not None and joint.get("type") in MOVES:
-            message = f'follows joint "{mimic.get("joint")}"'
-            mended.say(mimic, f'joint "{joint.get("name")}"', message, "it gets no motor of its own")
+            follows = because("mend.mimic.follows", remedy("no_motor_of_its_own"), leader=mimic.get("joint", ""))
+            mended.say(mimic, subject_of(joint), follows)

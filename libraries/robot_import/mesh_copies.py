@@ -13,6 +13,7 @@ from gemelo.libraries.arm.checks.meshes import MOST_TRIANGLES, MeshFacts, facts_
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.robot_import.mended import Mended
 from gemelo.libraries.robot_import.mending import safe_name
+from gemelo.schemas.reasons import because
 
 if TYPE_CHECKING:
     import trimesh
@@ -53,7 +54,7 @@ def _copy(file: Path, folder: Path, stem: str) -> str:
     try:
         scene_of(file).export(folder / f"{stem}.glb")
     except Exception as error:  # whatever its many readers raise for a damaged file
-        raise DescriptionError(f"{file} cannot be read: {error}") from error
+        raise DescriptionError(because("import.mesh.unreadable", file=str(file), problem=str(error))) from error
     return f"{stem}.glb"
 
 

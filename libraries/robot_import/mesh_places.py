@@ -21,9 +21,11 @@ from gemelo.libraries.robot_import.link_boxes import (
     joints_at,
     longest_joint,
 )
-from gemelo.libraries.robot_import.mended import Mended, links_of, subject_of
+from gemelo.libraries.robot_import.mended import Mended, links_of, subject_of, with_remedy
+from gemelo.schemas.reasons import because, remedy
 
 Array = NDArray[np.float64]
+LEFT_THERE = remedy("left_there")
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 AWAY = (
@@ -58,11 +60,10 @@ def mesh_places(mended: Mended) -> None:
         element = next(each for each in mended.xml.root.findall("link") if each.get("name") == link.name)
         box = boxes[link.name]
         assert box is not None
-        gap = 1000.0 * _gap(box, link, model)
-        message = f"its mesh lies {gap:.0f} mm from its joints, and the frame of the assembly does not explain it"
-        if mended.choose("mesh_places", element, subject_of(element), message, [AS_WRITTEN]) is None:
+        away_from = because("mend.place.away", gap=_gap(box, link, model))
+        if mended.choose("mesh_places", element, subject_of(element), away_from, [AS_WRITTEN]) is None:
             continue
-        mended.warn(element, subject_of(element), message, "left there, as you said")
+        mended.warn(element, subject_of(element), with_remedy(away_from, LEFT_THERE))
 
 
 def _fits_the_assembly(mended: Mended, model: UrdfModel, away: list[UrdfLink], back: Mapping[str, Rigid]) -> bool:
@@ -92,10 +93,11 @@ def _move_back(mended: Mended, model: UrdfModel, away: list[UrdfLink], back: Map
             if shape.mesh is not None:
                 written = set_origin(item, compose(pose, (shape.origin.xyz, from_rpy(*shape.origin.rpy))))
         if box is not None and written:
-            gap = 1000.0 * _gap(box, link, model)
-            far = f"its mesh lies {gap:.0f} mm from its joints" if link.name in names else "its mesh"
-            message = f"{far}: all meshes are in the frame of the assembly"
-            mended.say(element, subject_of(element), message, f"<origin {written}/>")
+            mend = remedy("written", text=f"<origin {written}/>")
+            what = because("mend.place.assembly", mend)
+            if link.name in names:
+                what = because("mend.place.assembly.away", mend, gap=_gap(box, link, model))
+            mended.say(element, subject_of(element), what)
 
 
 def collisions_beside(mended: Mended) -> None:
@@ -107,16 +109,16 @@ def collisions_beside(mended: Mended) -> None:
         gap = between(look, touch)
         if gap <= max(BESIDE_LEAST, BESIDE * diagonal(look)):
             continue
-        message = f"its <collision> stands {1000.0 * gap:.0f} mm beside its <visual>"
         item = element.findall("collision")[0]
         if len(link.visuals) == len(link.collisions) == 1 and _are_alike(mended, *link.visuals, *link.collisions):
             origin = link.visuals[0].origin
             written = set_origin(item, (origin.xyz, from_rpy(*origin.rpy)))
-            mended.say(
-                item, subject_of(element), f"{message}, of the same size", f"<origin {written}/>, as the <visual>"
-            )
-        elif mended.choose("collision_places", item, subject_of(element), message, [AS_WRITTEN]) is not None:
-            mended.warn(item, subject_of(element), message, "left there, as you said")
+            mend = remedy("written_as_visual", text=f"<origin {written}/>")
+            mended.say(item, subject_of(element), because("mend.place.beside.alike", mend, gap=gap))
+            continue
+        beside = because("mend.place.beside", gap=gap)
+        if mended.choose("collision_places", item, subject_of(element), beside, [AS_WRITTEN]) is not None:
+            mended.warn(item, subject_of(element), with_remedy(beside, LEFT_THERE))
 
 
 def masses_away(mended: Mended) -> None:
@@ -132,18 +134,16 @@ def masses_away(mended: Mended) -> None:
         gap = distance_to(look, place)
         if gap <= least:
             continue
-        message = f"its centre of mass lies {1000.0 * gap:.0f} mm outside it"
         pose = (place, from_rpy(*link.inertial.origin.rpy))
         x, y, z = (0.5 * (look[0] + look[1])).tolist()
-        tries: list[tuple[str, Rigid]] = [
-            (": it is in the frame of the assembly", compose(back.get(link.name, IDENTITY), pose))
-        ]
+        tries: list[tuple[str, Rigid]] = [("mend.mass.assembly", compose(back.get(link.name, IDENTITY), pose))]
         if np.linalg.norm(place) > IN_MILLIMETRES:
             smaller = (MILLIMETRE * place[0], MILLIMETRE * place[1], MILLIMETRE * place[2])
-            tries.append((": it is in millimetres", (smaller, pose[1])))
-        tries.append((", and is put into its middle", ((x, y, z), pose[1])))
-        why, there = next(each for each in tries if distance_to(look, each[1][0]) <= NEAR * least)
-        mended.say(inertial, subject_of(element), message + why, f"<origin {set_origin(inertial, there)}/>")
+            tries.append(("mend.mass.millimetres", (smaller, pose[1])))
+        tries.append(("mend.mass.middle", ((x, y, z), pose[1])))
+        code, there = next(each for each in tries if distance_to(look, each[1][0]) <= NEAR * least)
+        mend = remedy("written", text=f"<origin {set_origin(inertial, there)}/>")
+        mended.say(inertial, subject_of(element), because(code, mend, gap=gap))
 
 
 def set_origin(item: ET.Element, pose: Rigid) -> str:

@@ -18,10 +18,10 @@ from gemelo.libraries.arm.checks.meshes import IN_MILLIMETRES, MeshFacts
 from gemelo.libraries.arm.model.urdf import Geometry, UrdfLink, UrdfModel
 from gemelo.libraries.robot_import.link_boxes import carried_by, corners_of, longest_joint, placed, pose_of
 from gemelo.libraries.robot_import.mended import Mended, meshes_of, subject_of
+from gemelo.schemas.reasons import Value, because, remedy
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}  # [m]
-WORDS = {"m": "metres", "mm": "millimetres", "cm": "centimetres", "in": "inches"}
 AS_WRITTEN = "as_written"
 PLAIN = (0.4, 4.0)  # how often the distance of its joints a mesh is long, as written: between them nothing is wrong
 USUAL = 1.1  # times that a mesh is as long as its joints are apart
@@ -78,13 +78,15 @@ def _settle(
     span = longest_joint(mended.model)
     units = _fitting(ratio) if ratio is not None else _fitting_leaf(_length(mended, first), span)
     length = _length(mended, first) * scale
-    several = f", as {len(drawn)} <{tag}> meshes are written" if len(drawn) > 1 else ""
-    message = f'mesh "{first.geometry.mesh}" is {length:.4g} m long, where joints are up to {span:.4g} m apart{several}'
+    size: dict[str, Value] = {"mesh": first.geometry.mesh or "", "length": length, "span": span}
+    long = because("mend.mesh.long", **size)
+    if len(drawn) > 1:
+        long = because("mend.mesh.long.several", **size, count=len(drawn), tag=tag)
     if len(units) != 1:
-        fit = f"{' and '.join(WORDS[unit] for unit in units)} fit" if units else "no unit fits"
+        fit = because("mend.mesh.units", long, units=tuple(units)) if units else because("mend.mesh.no_unit", long)
         key, words = f"{tag}_mesh_unit", [*UNITS, AS_WRITTEN]
         mended.sized |= {each.geometry.mesh or "" for each in drawn}
-        chosen = mended.choose(key, first.mesh, subject_of(first.link), f"{message}: {fit}", words)
+        chosen = mended.choose(key, first.mesh, subject_of(first.link), fit, words)
         if chosen is None or chosen == AS_WRITTEN:
             return
         units = [chosen]
@@ -92,8 +94,8 @@ def _settle(
     for each in drawn:
         factor = UNITS[unit] / scale
         each.mesh.set("scale", " ".join(f"{factor * value:.9g}" for value in each.geometry.scale))
-    message = f"{message}: it is in {WORDS[unit]}"
-    mended.say(first.mesh, subject_of(first.link), message, f'scale="{first.mesh.get("scale")}"')
+    mend = remedy("written", text=f'scale="{first.mesh.get("scale")}"')
+    mended.say(first.mesh, subject_of(first.link), because("mend.mesh.unit", long, mend, unit=unit))
 
 
 def _fitting(ratio: Callable[[float], float]) -> list[str]:

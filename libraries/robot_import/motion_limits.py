@@ -7,7 +7,8 @@ import xml.etree.ElementTree as ET
 
 from gemelo.libraries.arm.checks.urdf import follower_range
 from gemelo.libraries.arm.model.urdf import JointKind, Limit, UrdfJoint
-from gemelo.libraries.robot_import.mended import Mended, numbers_in
+from gemelo.libraries.robot_import.mended import LEFT_OUT, Mended, numbers_in, subject_of
+from gemelo.schemas.reasons import Value, because, remedy
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 PLACES = 9  # significant digits of a limit that is written
@@ -20,31 +21,32 @@ def soft_limits(mended: Mended) -> None:
         for safety in element.findall("safety_controller"):
             element.remove(safety)
             low, high = (_number(safety, key) for key in ("soft_lower_limit", "soft_upper_limit"))
-            said = f"its soft limits {_text(low)} to {_text(high)}"
-            subject = f'joint "{joint.name}"'
             if joint.kind is JointKind.CONTINUOUS and (low, high) not in ((0.0, 0.0), (None, None)):
-                remedy = 'left out: write type="revolute" and a <limit> where it must stay within them'
-                mended.warn(safety, subject, f"{said} are of a continuous joint, which turns beyond them", remedy)
+                mend = remedy("left_out_revolute_limit")
+                turning = because("mend.soft.continuous", mend, low=_or_none(low), high=_or_none(high))
+                mended.warn(safety, subject_of(element), turning)
             elif joint.kind is not JointKind.FIXED:
-                _narrow_softly(mended, element, joint, safety, said)
+                _narrow_softly(mended, element, joint, safety)
 
 
-def _narrow_softly(mended: Mended, element: ET.Element, joint: UrdfJoint, safety: ET.Element, said: str) -> None:
+def _narrow_softly(mended: Mended, element: ET.Element, joint: UrdfJoint, safety: ET.Element) -> None:
     low, high = (_number(safety, key) for key in ("soft_lower_limit", "soft_upper_limit"))
     lower, upper = ends_of(joint.limit)
     narrow = (max(lower, -math.inf if low is None else low), min(upper, math.inf if high is None else high))
-    subject = f'joint "{joint.name}"'
+    subject = subject_of(element)
+    soft: dict[str, Value] = {"low": _or_none(low), "high": _or_none(high)}
+    ends: dict[str, Value] = {**soft, "lower": lower, "upper": upper}
     if (low, high) == (0.0, 0.0) or (low, high) == (None, None):
-        mended.say(safety, subject, "its <safety_controller> has no soft limits", "left out")
+        mended.say(safety, subject, because("mend.soft.none", LEFT_OUT))
     elif not narrow[0] < narrow[1]:
-        remedy = "left out: correct them where the joint must stay within them"
-        mended.warn(safety, subject, f"{said} leave no travel within its limits {lower:g} to {upper:g}", remedy)
+        mended.warn(safety, subject, because("mend.soft.no_travel", remedy("left_out_correct_them"), **ends))
     elif _is_near(low, lower) and _is_near(high, upper):
-        mended.say(safety, subject, f"{said} are its limits", "left out")
+        mended.say(safety, subject, because("mend.soft.same", LEFT_OUT, **soft))
     elif _is_near(narrow[0], lower) and _is_near(narrow[1], upper):
-        mended.say(safety, subject, f"{said} are not within its limits {lower:g} to {upper:g}", "the limits hold")
+        mended.say(safety, subject, because("mend.soft.beyond", remedy("limits_hold"), **ends))
     else:
-        mended.say(safety, subject, f"{said} are within its limits {lower:g} to {upper:g}", set_ends(element, *narrow))
+        mend = remedy("written", text=set_ends(element, *narrow))
+        mended.say(safety, subject, because("mend.soft.within", mend, **ends))
 
 
 def _is_near(value: float | None, limit: float) -> bool:
@@ -54,16 +56,17 @@ def _is_near(value: float | None, limit: float) -> bool:
 
 def calibrations(mended: Mended) -> None:
     """The places of reference marks, which restrict nothing and are looked for by no switch of ours."""
-    found = [(element, joint, mark) for element, joint in joints_of(mended) for mark in element.findall("calibration")]
-    for element, _, mark in found:
+    found = [(element, mark) for element, _ in joints_of(mended) for mark in element.findall("calibration")]
+    for element, mark in found:
         element.remove(mark)
     if found:
-        _, joint, mark = found[0]
-        more = f", and of {len(found) - 1} more" if found[1:] else ""
+        element, mark = found[0]
         words = " ".join(f'{key}="{value}"' for key, value in mark.items())
-        message = f"its <calibration {words}> says where a reference mark is{more}"
-        remedy = "left out: `reference_position` and [joint.homing] in robot.toml say that here"
-        mended.say(mark, f'joint "{joint.name}"', message, remedy)
+        mend, written = remedy("left_out_reference"), f"<calibration {words}>"
+        what = because("mend.calibration", mend, element=written)
+        if found[1:]:
+            what = because("mend.calibration.more", mend, element=written, more=len(found) - 1)
+        mended.say(mark, subject_of(element), what)
 
 
 def followers(mended: Mended) -> None:
@@ -75,12 +78,11 @@ def followers(mended: Mended) -> None:
         reach = None if leader is None else follower_range(joint, leader)
         if leader is None or reach is None or leader.limit is None:
             continue
-        subject, element = f'joint "{joint.name}"', elements[joint.name]
-        far = f'follows "{leader.name}" from {reach.low:.6g} to {reach.high:.6g}'
-        message = f"{far}, beyond its own limits {reach.lower:g} to {reach.upper:g}"
         if reach.narrow is not None:  # else it is an error, which others say
-            written = set_ends(elements[leader.name], *reach.narrow)
-            mended.say(element, subject, message, f'joint "{leader.name}": {written}')
+            element, written = elements[joint.name], set_ends(elements[leader.name], *reach.narrow)
+            led: dict[str, Value] = {"low": reach.low, "high": reach.high, "lower": reach.lower, "upper": reach.upper}
+            mend = remedy("written_of_joint", joint=leader.name, text=written)
+            mended.say(element, subject_of(element), because("urdf.mimic.beyond", mend, leader=leader.name, **led))
 
 
 def joints_of(mended: Mended) -> list[tuple[ET.Element, UrdfJoint]]:
@@ -108,5 +110,6 @@ def _number(element: ET.Element, key: str) -> float | None:
     return found[0] if found and len(found) == 1 and math.isfinite(found[0]) else None
 
 
-def _text(value: float | None) -> str:
-    return "none" if value is None else f"{value:g}"
+def _or_none(value: float | None) -> Value:
+    """The word for a soft limit that is not given."""
+    return "none" if value is None else value

@@ -15,13 +15,14 @@ from pathlib import Path
 import msgspec
 
 from gemelo.libraries.arm.checks.findings import Finding, error, warning
-from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import PAIR, DescriptionError, Subject
 from gemelo.libraries.arm.kinematics.collision_matrix import LinkPairData, collision_matrix
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.arm.model.srdf_edit import with_pairs
-from gemelo.libraries.robot_import.mended import Mended
+from gemelo.libraries.robot_import.mended import Mended, with_remedy
 from gemelo.libraries.robot_import.questions import yes_or_no
 from gemelo.libraries.robot_import.semantics import OF_SRDF
+from gemelo.schemas.reasons import because, remedy
 
 # Of the steps in processes of their own: with matrices of three columns the threads of BLAS cost a fourth more CPU.
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
@@ -37,7 +38,9 @@ def sampled_pairs(folder: Path, within: float | None) -> list[LinkPairData]:
     command = [sys.executable, "-m", MODULE, str(folder), repr(metres)]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False, env={**ONE_THREAD, **os.environ})
     if done.returncode:
-        raise DescriptionError(f"the pairs of links could not be sampled: {done.stdout.strip() or 'see above'}")
+        printed = done.stdout.strip()
+        failed = because("import.pairs.failed", printed=printed) if printed else because("import.pairs.ended")
+        raise DescriptionError(failed)
     return [msgspec.json.decode(line, type=LinkPairData) for line in done.stdout.splitlines()]
 
 
@@ -52,19 +55,21 @@ def write_pairs(arm: ArmDescription, pairs: Sequence[LinkPairData], mended: Mend
     touching = [found[pair] for pair in owners if pair in found and found[pair].reason is None]
     wanted |= {pair: reason for pair, reason in owners.items() if pair not in map(_sorted, wanted) and pair in found}
     for each in touching[:MOST_NAMED]:
-        more = f", as {len(touching) - MOST_NAMED} more" if len(touching) > MOST_NAMED else ""
-        message = f"the SRDF excuses it, and it comes as near as {1000.0 * each.nearest:.1f} mm{more}"
-        yield warning(file, _name(each), message, "not checked, as the SRDF says: remove it there where it may touch")
+        mend, more = remedy("not_checked_as_srdf"), len(touching) - MOST_NAMED
+        what = because("mend.pair.excused", mend, distance=each.nearest)
+        if more > 0:
+            what = because("mend.pair.excused.more", mend, distance=each.nearest, more=more)
+        yield warning(file, _subject(each), what)
     for each in pairs:
         if each.is_doubtful and _sorted(each.pair) not in owners:
             first, second = each.pair
             key = f"excuse.{first}.{second}"
-            near = f"{1000.0 * each.nearest:.1f} to {1000.0 * each.farthest:.1f} mm"
-            message = f"they are always near ({near}) and come to touch as they are drawn: parts of one hinge, or not?"
-            said = mended.questions.ask_without_default(key, f"{_name(each)}: {message} excuse them?", yes_or_no)
+            hinge = because("mend.pair.hinge", nearest=each.nearest, farthest=each.farthest)
+            question = because("import.ask.excuse", _subject(each).around(hinge))
+            said = mended.questions.ask_without_default(key, question, yes_or_no)
             if said is None:
-                remedy = f'write "{key}" = "yes" into a file for `gemelo import --answers`, or "no" to have it checked'
-                yield error(mended.source.label, _name(each), message, remedy)
+                mend = remedy("excuse_by_answer", key=key)
+                yield error(mended.source.label, _subject(each), with_remedy(hinge, mend))
             elif said:
                 wanted[each.pair] = BY_PERSON
     text = arm.srdf_path.read_text(encoding="utf-8")
@@ -76,8 +81,8 @@ def _sorted(pair: tuple[str, str]) -> tuple[str, str]:
     return first, second
 
 
-def _name(each: LinkPairData) -> str:
-    return f"pair {' and '.join(each.pair)}"
+def _subject(each: LinkPairData) -> Subject:
+    return Subject(PAIR, *each.pair)
 
 
 def main() -> int:

@@ -9,6 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeVar
 
+from gemelo.libraries.robot_import.questions import BadAnswer
+from gemelo.schemas.reasons import because
+
 T = TypeVar("T")
 
 
@@ -68,21 +71,21 @@ USUAL_DRIVER = "TMC2209"
 
 
 def motor_named(text: str) -> MotorPart:
-    """By its name however it is written ("nema17"); raises ValueError with all names."""
-    return _named(text, {part.name: part for part in MOTORS}, "motor")
+    """By its name however it is written ("nema17"); raises `BadAnswer` with all names."""
+    return _named(text, {part.name: part for part in MOTORS}, "import.answer.motor")
 
 
 def driver_named(text: str) -> DriverPart:
-    """By its name however it is written; raises ValueError with all names."""
-    return _named(text, {part.name: part for part in DRIVERS}, "driver")
+    """By its name however it is written; raises `BadAnswer` with all names."""
+    return _named(text, {part.name: part for part in DRIVERS}, "import.answer.driver")
 
 
-def _named(text: str, parts: dict[str, T], kind: str) -> T:
+def _named(text: str, parts: dict[str, T], code: str) -> T:
     wanted = _plain(text)
     for name, part in parts.items():
         if _plain(name) == wanted:
             return part
-    raise ValueError(f'no {kind} "{text}" in the table: there is {", ".join(parts)}')
+    raise BadAnswer(because(code, text=text, names=tuple(parts)))
 
 
 def _plain(text: str) -> str:

@@ -15,6 +15,7 @@ from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint
+from gemelo.schemas.reasons import Reason, Value, because
 
 Array = NDArray[np.float64]
 Wanted = Callable[[Array], bool]  # of a state (n,) [rad] or [m]
@@ -48,10 +49,10 @@ def _zero(lower: Array, upper: Array) -> Array:
 
 @dataclass(frozen=True)
 class NamedStates:
-    """The states by name, each by joint [rad] or [m], and a sentence for each that is not where one expects it."""
+    """The states by name, each by joint [rad] or [m], and why each is not where one expects it that is not there."""
 
     states: dict[str, dict[str, float]]
-    said: tuple[str, ...]
+    said: tuple[Reason, ...]
 
 
 def named_states(arm: ArmDescription, given: Mapping[str, Mapping[str, float]]) -> NamedStates:
@@ -158,11 +159,11 @@ def _first_free(
     if most > TIGHT:
         least = SHARE_OF_MOST * most
         return _pulled_back(lambda each: room.checker.distance(each) >= least, best, center, is_wanted)
-    touching = ", ".join(f"{first} and {second}" for first, second in room.checker.pairs_within(best, TIGHT)) or "none"
-    raise DescriptionError(
-        f'{arm.name}: no configuration of {TRIES} is free of contact for the state "{name}"; in the best one touch: '
-        f"{touching}. See with `gemelo collision matrix` how near they are elsewhere, and correct shapes or limits"
-    )
+    touching = [because("import.touching", first=a, second=b) for a, b in room.checker.pairs_within(best, TIGHT)]
+    tried: dict[str, Value] = {"robot": arm.name, "tries": TRIES, "state": name}
+    if not touching:
+        raise DescriptionError(because("import.state.none", **tried))
+    raise DescriptionError(because("import.state.touching", *touching, **tried))
 
 
 def _pulled_back(is_free: Wanted, state: Array, center: Array, is_wanted: Wanted | None) -> Array:
@@ -187,21 +188,23 @@ def _pulled_back(is_free: Wanted, state: Array, center: Array, is_wanted: Wanted
     return state
 
 
-def _not_at_zero(room: Room, home: Array, zero: Array, arm: ArmDescription, fixed: Array) -> Iterator[str]:
+def _not_at_zero(room: Room, home: Array, zero: Array, arm: ArmDescription, fixed: Array) -> Iterator[Reason]:
     """Why `home` is not zero, with the pair that is too near there."""
     if not np.isnan(fixed).any():
         return
-    moved = [f"{name} {value:.4g}" for name, value in zip(arm.joint_names, home, strict=True) if abs(value) > ASIDE]
+    moved = {name: float(value) for name, value in zip(arm.joint_names, home, strict=True) if abs(value) > ASIDE}
     if not moved:
         return
     apart = room.checker.distances(zero)
     pair = min(apart, key=lambda each: apart[each], default=None)
     if pair is not None and apart[pair] <= CLEAR and (abs(home - zero) > ASIDE).any():
-        near = f"{' and '.join(pair)} are {1000.0 * apart[pair]:.1f} mm apart" if apart[pair] > 0.0 else (
-            f"{' and '.join(pair)} touch")  # fmt: skip
-        yield f"home is not at zero, where {near}: it is at {', '.join(moved)}, and 0 for all other joints"
+        links = dict(zip(("first", "second"), pair, strict=True))
+        near = because("mend.home.touching", joints=moved, **links)
+        if apart[pair] > 0.0:
+            near = because("mend.home.near", joints=moved, distance=float(apart[pair]), **links)
+        yield near
     else:
-        yield f"home is not at zero, which is not within the limits: it is at {', '.join(moved)}"
+        yield because("mend.home.limits", joints=moved)
 
 
 def _range(joint: UrdfJoint) -> tuple[float, float]:

@@ -20,12 +20,13 @@ T = TypeVar("T")
 class Questions:
     """Each question has a key, by which its answer is kept and can be given again."""
 
-    def __init__(self, given: dict[str, str], takes_defaults: bool) -> None:
+    def __init__(self, given: dict[str, str], takes_defaults: bool, say: Callable[[Reason], str] = str) -> None:
+        self.say = say  # the sentence of a reason, in the language of who is asked
         self.answers: dict[str, str] = {}
         self._given, self._takes_defaults = given, takes_defaults
         self._by_default: set[str] = set()
 
-    def ask(self, key: str, question: str, default: str, parse: Callable[[str], T]) -> T:
+    def ask(self, key: str, question: Reason, default: str, parse: Callable[[str], T]) -> T:
         """The answer as `parse` reads it; raises `DescriptionError` where a given one is refused."""
         if key in self._given:
             return self._parsed(key, self._given[key], parse)
@@ -35,20 +36,20 @@ class Questions:
         if not sys.stdin.isatty():
             raise DescriptionError(because("import.question.nobody", key=key))
         while True:
-            print(f"  {question} [{default}] ", end="", flush=True)
+            print(f"  {self.say(question)} [{default}] ", end="", flush=True)
             said = sys.stdin.readline()
             if not said:
                 raise DescriptionError(because("import.question.no_answer", key=key))
             try:
                 return self._parsed(key, said.strip() or default, parse)
             except DescriptionError as error:
-                print(f"  {error}")
+                print(f"  {self.say(error.reason)}")
 
-    def ask_somebody(self, key: str, question: str, default: str, parse: Callable[[str], T]) -> T:
+    def ask_somebody(self, key: str, question: Reason, default: str, parse: Callable[[str], T]) -> T:
         """As `ask`; the default where it was not given and nobody is there to be asked."""
         return self.ask(key, question, default, parse) if key in self._given or sys.stdin.isatty() else parse(default)
 
-    def ask_without_default(self, key: str, question: str, parse: Callable[[str], T]) -> T | None:
+    def ask_without_default(self, key: str, question: Reason, parse: Callable[[str], T]) -> T | None:
         """As `ask`, of what has no default; None where it was not given and nobody is there to be asked."""
         if key not in self._given and (self._takes_defaults or not sys.stdin.isatty()):
             return None
@@ -58,7 +59,7 @@ class Questions:
 
     def rehearsal(self) -> Questions:
         """The same given answers, and defaults for all else."""
-        return Questions(self._given, takes_defaults=True)
+        return Questions(self._given, takes_defaults=True, say=self.say)
 
     def given_below(self, prefix: str) -> dict[str, str]:
         """The given answers whose keys begin with `prefix`, by what follows it; they count as asked for."""

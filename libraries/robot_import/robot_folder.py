@@ -8,14 +8,14 @@ import subprocess
 import sys
 import time
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from gemelo.libraries.arm.checks.findings import Finding, Severity, note
 from gemelo.libraries.arm.checks.meshes import MeshFacts
-from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import DescriptionError, Subject
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.arm.model.srdf_edit import entries, with_pairs
 from gemelo.libraries.arm.model.urdf import UrdfJoint, UrdfLink, UrdfModel
@@ -26,6 +26,7 @@ from gemelo.libraries.robot_import.mesh_copies import copy_meshes
 from gemelo.libraries.robot_import.pairs import ONE_THREAD, sampled_pairs, write_pairs
 from gemelo.libraries.robot_import.poses import NamedStates, named_states, srdf_text, zero_state
 from gemelo.libraries.robot_import.semantics import srdf_lines
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.text_file import read_text
 
 # [m] chosen: what shapes that are fitted to meshes may stand beyond them. Links that are never farther apart than this
@@ -62,7 +63,8 @@ def write_robot(folder: Path, description: Description) -> list[Finding]:
     """Fills the empty `folder`, each step with its time, and returns what is to be said of the result; raises
     `DescriptionError`."""
     mended = description.mended
-    with step("meshes and robot.urdf"):
+    say = mended.questions.say
+    with step(because("import.step.urdf"), say):
         model = mended.model  # before `_write_urdf` replaces collision shapes
         _write_urdf(folder, mended, description.name, model)
     joints, zero = [joint.name for joint in description.joints], zero_state(description.joints)
@@ -71,19 +73,19 @@ def write_robot(folder: Path, description: Description) -> list[Finding]:
     findings = _collisions(folder, mended, model)
     if any(each.severity is Severity.ERROR for each in findings):
         return findings
-    with step("home and ready, where nothing touches"):
+    with step(because("import.step.states"), say):
         states = _write_states(folder, mended)
         (folder / "robot.toml").write_text(description.robot_toml(states.states["home"]), encoding="utf-8")
-    return [*findings, *(note("robot.srdf", 'state "home"', said) for said in states.said)]
+    return [*findings, *(note("robot.srdf", Subject("state", "home"), said) for said in states.said)]
 
 
 @contextmanager
-def step(what: str) -> Iterator[None]:
-    """Says what is done, and how long it took."""
-    print(f"{what} ...", flush=True)
+def step(what: Reason, say: Callable[[Reason], str]) -> Iterator[None]:
+    """Says what is done, and how long it took, in the sentences that `say` makes."""
+    print(say(because("import.step.begins", what)), flush=True)
     began = time.monotonic()
     yield
-    print(f"{what}: {time.monotonic() - began:.1f} s", flush=True)
+    print(say(because("import.step.done", what, seconds=time.monotonic() - began)), flush=True)
 
 
 def _write_urdf(folder: Path, mended: Mended, name: str, model: UrdfModel) -> None:
@@ -117,9 +119,9 @@ def _collisions(folder: Path, mended: Mended, model: UrdfModel) -> list[Finding]
     """Shapes around the meshes, and the pairs of links that need no check."""
     links = [link.name for link in model.links if _is_fitted(link, mended)]
     if links:
-        with step(f"collision shapes for {len(links)} links"):
+        with step(because("import.step.shapes", count=len(links)), mended.questions.say):
             _run("collision", "fit", str(folder), "--meshes", "--write", "--link", *links)
-    with step("pairs of links that need no check"):
+    with step(because("import.step.pairs"), mended.questions.say):
         arm = load_arm(folder)
         excess = max(EXCESS, EXCESS_SHARE * _longest(mended, model))
         pairs = sampled_pairs(folder, arm.clearance + excess if links else None)
@@ -138,7 +140,10 @@ def _run(*words: str) -> None:
     command, environment = [sys.executable, "-m", COMMAND_LINE, *words], {**ONE_THREAD, **os.environ}
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False, env=environment)
     if done.returncode:
-        raise DescriptionError(f"gemelo {' '.join(words)} failed: {done.stdout.strip() or 'see above'}")
+        command_line = f"gemelo {' '.join(words)}"
+        if printed := done.stdout.strip():
+            raise DescriptionError(because("import.command.failed", command=command_line, printed=printed))
+        raise DescriptionError(because("import.command.ended", command=command_line))
 
 
 def _write_states(folder: Path, mended: Mended) -> NamedStates:

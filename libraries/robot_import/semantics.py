@@ -7,11 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
+from gemelo.libraries.arm.errors import Subject
 from gemelo.libraries.arm.model.description import ROUNDING
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfModel
 from gemelo.libraries.robot_import.joint_mending import stand_at
-from gemelo.libraries.robot_import.mended import Mended, Semantics
+from gemelo.libraries.robot_import.mended import LEFT_OUT, Mended, Semantics, unreadable, with_remedy
 from gemelo.libraries.robot_import.poses import zero_state
+from gemelo.schemas.reasons import Reason, Value, because, remedy
 from gemelo.schemas.text_file import NotUtf8, read_text
 
 SUFFIX, XACRO = ".srdf", ".srdf.xacro"
@@ -28,13 +30,13 @@ def semantics(mended: Mended) -> None:
     others: list[tuple[Path, str]] = []
     for file in mended.source.beside(SUFFIX, XACRO):
         if file.name.endswith(XACRO):
-            remedy = f"left out: expand it where ROS is (`xacro {file.name} > {file.name.removesuffix('.xacro')}`)"
-            mended.warn(root, file.name, "is an SRDF in xacro", remedy)
+            expand = remedy("left_out_expand", file=file.name, expanded=file.name.removesuffix(".xacro"))
+            mended.warn(root, Subject(within=file.name), because("mend.srdf.xacro", expand))
             continue
         try:
             srdf = ET.fromstring(read_text(file))
         except (OSError, NotUtf8, ET.ParseError) as error:
-            mended.warn(root, file.name, f"cannot be read: {error}", "left out")
+            mended.warn(root, Subject(within=file.name), with_remedy(unreadable(error), LEFT_OUT))
             continue
         for element in srdf.iter():
             element.attrib.update({key: mended.renamed.get(text, text) for key, text in element.items()})
@@ -43,9 +45,11 @@ def semantics(mended: Mended) -> None:
         else:
             others.append((file, srdf.get("name", "")))
     for file, other in [] if found else others[:MOST_NAMED]:
-        mended.warn(root, file.name, f'is of robot "{other}", not of "{name}"', "left out")
+        strange = because("mend.srdf.other_robot", LEFT_OUT, other=other, robot=name)
+        mended.warn(root, Subject(within=file.name), strange)
     for file, _ in found[1:]:
-        mended.warn(root, file.name, f"{file} is another SRDF of this robot", f"left out: {found[0][0]} is used")
+        another = because("mend.srdf.another", remedy("left_out_other_used", file=str(found[0][0])), file=str(file))
+        mended.warn(root, Subject(within=file.name), another)
     if found:
         _Reader(mended, *found[0]).read()
 
@@ -69,22 +73,22 @@ class _Reader:
         for tag in UNUSED:
             count = len(self.srdf.findall(tag))
             if count:
-                self._say(f"<{tag}>", f"{count} of these say nothing that is used here", "left out")
+                self._say(Subject(f"<{tag}>"), because("mend.unused", LEFT_OUT, count=count))
         self.mended.semantics = self.known
-        taken = f"{len(self.known.groups)} groups, {len(self.known.states)} states, {len(self.known.pairs)} pairs"
-        self._say("robot", f"{taken} of links that are not checked", "taken into robot.srdf")
+        counts = {name: len(getattr(self.known, name)) for name in ("groups", "states", "pairs")}
+        self._say(Subject("robot"), because("mend.srdf.taken", remedy("taken_into_srdf"), **counts))
 
-    def _say(self, subject: str, message: str, remedy: str) -> None:
-        self.mended.say(self.mended.xml.root, f"{self.file}: {subject}", message, remedy)
+    def _say(self, subject: Subject, what: Reason) -> None:
+        self.mended.say(self.mended.xml.root, subject._replace(within=self.file), what)
 
-    def _warn(self, subject: str, message: str, remedy: str = "left out") -> None:
-        self.mended.warn(self.mended.xml.root, f"{self.file}: {subject}", message, remedy)
+    def _warn(self, subject: Subject, what: Reason) -> None:
+        self.mended.warn(self.mended.xml.root, subject._replace(within=self.file), what)
 
     def _group(self, element: ET.Element) -> None:
         name = element.get("name", "")
         joints, strange = _joints_in(element, self.srdf, self.model, (name,))
         if strange:
-            self._warn(f'group "{name}"', f"it names {', '.join(strange)}, which the URDF does not have")
+            self._warn(Subject("group", name), because("mend.srdf.names", LEFT_OUT, names=tuple(strange)))
         if joints:
             self.known.groups[name] = joints
             tips = [chain.get("tip_link", "") for chain in element.findall("chain")]
@@ -94,16 +98,16 @@ class _Reader:
     def _state(self, element: ET.Element) -> None:
         name, group = element.get("name", ""), element.get("group", "")
         values: dict[str, float] = {}
-        subject = f'state "{name}"'
+        subject = Subject("state", name)
         for joint in element.findall("joint"):
             key, text = joint.get("name", ""), joint.get("value", "")
             try:
                 value = float(text)
             except ValueError:
-                self._warn(subject, f'"{text}" of {key} is no number')
+                self._warn(subject, because("mend.srdf.number", LEFT_OUT, text=text, joint=key))
                 return
             if key not in self.model.joint_names:
-                self._warn(subject, f'it names joint "{key}", which the URDF does not have')
+                self._warn(subject, because("mend.srdf.joint", LEFT_OUT, joint=key))
                 return
             found = self.model.joint(key)
             if found.kind is JointKind.FIXED or found.mimic is not None:
@@ -112,14 +116,15 @@ class _Reader:
             if limit is not None and found.kind is not JointKind.CONTINUOUS and limit.lower < limit.upper:
                 nearest = min(max(value, limit.lower), limit.upper)
                 if abs(nearest - value) > ROUNDING:
-                    self._warn(subject, f"{key} = {value:g} is beyond its limits {limit.lower:g} to {limit.upper:g}")
+                    ends: dict[str, Value] = {"lower": limit.lower, "upper": limit.upper}
+                    self._warn(subject, because("mend.srdf.limits", LEFT_OUT, joint=key, value=value, **ends))
                     return
                 value = nearest
             values[key] = value
         if values and group in self.known.groups:
             self.known.states.append((name, group, values))
         elif values:
-            self._warn(subject, f'it is of group "{group}", which is not there')
+            self._warn(subject, because("mend.srdf.group", LEFT_OUT, group=group))
 
     def _passive(self) -> None:
         names = [each.get("name", "") for each in self.srdf.findall("passive_joint")]
@@ -127,14 +132,15 @@ class _Reader:
         moving = [each for each in joints if each.kind is not JointKind.FIXED and each.mimic is None]
         if moving:
             stand_at(self.mended, zero_state(moving))
-            listed = ", ".join(f'"{each.name}"' for each in moving)
-            self._warn("passive_joint", f"no motor moves {listed}", "they stand still at 0 or the nearest limit")
+            still = tuple(each.name for each in moving)
+            passive = because("mend.srdf.passive", remedy("passive_stand_still"), joints=still)
+            self._warn(Subject("passive_joint"), passive)
 
     def _pair(self, element: ET.Element) -> None:
         first, second = sorted((element.get("link1", ""), element.get("link2", "")))
         missing = [link for link in (first, second) if link not in self.model.link_names]
         if missing:
-            self._warn("disable_collisions", f'it names link "{missing[0]}", which the URDF does not have')
+            self._warn(Subject("disable_collisions"), because("mend.srdf.link", LEFT_OUT, link=missing[0]))
         elif first != second:
             self.known.pairs[first, second] = element.get("reason", "")
 

@@ -12,13 +12,12 @@ from urllib.parse import unquote
 
 from gemelo.libraries.arm.errors import nearest_name, wrong_file
 from gemelo.libraries.robot_import.xacro_files import SUFFIX, expanded, outermost
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import Reason, because
 
 BESIDE = 2  # innermost folders, whose meshes are the file's own without a package
 DEPTH = 4  # folders below a package in which its configuration may be
 PACKAGE = "package.xml"  # of ROS
 UP = 6  # folders above the URDF in which its package may be
-MOST_NAMED = 3  # files of one name
 ENCODING = re.compile(rb"<\?xml[^>]*?\bencoding\s*=\s*[\"']([A-Za-z0-9._-]+)")
 SEMANTIC = ".srdf"  # in the name of an SRDF, also of one in xacro
 LONGEST_DECLARATION = 200  # [B]
@@ -68,21 +67,23 @@ class RobotSource:
         alike = [path for path in _files(self.root) if _is_mesh(path) and path.stem.lower() == wanted]
         return alike[0] if len(alike) == 1 else None
 
-    def near(self, reference: str) -> str:
-        """A hint at the file with the most similar name; or at those of the same one, of which any could be meant."""
+    def missing(self, reference: str) -> Reason:
+        """That a mesh is not there, with the file of the most similar name; or those of the same one, of which any
+        could be meant."""
         name = Path(unquote(reference.replace("\\", "/"))).name
         meshes = [path for path in _files(self.root) if _is_mesh(path)]
         for is_name in (True, False):
             wanted = name.lower() if is_name else Path(name).stem.lower()
             alike = [path for path in meshes if (path.name if is_name else path.stem).lower() == wanted]
-            same = [str(path.relative_to(self.root)) for path in alike]
+            same = tuple(str(path.relative_to(self.root)) for path in alike)
             if same:
-                more = f" and {len(same) - MOST_NAMED} more" if len(same) > MOST_NAMED else ""
-                return f", and {len(same)} have that name: {', '.join(same[:MOST_NAMED])}{more}"
+                return because("mend.mesh.several", mesh=reference, count=len(same), files=same)
         near = nearest_name(name, [path.name for path in meshes])
         if near:
-            return f'; did you mean "{near}"?'
-        return "" if meshes else f"; there is no mesh below {self.root}"
+            return because("mend.mesh.near", mesh=reference, name=near)
+        if meshes:
+            return because("mesh.none", mesh=reference)
+        return because("mend.mesh.none_at_all", mesh=reference, folder=str(self.root))
 
     def _candidates(self, reference: str) -> Iterator[Path]:
         scheme, _, rest = reference.rpartition("://")
@@ -99,11 +100,15 @@ class RobotSource:
 
 
 def find_source(
-    given: Path, arguments: Mapping[str, str] | None = None, ask: Callable[[Path], None] = lambda urdf: None
+    given: Path,
+    arguments: Mapping[str, str] | None = None,
+    ask: Callable[[Path], None] = lambda urdf: None,
+    say: Callable[[Reason], str] = str,
 ) -> RobotSource:
     """The source at a URDF, a xacro file with `arguments`, or an export's folder; raises `DescriptionError`.
 
-    `ask` is called before a xacro file is expanded, and raises it where that is not wanted.
+    `ask` is called before a xacro file is expanded, and raises it where that is not wanted; `say` makes the sentence of
+    what the file prints.
     """
     if not given.exists():
         raise wrong_file(given, because("import.source.none"))
@@ -111,7 +116,7 @@ def find_source(
     text = _decoded(urdf)
     if urdf.suffix.lower() == SUFFIX or "<xacro:" in text:
         ask(urdf)
-        expansion = expanded(urdf, root, arguments or {}, lambda package: _found_package(package, urdf))
+        expansion = expanded(urdf, root, arguments or {}, lambda package: _found_package(package, urdf), say)
         return RobotSource(urdf, root, expansion, is_expanded=True)
     if arguments:
         raise wrong_file(urdf, because("import.xacro.none", names=tuple(arguments)))

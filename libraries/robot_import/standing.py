@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
+
 from gemelo.libraries.arm.device.device_config import MAX_COUNTS
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import Subject, nearest
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
 from gemelo.libraries.arm.model.virtual_drive import driven_joints
 from gemelo.libraries.robot_import.joint_mending import stand_at
 from gemelo.libraries.robot_import.mended import Mended
 from gemelo.libraries.robot_import.poses import zero_state
-from gemelo.libraries.robot_import.questions import Questions, yes_or_no
+from gemelo.libraries.robot_import.questions import BadAnswer, Questions, yes_or_no
+from gemelo.schemas.reasons import Remedy, Value, because, remedy
 
 MOST = MAX_COUNTS["joint"]  # that one device drives
-FEW = 3  # names that are said
-STANDING = "they stand still at 0 or the nearest limit; `tool_frame` and `others_stand_still` say otherwise"
-DRIVEN = "they are driven apart from it; where they hold it too, as the legs of a delta do, that loop is not followed"
+STANDING, DRIVEN = remedy("others_stand_still"), remedy("others_are_driven")
+STAY = remedy("others_stay")
 WHEEL = "wheel"  # in the name of a joint or its link
 
 
@@ -25,10 +27,7 @@ def ask_who_stands(mended: Mended, tool: str, questions: Questions) -> None:
     driven = driven_joints(model)
     aside = _aside(model, driven, tool)
     if aside:
-        names = ", ".join(joint.name for joint in aside)
-        question = (
-            f'do these joints, which do not carry "{tool}", stand still at 0 (or the limit nearest to it): {names}?'
-        )
+        question = because("import.ask.stand", tool=tool, joints=tuple(joint.name for joint in aside))
         stand = len(driven) > MOST or any(_is_wheel(joint) for joint in aside)
         if questions.ask("others_stand_still", question, "yes" if stand else "no", yes_or_no):
             stand_at(mended, zero_state(aside))
@@ -44,15 +43,19 @@ def _ask_which_are_driven(mended: Mended, driven: list[UrdfJoint], tool: str, qu
     """Of more joints than a device drives: by default those that carry the tool, and what the last of them carries."""
     chain = {joint.name for joint in _chain(mended.model, driven, tool)}
     usual = [joint.name for joint in driven if joint.name in chain]
-    question = f"which of its {len(driven)} joints, {MOST} at the most, does its device drive? the others stand still"
+    question = because("import.ask.driven", count=len(driven), most=MOST)
     names = questions.ask("driven_joints", question, " ".join(usual), lambda text: _names(text, driven))
     held = [joint for joint in driven if joint.name not in names]
     stand_at(mended, zero_state(held))
-    message = f"{len(driven)} joints move, and a device drives {MOST}: {_few([joint.name for joint in held])} of them"
-    message += " stands still" if len(held) == 1 else " stand still"
-    remedy = "at 0 or the nearest limit; `driven_joints` in --answers names those that move"
-    element = next(each for each in mended.xml.root.findall("joint") if each.get("name") == held[0].name)
-    mended.warn(element, f'joint "{held[0].name}"', message, remedy)
+    counts: dict[str, Value] = {"count": len(driven), "most": MOST}
+    what = because("mend.driven.one", STAY, joint=held[0].name, **counts)
+    if held[1:]:
+        what = because("mend.driven.several", STAY, joints=tuple(joint.name for joint in held), **counts)
+    mended.warn(_element(mended, held[0]), Subject("joint", held[0].name), what)
+
+
+def _element(mended: Mended, joint: UrdfJoint) -> ET.Element:
+    return next(each for each in mended.xml.root.findall("joint") if each.get("name") == joint.name)
 
 
 def _chain(model: UrdfModel, driven: list[UrdfJoint], tool: str) -> list[UrdfJoint]:
@@ -71,9 +74,9 @@ def _names(text: str, driven: list[UrdfJoint]) -> list[str]:
     names, known = text.replace(",", " ").split(), [joint.name for joint in driven]
     strange = [name for name in names if name not in known]
     if strange:
-        raise ValueError(f'"{strange[0]}" is no joint that moves{suggestion(strange[0], known)}')
+        raise BadAnswer(because("import.answer.no_joint", nearest(strange[0], known), name=strange[0]))
     if not 0 < len(set(names)) <= MOST:
-        raise ValueError(f"name 1 to {MOST} joints")
+        raise BadAnswer(because("import.answer.joints", most=MOST))
     return names
 
 
@@ -106,13 +109,7 @@ def _is_wheel(joint: UrdfJoint) -> bool:
     return joint.kind is JointKind.CONTINUOUS and WHEEL in f"{joint.name} {joint.child}".lower()
 
 
-def _say(mended: Mended, aside: list[UrdfJoint], tool: str, remedy: str) -> None:
-    names = [joint.name for joint in aside]
-    element = next(each for each in mended.xml.root.findall("joint") if each.get("name") == names[0])
-    message = f'{len(names)} joints do not carry the tool "{tool}" ({_few(names)})'
-    mended.warn(element, f'joint "{names[0]}"', message, remedy)
-
-
-def _few(names: list[str]) -> str:
-    """The first of them."""
-    return ", ".join(names[:FEW]) + (f" and {len(names) - FEW} more" if len(names) > FEW else "")
+def _say(mended: Mended, aside: list[UrdfJoint], tool: str, mend: Remedy) -> None:
+    names = tuple(joint.name for joint in aside)
+    what = because("mend.joints.aside", mend, count=len(names), tool=tool, joints=names)
+    mended.warn(_element(mended, aside[0]), Subject("joint", names[0]), what)

@@ -6,8 +6,10 @@ import math
 import xml.etree.ElementTree as ET
 
 from gemelo.libraries.arm.checks.units import joint_lengths
+from gemelo.libraries.arm.errors import Subject
 from gemelo.libraries.arm.model.urdf import UrdfJoint
 from gemelo.libraries.robot_import.mended import Mended
+from gemelo.schemas.reasons import because, remedy
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 RADIUS_SHARE = 0.025  # of the longest rod: thin, and yet seen
@@ -28,8 +30,8 @@ def sticks(mended: Mended) -> None:
         for shape in rods or ([] if carried else [_visual("sphere", {"radius": f"{radius:.6g}"})]):
             link.append(shape)
             mended.xml.lines[shape] = mended.xml.lines.get(link, 0)
-    remedy = f"each is a rod of {2e3 * radius:.3g} mm from joint to joint, which is all that touches: give them shapes"
-    mended.warn(root, "robot", "no link has a <visual> or <collision>", remedy)
+    rods_instead = remedy("rods_instead", thickness=2.0 * radius)
+    mended.warn(root, Subject("robot"), because("mend.robot.no_shape", rods_instead))
 
 
 def _rod(joint: UrdfJoint, radius: float) -> ET.Element:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from gemelo.libraries.arm.checks.findings import Finding, Severity, error
 from gemelo.libraries.arm.checks.meshes import MOST_TRIANGLES, MeshFacts
-from gemelo.libraries.arm.errors import DescriptionError, suggestion
+from gemelo.libraries.arm.errors import DescriptionError, Subject, nearest
 from gemelo.libraries.arm.frames.transforms import IDENTITY, Rigid, compose
 from gemelo.libraries.arm.kinematics.chain import origin_of
 from gemelo.libraries.arm.model.urdf import JointKind, UrdfModel
@@ -22,12 +22,14 @@ from gemelo.libraries.robot_import.mended import Mended, links_of, meshes_of, su
 from gemelo.libraries.robot_import.mending import mend, safe_name
 from gemelo.libraries.robot_import.mesh_places import set_origin
 from gemelo.libraries.robot_import.parts import MOTORS, USUAL_DRIVER, DriverPart, MotorPart, driver_named, motor_named
-from gemelo.libraries.robot_import.questions import Questions, yes_or_no
+from gemelo.libraries.robot_import.questions import BadAnswer, Questions, yes_or_no
 from gemelo.libraries.robot_import.robot_folder import Description
 from gemelo.libraries.robot_import.semantics import semantics
 from gemelo.libraries.robot_import.source import RobotSource
 from gemelo.libraries.robot_import.standing import ask_who_stands
 from gemelo.libraries.robot_import.tool_link import other_tools, tool_link
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import Value, because, remedy
 
 LONGEST_NAME = 60  # letters: with what others add it is a folder's name everywhere
 NOT_IN_A_NAME = r"[^A-Za-z0-9_-]+"
@@ -63,17 +65,13 @@ def surveyed(source: RobotSource, questions: Questions, name: str = "", motor: s
     try:
         description = _described(mended, questions, name, motor, driver)
     except _NoArm as why:
-        findings = [error(source.label, "robot", str(why), why.remedy, mended.xml.lines.get(mended.xml.root, 0))]
+        findings = [error(source.label, Subject("robot"), why.reason, mended.xml.lines.get(mended.xml.root, 0))]
         return Survey([*findings, *mended.findings()], None)
     return Survey(mended.findings(), description)
 
 
-class _NoArm(ValueError):
+class _NoArm(ReasonedError):
     """Why nothing can be built of a source, and what would do."""
-
-    def __init__(self, why: str, remedy: str) -> None:
-        super().__init__(why)
-        self.remedy = remedy
 
 
 def _described(mended: Mended, questions: Questions, name: str, motor: str, driver: str) -> Description:
@@ -83,20 +81,17 @@ def _described(mended: Mended, questions: Questions, name: str, motor: str, driv
     _say_name(mended, robot)
     usual_motor = _part(motor_named, motor or MOTORS[0].name)
     usual_driver = _part(driver_named, driver or USUAL_DRIVER)
-    tool = questions.ask("tool_frame", "the tool's link", _tool(mended), _link_of(mended.model))
+    tool = questions.ask("tool_frame", because("import.ask.tool"), _tool(mended), _link_of(mended.model))
     others = other_tools(mended.model, tool)
     if others:
-        message = f'the goals are about "{tool}", though {_quoted(others)} could be the tool too'
-        mended.warn(mended.xml.root, "robot", message, "`tool_frame` in robot.toml, or in --answers, names another")
+        what = because("mend.tool.others", remedy("other_tool_frame"), tool=tool, others=tuple(others))
+        mended.warn(mended.xml.root, Subject("robot"), what)
     ask_who_stands(mended, tool, questions)
     merge_rigid(mended)
     joints = driven_joints(mended.model)
     if not joints:
-        raise _NoArm("it has no joint that moves, so it is no arm", "name another file")
-    has_motors = questions.ask(
-        "motors", "does it have motors to drive (no: to plan and look at only)?",
-        "yes" if motor or driver else "no", yes_or_no,
-    )  # fmt: skip
+        raise _NoArm(because("mend.robot.no_joint", remedy("name_another_file")))
+    has_motors = questions.ask("motors", because("import.ask.motors"), "yes" if motor or driver else "no", yes_or_no)
     drives = ask_drives(joints, questions, usual_motor, usual_driver) if has_motors else []
     return Description(mended, robot, _base(mended.model), tool, joints, drives)
 
@@ -106,14 +101,16 @@ def _tool(mended: Mended) -> str:
     known = mended.semantics
     if known is None or not known.tip:
         return tool_link(mended.model)
-    mended.say(mended.xml.root, f"{known.file}: robot", f'its largest chain ends at "{known.tip}"', "`tool_frame`")
+    what = because("mend.tool.chain", remedy("written", text="`tool_frame`"), link=known.tip)
+    mended.say(mended.xml.root, Subject("robot", within=known.file), what)
     return known.tip
 
 
 def _say_name(mended: Mended, name: str) -> None:
     if device_name(name) != name:
-        message = f'"{name}" has {len(name)} letters, and a device has {MAX_NAME} at most'
-        mended.say(mended.xml.root, "robot", message, f'its device is "{device_name(name)}"; --name gives another')
+        mend = remedy("device_is_named", device=device_name(name))
+        what = because("mend.robot.name", mend, name=name, letters=len(name), most=MAX_NAME)
+        mended.say(mended.xml.root, Subject("robot"), what)
 
 
 def _dense(mended: Mended) -> None:
@@ -123,21 +120,22 @@ def _dense(mended: Mended) -> None:
         known = mended.facts(geometry)
         if isinstance(known, MeshFacts) and known.triangles > MOST_TRIANGLES and geometry.mesh not in said:
             said.add(geometry.mesh)
-            message = f'mesh "{geometry.mesh}" has {known.triangles} triangles, more than {MOST_TRIANGLES}'
-            mended.say(mesh, subject_of(link), message, "its copy is made coarser, to draw it and to fit shapes to it")
+            counts: dict[str, Value] = {"triangles": known.triangles, "most": MOST_TRIANGLES}
+            what = because("mend.mesh.triangles", remedy("coarser_copy"), mesh=geometry.mesh or "", **counts)
+            mended.say(mesh, subject_of(link), what)
 
 
 def _part(named: Callable[[str], MotorPart | DriverPart], text: str) -> str:
     try:
         return str(named(text).name)
-    except ValueError as problem:
-        raise DescriptionError(str(problem)) from problem
+    except BadAnswer as problem:
+        raise DescriptionError(problem.reason) from problem
 
 
 def _link_of(model: UrdfModel) -> Callable[[str], str]:
     def read(text: str) -> str:
         if text not in model.link_names:
-            raise ValueError(f"no such link{suggestion(text, model.link_names)}")
+            raise BadAnswer(because("import.answer.no_link", nearest(text, model.link_names)))
         return text
 
     return read
@@ -146,10 +144,6 @@ def _link_of(model: UrdfModel) -> Callable[[str], str]:
 def _base(model: UrdfModel) -> str:
     children = {joint.child for joint in model.joints}
     return next(link for link in model.link_names if link not in children)
-
-
-def _quoted(names: Sequence[str]) -> str:
-    return ", ".join(f'"{name}"' for name in names)
 
 
 def merge_rigid(mended: Mended) -> None:
@@ -174,10 +168,8 @@ def merge_rigid(mended: Mended) -> None:
             _give(elements[root], item, compose(pose, pose_of(shape)))
             mended.xml.lines.setdefault(item, mended.xml.lines.get(element, 0))
     for root, count in moved.items():
-        message = f"{count} links with shapes are fixed to it, of {len(links)} links in all"
-        mended.say(
-            elements[root], subject_of(elements[root]), message, "they are drawn and checked as one part with it"
-        )
+        what = because("mend.link.fixed", remedy("drawn_as_one"), count=count, links=len(links))
+        mended.say(elements[root], subject_of(elements[root]), what)
 
 
 def _give(link: ET.Element, item: ET.Element, pose: Rigid) -> None:

@@ -9,6 +9,8 @@ from pathlib import Path
 import msgspec
 
 from gemelo.libraries.arm.checks.findings import Finding, error
+from gemelo.libraries.arm.errors import Subject
+from gemelo.schemas.reasons import because
 
 TRIAL = "gemelo.services.planner.trial"
 
@@ -18,5 +20,5 @@ def trial_findings(folder: Path) -> list[Finding]:
     ended = subprocess.run([sys.executable, "-m", TRIAL, str(folder)], check=False, stdout=subprocess.PIPE, text=True)
     found = [msgspec.json.decode(line, type=Finding) for line in ended.stdout.splitlines()]
     if ended.returncode != 0:
-        found.append(error(folder.name, "trial", f"ended with {ended.returncode}: what it said stands above"))
+        found.append(error(folder.name, Subject("trial"), because("trial.ended", code=ended.returncode)))
     return found

@@ -14,10 +14,12 @@ from gemelo.libraries.arm.checks.units import (
     is_drawn_in_millimetres,
 )
 from gemelo.libraries.arm.checks.urdf import principal_moments
+from gemelo.libraries.arm.errors import Subject
 from gemelo.libraries.arm.model.urdf import JointKind
 from gemelo.libraries.arm.model.xml_reader import MINUSES
 from gemelo.libraries.robot_import.joint_mending import FREE
-from gemelo.libraries.robot_import.mended import Mended, links_of, numbers_in
+from gemelo.libraries.robot_import.mended import Mended, links_of, numbers_in, subject_of, with_remedy
+from gemelo.schemas.reasons import because, remedy
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 MILLIMETRE, DEGREE = 0.001, math.pi / 180.0  # [m], [rad]
@@ -37,17 +39,18 @@ def degrees(mended: Mended) -> None:
     if 2 * len(beyond) <= len(turns) or any(_is_usual(value) for value in turns):
         return
     first = next(each for each in origins if max(map(abs, numbers_in(each.get("rpy", "")) or ())) > MOST_TURN)
-    message = f'rpy="{first.get("rpy")}" is in degrees, and so are all of its {len(origins)}'
+    was = first.get("rpy", "")
     for origin in origins:
         _scaled(origin, "rpy", DEGREE)
-    mended.say(first, "<origin>", message, f'rpy="{first.get("rpy")}" and the others in radians')
+    mend = remedy("written_in_radians", text=f'rpy="{first.get("rpy")}"')
+    mended.say(first, Subject("<origin>"), because("mend.degrees", mend, rpy=was, count=len(origins)))
 
 
 def lengths(mended: Mended) -> None:
     """A URDF that is drawn in millimetres as a whole; its meshes are judged for themselves."""
     if not is_drawn_in_millimetres(mended.model):
         return
-    root, (message, line) = mended.xml.root, in_millimetres_reason(mended.model)
+    root, (why, line) = mended.xml.root, in_millimetres_reason(mended.model)
     for parent in (*root.findall("joint"), *root.findall("link"), *root.findall("link/*")):
         for origin in parent.findall("origin"):
             _scaled(origin, "xyz", MILLIMETRE)
@@ -58,7 +61,7 @@ def lengths(mended: Mended) -> None:
     _slides(mended)
     _moments(mended)
     said = next(element for element, at in mended.xml.lines.items() if at == line)
-    mended.say(said, "robot", message, "all lengths by 0.001: origins, shapes, slides")
+    mended.say(said, Subject("robot"), with_remedy(why, remedy("all_lengths_scaled")))
 
 
 def _slides(mended: Mended) -> None:
@@ -115,8 +118,8 @@ def minuses(mended: Mended) -> None:
                 element.set(key, plain)
     if found:
         element, text = found[0]
-        message = f'"{text}" has a minus sign of print, as {len(found)} of its numbers have'
-        mended.say(element, f"<{element.tag}>", message, f'"{text.translate(MINUSES)}"')
+        mend = remedy("written", text=f'"{text.translate(MINUSES)}"')
+        mended.say(element, Subject(f"<{element.tag}>"), because("mend.minuses", mend, text=text, count=len(found)))
 
 
 def separators(mended: Mended) -> None:
@@ -131,8 +134,9 @@ def separators(mended: Mended) -> None:
                 element.set(key, " ".join(words))
     if found:
         element, key, text = found[0]
-        message = f'{key}="{text}" has commas between its numbers, as {len(found)} of its triples have'
-        mended.say(element, f"<{element.tag}>", message, f'{key}="{element.get(key)}"')
+        mend = remedy("written", text=f'{key}="{element.get(key)}"')
+        commas = because("mend.commas", mend, attribute=key, text=text, count=len(found))
+        mended.say(element, Subject(f"<{element.tag}>"), commas)
 
 
 def capitals(mended: Mended) -> None:
@@ -142,4 +146,5 @@ def capitals(mended: Mended) -> None:
         plain = kind.strip().lower()
         if kind != plain and plain in (*JointKind, *FREE):
             joint.set("type", plain)
-            mended.say(joint, f'joint "{joint.get("name")}"', f'type "{kind}" is no type', f'type="{plain}"')
+            mend = remedy("written", text=f'type="{plain}"')
+            mended.say(joint, subject_of(joint), because("mend.capitals", mend, type=kind))

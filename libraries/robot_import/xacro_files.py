@@ -15,7 +15,13 @@ SUFFIX = ".xacro"
 UNDEFINED = re.compile(r"Undefined substitution argument (\S+)")
 
 
-def expanded(path: Path, root: Path, arguments: Mapping[str, str], find: Callable[[str], Path]) -> str:
+def expanded(
+    path: Path,
+    root: Path,
+    arguments: Mapping[str, str],
+    find: Callable[[str], Path],
+    say: Callable[[Reason], str] = str,
+) -> str:
     """The URDF's text, in the lines that `xacro` prints; it is given files of the folder `root`, and of the packages
     for which `find` gives a folder or raises `DescriptionError`, as this does for a file that is refused, for an
     argument that it does not have, and without the package `xacro`.
@@ -27,7 +33,7 @@ def expanded(path: Path, root: Path, arguments: Mapping[str, str], find: Callabl
     except Failed as failed:
         raise wrong_file(path, _why(failed)) from failed
     for note in expansion.notes:
-        print(f"  {path.name} says: {note}")
+        print(f"  {say(because('import.xacro.note', file=path.name, text=note))}")
     for name in arguments:
         if name not in expansion.known:
             known = nearest(name, expansion.known)

@@ -14,6 +14,7 @@ from gemelo.schemas.reasons.units import in_display_units, in_si_units
 # SI units; names of joints, links, objects and hosts as they are; several numbers, or each by its joint's name
 Value = bool | int | float | str | tuple[str | float, ...] | dict[str, float]
 FILE = "file."  # begins the codes of what is wrong in a file
+ALL, FEW = "all ", 3  # before a unit of each; chosen: how many of `few` are named
 NOTHING = "-"  # the text of a remedy that a front end does not have
 WITHIN = frozenset(("causes", "cause_1", "cause_2", "lines", "remedies"))  # of a template, besides the reason's values
 PLAIN = "plain"  # the code of a sentence that has none of its own
@@ -62,7 +63,8 @@ class _Writer:
 
     What stands behind a value's colon is its unit, or how it is worded: `word`, one that the catalogue translates,
     `names`, each in the quotation marks of the language, and `argument`, of which each front end has a name of its own.
-    `either` puts the word for or between several.
+    `either` puts the word for or between several, `all` the word for and, with a unit of each behind it; `few` are the
+    first of many, and how many more. A number among words stands as it is.
     Of several numbers each has the unit; of numbers by their joints' names each has its own, where the unit is a value
     with as many. `word.phase` are words of that kind alone.
     """
@@ -117,10 +119,17 @@ class _Writer:
             return ", ".join(self._word("quoted").format(name=name) for name in _each(value))
         if format_spec == "either":
             return f" {self._word('or')} ".join(_each(value))
+        if format_spec.startswith(ALL):
+            each_spec = format_spec.removeprefix(ALL)
+            return f" {self._word('and')} ".join(self.format_field(each, each_spec) for each in _each(value))
+        if format_spec == "few":
+            return self._few(_each(value))
         if format_spec == "argument":
             return self._all_of([self._argument(name) for name in _each(value)])
         if isinstance(value, str):
             return self._worded(value, format_spec) if format_spec.startswith("word") else value
+        if isinstance(value, float) and format_spec.startswith("word"):
+            return f"{value:g}"
         if isinstance(value, tuple):
             between = ", " if any(isinstance(each, str) for each in value) else " "
             return between.join(self.format_field(each, format_spec) for each in value)
@@ -163,6 +172,11 @@ class _Writer:
     def _all_of(self, names: Sequence[str]) -> str:
         """Several, the last one after the word for and."""
         return f" {self._word('and')} ".join(", ".join(part) for part in (names[:-1], names[-1:]) if part)
+
+    def _few(self, names: Sequence[str]) -> str:
+        """The first of them, and how many more there are."""
+        first, count = ", ".join(names[:FEW]), len(names) - FEW
+        return f"{first} {self._word('and')} {self._word('more').format(count=count)}" if count > 0 else first
 
     def _either(self, remedies: Sequence[str]) -> str:
         """Several ways to mend it."""

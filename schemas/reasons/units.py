@@ -52,6 +52,8 @@ _SAME: dict[str, Written] = {
     "typed rad or m": _typed("deg", degrees(1.0)),
     "typed share": _typed("%", 100.0),
     "mm": _short(" mm", _thousand),
+    "whole mm": _unit("mm", 0, _thousand),
+    "bare mm": _unit("", 0, _thousand),
     "mm/s": _short(" mm/s", _thousand),
     "s": _unit("s", 3),
     "ms": _unit("ms", 1, _thousand),

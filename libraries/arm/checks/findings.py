@@ -9,7 +9,7 @@ from enum import StrEnum
 import msgspec
 
 from gemelo.libraries.arm.errors import Subject
-from gemelo.schemas.reasons import PLAIN, Reason, Remedy, because, plain, say
+from gemelo.schemas.reasons import Reason, because, say
 
 
 class Severity(StrEnum):
@@ -79,23 +79,13 @@ def once(findings: Iterable[Finding]) -> list[Finding]:
     return [replace(each, line=lines[0], also=tuple(lines[1:])) for each, lines in found.values()]
 
 
-def error(file: str, subject: Subject | str, what: Reason | str, remedy: str = "", line: int = 0) -> Finding:
-    return _found(Severity.ERROR, file, subject, what, remedy, line)
+def error(file: str, subject: Subject, what: Reason, line: int = 0) -> Finding:
+    return Finding(Severity.ERROR, file, subject, what, line)
 
 
-def note(file: str, subject: Subject | str, what: Reason | str, remedy: str = "", line: int = 0) -> Finding:
-    return _found(Severity.NOTE, file, subject, what, remedy, line)
+def note(file: str, subject: Subject, what: Reason, line: int = 0) -> Finding:
+    return Finding(Severity.NOTE, file, subject, what, line)
 
 
-def warning(file: str, subject: Subject | str, what: Reason | str, remedy: str = "", line: int = 0) -> Finding:
-    return _found(Severity.WARNING, file, subject, what, remedy, line)
-
-
-def _found(
-    severity: Severity, file: str, subject: Subject | str, what: Reason | str, remedy: str, line: int
-) -> Finding:
-    """Texts are sentences, subjects and remedies that have no code."""
-    why = plain(what) if isinstance(what, str) else what
-    if remedy:
-        why = msgspec.structs.replace(why, remedies=(*why.remedies, Remedy(code=PLAIN, values={"text": remedy})))
-    return Finding(severity, file, Subject(subject) if isinstance(subject, str) else subject, why, line)
+def warning(file: str, subject: Subject, what: Reason, line: int = 0) -> Finding:
+    return Finding(Severity.WARNING, file, subject, what, line)

@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import gemelo
-from gemelo.libraries.arm.errors import DescriptionError
+from gemelo.libraries.arm.errors import DescriptionError, wrong_file
+from gemelo.schemas.reasons import Reason, because
 
 LONGEST = 30.0  # [s] of one expansion, chosen: the largest published robots take 2
 LARGEST_FILE = 20_000_000  # [bytes] chosen
@@ -67,21 +68,21 @@ class Confined:
         if not resolved.is_file():
             raise FileNotFoundError(2, "No such file or directory", path)
         if resolved.stat().st_size > LARGEST_FILE:
-            raise DescriptionError(f"{by}: {path} has {resolved.stat().st_size} bytes: the limit is {LARGEST_FILE}")
+            size = resolved.stat().st_size
+            raise wrong_file(by, because("import.xacro.large", file=path, bytes=size, limit=LARGEST_FILE))
         return resolved.read_bytes()
 
     def package(self, name: str) -> str:
         """The folder of a package, from now on one of those that are read; raises `DescriptionError`."""
         if not PACKAGE.fullmatch(name):
-            raise DescriptionError(f"{self._path}: $(find {name}): this is no name of a package: write its name alone")
+            raise wrong_file(self._path, because("import.xacro.package_name", package=name))
         folder = self._find(name)
         resolved = folder.resolve()
         if not self._is_inside(resolved):
             if not any((resolved / mark).exists() for mark in MARKS_OF_A_PACKAGE):
-                raise DescriptionError(
-                    f"{self._path}: $(find {name}): {folder} is no package, as it has none of "
-                    f"{', '.join(MARKS_OF_A_PACKAGE)}: copy the package into {self._roots[0]}"
-                )
+                folders = {"folder": str(folder), "to": str(self._roots[0])}
+                what = because("import.xacro.no_package", package=name, marks=MARKS_OF_A_PACKAGE, **folders)
+                raise wrong_file(self._path, what)
             self._roots.append(resolved)
         return str(folder)
 
@@ -98,17 +99,14 @@ class Confined:
 
     def _require_inside(self, resolved: Path, path: str, by: str) -> None:
         if not self._is_inside(resolved):
-            folders = ", ".join(map(str, self._roots))
-            raise DescriptionError(
-                f"{by}: it reads {path}, which is outside of what is imported ({folders}) or hidden: copy the file "
-                "there, or give `gemelo import` the folder that holds both"
-            )
+            raise wrong_file(by, because("import.xacro.outside", file=path, folders=tuple(map(str, self._roots))))
 
 
 def expand(path: Path, arguments: Mapping[str, str], files: Confined, seconds: float = LONGEST) -> Expansion:
     """The expansion in a process of its own, ended after `seconds` [s]; raises `DescriptionError` for what is refused,
     and `Failed`."""
     notes: list[str] = []
+    refusals: dict[str, Reason] = {}  # of what the process has asked for, by their sentences, which it gives back
     with _process() as child:
         assert child.stdin is not None
         timer = threading.Timer(seconds, child.kill)
@@ -122,16 +120,14 @@ def expand(path: Path, arguments: Mapping[str, str], files: Confined, seconds: f
                 if "expanded" in asked:
                     return Expansion(asked["expanded"], tuple(asked["known"]), tuple(notes))
                 if "refused" in asked:
-                    raise DescriptionError(asked["refused"])
+                    raise DescriptionError(refusals.get(asked["refused"], asked["refused"]))
                 if "failed" in asked:
                     raise Failed(asked["failed"], asked["text"])
-                message = _answer(asked, files)
+                message = _answer(asked, files, refusals)
         except (BrokenPipeError, EOFError):
             child.wait()
-            raise DescriptionError(
-                f"{path}: its expansion was ended: it took more than {seconds:g} s or 1 GiB (code {child.returncode}): "
-                "a macro that calls itself, or a value that grows; expand it where ROS is, if you trust it"
-            ) from None
+            ended = because("import.xacro.ended", seconds=seconds, code=child.returncode)
+            raise wrong_file(path, ended) from None
         finally:
             timer.cancel()
 
@@ -150,7 +146,7 @@ def _next(child: subprocess.Popen[bytes], notes: list[str]) -> dict[str, Any]:
             notes.append(str(asked["note"]))
 
 
-def _answer(asked: Mapping[str, Any], files: Confined) -> dict[str, Any]:
+def _answer(asked: Mapping[str, Any], files: Confined, refusals: dict[str, Reason]) -> dict[str, Any]:
     try:
         if "read" in asked:
             return {"value": base64.b64encode(files.read(asked["read"], asked["by"])).decode()}
@@ -158,6 +154,7 @@ def _answer(asked: Mapping[str, Any], files: Confined) -> dict[str, Any]:
             return {"value": files.package(asked["find"])}
         return {"value": files.matching(asked["glob"], asked["by"])}
     except DescriptionError as error:
+        refusals[str(error)] = error.reason
         return {"refused": str(error)}
     except (OSError, ValueError) as error:
         return {"missing": getattr(error, "strerror", None) or str(error)}

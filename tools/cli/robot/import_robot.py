@@ -60,7 +60,7 @@ def run(options: Options) -> ExitCode:
 
     wanted = ImportOptions(
         options.source, options.output, options.name, options.yes, options.force,
-        options.answers, options.motor, options.driver, dict(options.xacro),
+        options.answers, options.motor, options.driver, dict(options.xacro), sentence,
     )  # fmt: skip
     try:
         folder = import_robot(wanted)

@@ -76,7 +76,7 @@ def _findings(folder: Path, xacro: Mapping[str, str]) -> list[Finding]:
 
     print(sentence(because("finding.as_import", folder=str(folder), file=ROBOT_FILE)))
     try:
-        return source_findings(ImportOptions(folder, Path(), yes=True, xacro=xacro))
+        return source_findings(ImportOptions(folder, Path(), yes=True, xacro=xacro, say=sentence))
     except DescriptionError as error:
         raise CommandError(error) from error
 
