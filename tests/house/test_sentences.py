@@ -17,7 +17,6 @@ FOLDERS = {  # whose sentences stand in the code, and why
     "tools/demo/": "shows a checkout, in the words of its film",
     "tools/replay/": "compares a recording with the code, for who works on that",
     "tools/stack/": "starts and stops processes for `make`, before anything of the product is built",
-    "libraries/robot_import/": "not converted yet: the importer's findings",
     "services/detector/": "not converted yet: what is wrong with a model of one's own",
     "services/visualizer/": "not converted yet: the view and its recordings",
     "tools/chaos/": "not converted yet: the report of a campaign",
@@ -40,6 +39,9 @@ FOR_DEVELOPERS = {  # exceptions that no person is shown: a traceback or a log h
 SINGLE = {  # by file and what carries it
     ("gemelo/api/homing.py", "Refused"): "two calls of a script, beside the reason",
     ("gemelo/pytest_plugin.py", "UsageError"): "of pytest, which speaks English",
+    ("libraries/robot_import/xacro_sandbox/expressions.py", "KeyError"): "Python's own words, which xacro quotes",
+    ("libraries/robot_import/xacro_sandbox/expressions.py", "NameError"): "Python's own words, which xacro quotes",
+    ("libraries/robot_import/xacro_sandbox/process.py", "PermissionError"): "for code that breaks out of the sandbox",
     ("libraries/runtime/application.py", "ArgumentTypeError"): "the command line of a service, for its supervisor",
     ("libraries/runtime/bus/wire.py", "TooLarge"): "not converted yet",
     ("libraries/runtime/process/shutdown.py", "print"): "a line of a service's log",

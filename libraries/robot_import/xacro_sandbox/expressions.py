@@ -12,13 +12,13 @@ import string
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import because
+
+NOT_ADMITTED = "import.xacro.not_admitted"
 LONGEST = 100_000  # letters or elements of one value, chosen: a robot's longest list has some hundred
 MOST_BITS = 1024  # of an integer, chosen: a double has 53
 MOST_STEPS = 200_000  # nodes visited by one expression, chosen
-REMEDY = (
-    "an expression may have arithmetic, comparisons, names, subscripts, and the functions that xacro documents; if you "
-    "trust the file, expand it where ROS is (`xacro robot.urdf.xacro > robot.urdf`) and import that"
-)
 WIDE = re.compile(r"\*|\d{4}")  # the width of a format that is taken from a value, or has four digits
 PLAIN = (bool, int, float, str, list, tuple, dict, set, frozenset, range, type(None))
 OF_A_TEXT = """
@@ -33,8 +33,8 @@ METHODS: Mapping[type, frozenset[str]] = {
 }
 
 
-class ExpressionRefused(Exception):
-    """The expression is outside of what is admitted; the text says what of it, and its limit."""
+class ExpressionRefused(ReasonedError):
+    """The expression is outside of what is admitted; the reason says what of it, and its limit."""
 
 
 class Names:
@@ -66,15 +66,15 @@ class _Evaluation:
     def value(self, node: ast.expr) -> Any:
         self._steps += 1
         if self._steps > MOST_STEPS:
-            raise ExpressionRefused(f"it takes more than {MOST_STEPS} steps")
+            raise ExpressionRefused(because("import.xacro.steps", most=MOST_STEPS))
         kind = KINDS.get(type(node))
         if kind is None:
-            raise ExpressionRefused(f"{type(node).__name__} is not admitted in it")
+            raise ExpressionRefused(because(NOT_ADMITTED, what=type(node).__name__))
         return _bounded(kind(self, node))
 
     def constant(self, node: ast.Constant) -> Any:
         if not isinstance(node.value, PLAIN):
-            raise ExpressionRefused(f"{node.value!r} is not admitted in it")
+            raise ExpressionRefused(because(NOT_ADMITTED, what=repr(node.value)))
         return node.value
 
     def name(self, node: ast.Name) -> Any:
@@ -86,7 +86,7 @@ class _Evaluation:
     def binary(self, node: ast.BinOp) -> Any:
         apply = OPERATIONS.get(type(node.op))
         if apply is None:
-            raise ExpressionRefused(f"{type(node.op).__name__} is not admitted in it")
+            raise ExpressionRefused(because(NOT_ADMITTED, what=type(node.op).__name__))
         return apply(self.value(node.left), self.value(node.right))
 
     def unary(self, node: ast.UnaryOp) -> Any:
@@ -118,13 +118,13 @@ class _Evaluation:
 
     def mapped(self, node: ast.Dict) -> dict[Any, Any]:
         if None in node.keys:
-            raise ExpressionRefused("** is not admitted in it")
+            raise ExpressionRefused(because(NOT_ADMITTED, what="**"))
         return {self.value(key): self.value(value) for key, value in zip(node.keys, node.values, strict=True) if key}
 
     def subscript(self, node: ast.Subscript) -> Any:
         whole = self.value(node.value)
         if not isinstance(whole, PLAIN):
-            raise ExpressionRefused(f"a subscript of {type(whole).__name__} is not admitted in it")
+            raise ExpressionRefused(because("import.xacro.subscript", kind=type(whole).__name__))
         return operator.getitem(whole, self._place(node.slice))  # type: ignore[arg-type]  # TypeError is an answer
 
     def _place(self, node: ast.expr) -> Any:
@@ -145,11 +145,14 @@ class _Evaluation:
             if node.attr in whole:
                 return whole[node.attr]
             raise KeyError(f"there is no key '{node.attr}'")
-        raise ExpressionRefused(f'the attribute "{node.attr}" of {_kind_of(whole)} is not admitted in it')
+        if isinstance(whole, PLAIN):
+            kind = type(whole).__name__
+            raise ExpressionRefused(because("import.xacro.attribute", attribute=node.attr, kind=kind))
+        raise ExpressionRefused(because("import.xacro.attribute.strange", attribute=node.attr))
 
     def call(self, node: ast.Call) -> Any:
         if any(isinstance(each, ast.Starred) for each in node.args) or any(each.arg is None for each in node.keywords):
-            raise ExpressionRefused("* and ** in a call are not admitted in it")
+            raise ExpressionRefused(because("import.xacro.starred"))
         function = self._function(node.func)
         arguments = [self.value(each) for each in node.args]
         return function(*arguments, **{each.arg: self.value(each.value) for each in node.keywords if each.arg})
@@ -162,12 +165,12 @@ class _Evaluation:
                 return _method(kind, whole, node.attr)
         function = self.value(node)
         if not any(function is each for each in self._functions):
-            raise ExpressionRefused(f"a call of {ast.unparse(node)} is not admitted in it")
+            raise ExpressionRefused(because("import.xacro.call", function=ast.unparse(node)))
         return function  # type: ignore[no-any-return]  # one of those that were given
 
     def comprehension(self, node: ast.ListComp | ast.GeneratorExp) -> list[Any]:
         if len(node.generators) != 1:
-            raise ExpressionRefused("a comprehension over several lists is not admitted in it")
+            raise ExpressionRefused(because("import.xacro.comprehension"))
         (over,) = node.generators
         return [self.value(node.elt) for _ in self._bindings(over)]
 
@@ -202,46 +205,41 @@ def _bound(target: ast.expr, element: Any) -> dict[str, Any]:
         return {target.id: element}
     if isinstance(target, ast.Tuple) and all(isinstance(each, ast.Name) for each in target.elts):
         return {each.id: part for each, part in zip(target.elts, element, strict=True) if isinstance(each, ast.Name)}
-    raise ExpressionRefused("the target of a comprehension is a name, or several")
-
-
-def _kind_of(value: Any) -> str:
-    return type(value).__name__ if isinstance(value, PLAIN) else "what is no plain data"
+    raise ExpressionRefused(because("import.xacro.target"))
 
 
 def _bounded(value: Any) -> Any:
     """The value itself; raises `ExpressionRefused` where it is larger than any robot's."""
     if isinstance(value, (str, list, tuple, dict, set, frozenset)) and len(value) > LONGEST:
-        raise ExpressionRefused(f"it makes a value of {len(value)} letters or elements: the limit is {LONGEST}")
+        raise ExpressionRefused(because("import.xacro.value", count=len(value), limit=LONGEST))
     if isinstance(value, int) and value.bit_length() > MOST_BITS:
-        raise ExpressionRefused(f"it makes an integer of {value.bit_length()} bits: the limit is {MOST_BITS}")
+        raise ExpressionRefused(because("import.xacro.integer", bits=value.bit_length(), limit=MOST_BITS))
     return value
 
 
 def _power(base: Any, exponent: Any) -> Any:
     if isinstance(base, int) and isinstance(exponent, int) and base.bit_length() * exponent > MOST_BITS:
-        raise ExpressionRefused(f"a power makes an integer of more than {MOST_BITS} bits")
+        raise ExpressionRefused(because("import.xacro.power", limit=MOST_BITS))
     return base**exponent
 
 
 def _shifted(value: Any, by: Any) -> Any:
     if isinstance(by, int) and by > MOST_BITS:
-        raise ExpressionRefused(f"a shift makes an integer of more than {MOST_BITS} bits")
+        raise ExpressionRefused(because("import.xacro.shift", limit=MOST_BITS))
     return value << by
 
 
 def _product(left: Any, right: Any) -> Any:
     for several, count in ((left, right), (right, left)):
         if isinstance(several, (str, list, tuple)) and isinstance(count, int) and len(several) * count > LONGEST:
-            raise ExpressionRefused(
-                f"a product makes {len(several) * count} letters or elements: the limit is {LONGEST}"
-            )
+            made = str(len(several) * count)  # of any length
+            raise ExpressionRefused(because("import.xacro.product", count=made, limit=LONGEST))
     return left * right
 
 
 def _remainder(left: Any, right: Any) -> Any:
     if isinstance(left, str) and WIDE.search(left):
-        raise ExpressionRefused("the width of a format has at most three digits")
+        raise ExpressionRefused(because("import.xacro.width"))
     return left % right
 
 
@@ -250,12 +248,12 @@ class _PlainFormat(string.Formatter):
 
     def get_field(self, field_name: str, args: Any, kwargs: Any) -> Any:
         if not re.fullmatch(r"\w*", field_name):
-            raise ExpressionRefused(f'the field "{field_name}" of a format is not admitted in it')
+            raise ExpressionRefused(because("import.xacro.field", field=field_name))
         return super().get_field(field_name, args, kwargs)
 
     def format_field(self, value: Any, format_spec: str) -> str:
         if WIDE.search(format_spec):
-            raise ExpressionRefused("the width of a format has at most three digits")
+            raise ExpressionRefused(because("import.xacro.width"))
         return str(super().format_field(value, format_spec))
 
 
@@ -270,7 +268,7 @@ def _method(kind: type, whole: Any, name: str) -> Callable[..., Any]:
 
 def _replaced(whole: str, old: str, new: str, *count: int) -> str:
     if (whole.count(old) + 1) * len(new) > LONGEST:
-        raise ExpressionRefused(f"a replacement makes more than {LONGEST} letters")
+        raise ExpressionRefused(because("import.xacro.replacement", limit=LONGEST))
     return whole.replace(old, new, *count)
 
 

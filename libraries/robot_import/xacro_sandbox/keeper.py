@@ -20,6 +20,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 import gemelo
 from gemelo.libraries.arm.errors import DescriptionError, wrong_file
 from gemelo.schemas.reasons import Reason, because
@@ -106,7 +108,6 @@ def expand(path: Path, arguments: Mapping[str, str], files: Confined, seconds: f
     """The expansion in a process of its own, ended after `seconds` [s]; raises `DescriptionError` for what is refused,
     and `Failed`."""
     notes: list[str] = []
-    refusals: dict[str, Reason] = {}  # of what the process has asked for, by their sentences, which it gives back
     with _process() as child:
         assert child.stdin is not None
         timer = threading.Timer(seconds, child.kill)
@@ -120,10 +121,10 @@ def expand(path: Path, arguments: Mapping[str, str], files: Confined, seconds: f
                 if "expanded" in asked:
                     return Expansion(asked["expanded"], tuple(asked["known"]), tuple(notes))
                 if "refused" in asked:
-                    raise DescriptionError(refusals.get(asked["refused"], asked["refused"]))
+                    raise DescriptionError(msgspec.convert(asked["refused"], Reason))
                 if "failed" in asked:
                     raise Failed(asked["failed"], asked["text"])
-                message = _answer(asked, files, refusals)
+                message = _answer(asked, files)
         except (BrokenPipeError, EOFError):
             child.wait()
             ended = because("import.xacro.ended", seconds=seconds, code=child.returncode)
@@ -146,7 +147,7 @@ def _next(child: subprocess.Popen[bytes], notes: list[str]) -> dict[str, Any]:
             notes.append(str(asked["note"]))
 
 
-def _answer(asked: Mapping[str, Any], files: Confined, refusals: dict[str, Reason]) -> dict[str, Any]:
+def _answer(asked: Mapping[str, Any], files: Confined) -> dict[str, Any]:
     try:
         if "read" in asked:
             return {"value": base64.b64encode(files.read(asked["read"], asked["by"])).decode()}
@@ -154,8 +155,7 @@ def _answer(asked: Mapping[str, Any], files: Confined, refusals: dict[str, Reaso
             return {"value": files.package(asked["find"])}
         return {"value": files.matching(asked["glob"], asked["by"])}
     except DescriptionError as error:
-        refusals[str(error)] = error.reason
-        return {"refused": str(error)}
+        return {"refused": msgspec.to_builtins(error.reason)}
     except (OSError, ValueError) as error:
         return {"missing": getattr(error, "strerror", None) or str(error)}
 

@@ -1,7 +1,7 @@
 """Process that expands one xacro file: it reads no file itself, and has limits of time and memory.
 
 The protocol with its keeper is one JSON object a line: a request that it answers ("read", "find", "glob"), or the
-last word ("expanded", "refused", "failed"). What is wrong in the file is said by the keeper.
+last word ("expanded", "refused" with a reason, "failed"). What is wrong in the file is said by the keeper.
 """
 
 from __future__ import annotations
@@ -20,12 +20,14 @@ from html import unescape
 from types import SimpleNamespace
 from typing import Any, BinaryIO
 
+import msgspec
 import xacro
 import yaml
 from xacro import substitution_args
 
-from gemelo.libraries.robot_import.xacro_sandbox.expressions import REMEDY, ExpressionRefused, Interpreter
+from gemelo.libraries.robot_import.xacro_sandbox.expressions import ExpressionRefused, Interpreter
 from gemelo.libraries.robot_import.xacro_sandbox.symbols import functions, of_eval, symbols
+from gemelo.schemas.reasons import Reason, because
 
 CPU = 20  # [s] chosen: the largest published robots take 2
 MEMORY = 1 << 30  # [bytes] of addresses, chosen: Python with xacro has 0.2 of it
@@ -33,7 +35,7 @@ FORBIDDEN = ("open", "os.", "subprocess.", "socket.", "exec", "import", "ctypes.
 
 
 class Refused(Exception):
-    """What the file asks for is not allowed; the text is a sentence with its place and its remedy."""
+    """What the file asks for is not allowed; the keeper gets the reason, with its place and its remedy."""
 
 
 class Keeper:
@@ -42,7 +44,7 @@ class Keeper:
     def __init__(self, answers: BinaryIO, requests: BinaryIO) -> None:
         self._answers, self._requests = answers, requests
         self.texts: dict[str, str] = {}  # by path
-        self.refusal = ""  # the first one: xacro wraps what is raised in it
+        self.refusal: dict[str, Any] = {}  # the first reason: xacro wraps what is raised in it
 
     def say(self, **message: object) -> None:
         """Sends one line."""
@@ -63,10 +65,10 @@ class Keeper:
         """The paths that match a pattern."""
         return list(self._asked(glob=pattern, by=xacro.filestack[-1]))
 
-    def refuse(self, sentence: str) -> Refused:
-        """The exception to raise; the first sentence is the one that is said."""
-        self.refusal = self.refusal or sentence
-        return Refused(sentence)
+    def refuse(self, reason: dict[str, Any]) -> Refused:
+        """The exception to raise; the first reason is the one that is said."""
+        self.refusal = self.refusal or reason
+        return Refused(reason.get("code"))
 
     def _asked(self, **request: object) -> Any:
         self.say(**request)
@@ -120,10 +122,8 @@ def take_over(keeper: Keeper, arguments: KnownArguments) -> None:
         return substitution_args.convert_value(substitution_args._eval_arg(name, arguments), "auto")
 
     def environment(name: str) -> str:
-        raise keeper.refuse(
-            f"{xacro.filestack[-1]}: $(env {name}): the environment is not given to a xacro file: write "
-            f"`$(arg {name})` there, and give --xacro {name}:=VALUE"
-        )
+        what = because("import.xacro.environment", name=name)
+        raise keeper.refuse(_sent(because("file.wrong", what, file=str(xacro.filestack[-1]))))
 
     known = of_eval(converted, keeper.find)
     of_text = Interpreter([each for each in known.values() if callable(each)])
@@ -139,18 +139,25 @@ def _evaluated(keeper: Keeper, interpreter: Interpreter, text: str, names: Mappi
     try:
         return interpreter.evaluate(text, names)
     except ExpressionRefused as error:
-        raise keeper.refuse(f"{place(text, keeper.texts)}: `{text.strip()}`: {error}: {REMEDY}") from error
+        what = because("import.xacro.expression", error.reason, text=text.strip())
+        raise keeper.refuse(_sent(placed(what, text, keeper.texts))) from error
 
 
-def place(text: str, texts: Mapping[str, str]) -> str:
-    """The file, with its line where the text stands in it as it is written: the macro's, else the one being read."""
+def _sent(reason: Reason) -> dict[str, Any]:
+    """As JSON has it."""
+    sent: dict[str, Any] = msgspec.to_builtins(reason)
+    return sent
+
+
+def placed(what: Reason, text: str, texts: Mapping[str, str]) -> Reason:
+    """With its file, and the line where the text stands as it is written: the macro's, else of the one being read."""
     macros = [each.history[-1][-1] for each in reversed(xacro.macrostack or []) if each.history]
     files = [*macros, *reversed(xacro.filestack), *texts]
     for file in files:
         for number, line in enumerate(unescape(texts.get(file, "")).splitlines(), 1):
             if text.strip().splitlines()[:1] and text.strip().splitlines()[0] in line:
-                return f"{file}, line {number}"
-    return str(files[0])
+                return because("file.line", what, file=str(file), line=number)
+    return because("file.wrong", what, file=str(files[0]))
 
 
 def _parsed(keeper: Keeper, path: str) -> xml.dom.minidom.Document:
@@ -162,7 +169,8 @@ def _parsed(keeper: Keeper, path: str) -> xml.dom.minidom.Document:
         raise xacro.XacroException(f"{error.strerror}: {error.filename}", exc=error) from error
 
     def entity(name: str, *_: object) -> None:
-        raise keeper.refuse(f"{path}: the entity &{name}; is defined in it: write its text where it is used")
+        what = because("import.xacro.entity", name=name)
+        raise keeper.refuse(_sent(because("file.wrong", what, file=path)))
 
     parser = xml.parsers.expat.ParserCreate()
     parser.EntityDeclHandler = entity
@@ -192,6 +200,7 @@ def shut() -> None:
     """From here on this process opens, imports and runs nothing: whatever asks for it gets an exception."""
     xml.dom.minidom.parseString(b"<warm/>").toprettyxml()  # imports what it needs
     yaml.load("[1, 1.5, a]", _loader())
+    _sent(because("import.xacro.entity", name="warm"))
 
     def refuse(event: str, _: object) -> None:
         if event.startswith(FORBIDDEN):
