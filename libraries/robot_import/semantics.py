@@ -75,7 +75,8 @@ class _Reader:
             if count:
                 self._say(Subject(f"<{tag}>"), because("mend.unused", LEFT_OUT, count=count))
         self.mended.semantics = self.known
-        counts = {name: len(getattr(self.known, name)) for name in ("groups", "states", "pairs")}
+        known = self.known
+        counts = {"groups": len(known.groups), "states": len(known.states), "pairs": len(known.pairs)}
         self._say(Subject("robot"), because("mend.srdf.taken", remedy("taken_into_srdf"), **counts))
 
     def _say(self, subject: Subject, what: Reason) -> None:

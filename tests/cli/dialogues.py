@@ -102,6 +102,8 @@ broker secure --serial no_port --device a b
 link bench --rate 300
 camera print tags --page a4 --to nowhere/board.pdf
 import nowhere
+import tests/cli/dialogues/mended.urdf --yes --output tests/cli --name dialogues
+import tests/cli/dialogues/broken.urdf --yes
 collision matrix nowhere
 """.strip().splitlines()
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import pytest
 
+from gemelo.libraries.runtime.deployment import project_root
 from tests.cli.dialogues import COMMANDS, LANGUAGES, PROMPT, golden, said
 
 pytestmark = pytest.mark.full  # a simulated arm for most commands
 
 
 @pytest.fixture(autouse=True)
-def _a_hundred_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+def _a_hundred_columns_in_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.chdir(project_root())  # some commands name a file of it
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

@@ -34,6 +34,29 @@ def test_what_is_no_source_says_why_with_its_place(tmp_path: Path) -> None:
     assert reason_of(urdf, {"long": "1"}) == because("file.wrong", no_xacro, file=str(urdf))
 
 
+def test_what_the_sandbox_of_a_xacro_file_refuses_says_why_with_its_place(tmp_path: Path) -> None:
+    """Whether the process that expands it refuses, or its keeper."""
+    file = tmp_path / "arm.urdf.xacro"
+
+    def refused(content: str) -> Reason:
+        head = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+        file.write_text(f"{head}\n{content}\n</robot>")
+        return reason_of(file)
+
+    lambda_ = because("import.xacro.not_admitted", what="Lambda")
+    expression = because("import.xacro.expression", lambda_, text="(lambda: 1)()")
+    assert refused('<link name="${(lambda: 1)()}"/>') == because("file.line", expression, file=str(file), line=2)
+    assert "`(lambda: 1)()`: no se admite Lambda: una expresión puede tener" in say(
+        because("file.wrong", expression), "es"
+    )
+    environment = because("import.xacro.environment", name="TOKEN")
+    assert refused('<link name="$(env TOKEN)"/>') == because("file.wrong", environment, file=str(file))
+    (tmp_path.parent / "beside.yaml").write_text("a: 1")
+    outside = refused("<link name=\"${xacro.load_yaml('../beside.yaml')['a']}\"/>")
+    named = because("import.xacro.outside", file=str(tmp_path / "../beside.yaml"), folders=(str(tmp_path),))
+    assert outside == because("file.wrong", named, file=str(file))
+
+
 def test_an_answer_that_is_none_says_why() -> None:
     cases = ((whole, "x", because("import.answer.whole")), (above_zero, "0", because("import.answer.above_zero")),
              (one_of("a", "b"), "c", because("import.answer.none_of", known=("a", "b"))))  # fmt: skip

@@ -134,6 +134,23 @@ def test_several_remedies_are_a_choice():
     assert say(both, "es") == "El plan no tiene puntos; planifique otra vez, o envíelo por partes"
 
 
+def test_of_many_names_the_first_are_given_and_how_many_more():
+    drawn = because("mend.links.drawn", count=5, links=("a", "b", "c", "d", "e"))
+    assert str(drawn) == "5 links are drawn and have no <collision> (a, b, c and 2 more)"
+    assert say(drawn, "es").endswith("(a, b, c y 2 más)")
+    three = because("mend.links.drawn", count=3, links=("a", "b", "c"))
+    assert str(three).endswith("(a, b, c)")
+
+
+def test_several_words_are_joined_by_and_and_a_number_among_words_stands_as_it_is():
+    units = because("mend.mesh.units", because("mend.mesh.long", mesh="a", length=1.0, span=2.0), units=("cm", "in"))
+    assert str(units).endswith(": centimetres and inches fit")
+    assert say(units, "es").endswith(": podrían ser centímetros y pulgadas")
+    soft = because("mend.soft.same", low=-0.5, high="none")
+    assert str(soft) == "its soft limits -0.5 to none are its limits"
+    assert "de -0.5 a ninguno" in say(soft, "es")
+
+
 def test_what_is_explained_is_a_code_or_the_beginning_of_some_in_every_language():
     explained = {
         language: {name for context, name in entries(language) if context == EXPLAIN} for language in languages()
