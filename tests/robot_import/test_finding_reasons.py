@@ -287,5 +287,5 @@ def test_an_import_speaks_the_language_of_the_command_line(tmp_path: Path, capsy
     first, *lines = printed.out.splitlines()
     assert first == "lectura del archivo de origen y sus mallas ..."
     assert lines[0].startswith("error: arm.urdf, línea 5: eslabón «fore»: la malla «gone.stl» no está; no hay ninguna")
-    assert lines[-1] == "corregido: arm.urdf, línea 10: <gazebo>: hay 1, y nada de lo que dicen se usa aquí -> se omite"
+    assert lines[-1] == "corregido: arm.urdf, línea 10: <gazebo>: nada de lo que dice se usa aquí (1 en total) -> se omite"
     assert "el error de arriba no tiene una sola respuesta" in printed.err.lower()

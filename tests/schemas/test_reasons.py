@@ -137,7 +137,7 @@ def test_several_remedies_are_a_choice():
 def test_of_many_names_the_first_are_given_and_how_many_more():
     drawn = because("mend.links.drawn", count=5, links=("a", "b", "c", "d", "e"))
     assert str(drawn) == "5 links are drawn and have no <collision> (a, b, c and 2 more)"
-    assert say(drawn, "es").endswith("(a, b, c y 2 más)")
+    assert say(drawn, "es").endswith(": a, b, c y 2 más (5 en total)")
     three = because("mend.links.drawn", count=3, links=("a", "b", "c"))
     assert str(three).endswith("(a, b, c)")
 
