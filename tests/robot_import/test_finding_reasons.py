@@ -287,5 +287,6 @@ def test_an_import_speaks_the_language_of_the_command_line(tmp_path: Path, capsy
     first, *lines = printed.out.splitlines()
     assert first == "lectura del archivo de origen y sus mallas ..."
     assert lines[0].startswith("error: arm.urdf, línea 5: eslabón «fore»: la malla «gone.stl» no está; no hay ninguna")
-    assert lines[-1] == "corregido: arm.urdf, línea 10: <gazebo>: nada de lo que dice se usa aquí (1 en total) -> se omite"
+    nothing = "nada de lo que dice se usa aquí (1 en total) -> se omite"
+    assert lines[-1] == f"corregido: arm.urdf, línea 10: <gazebo>: {nothing}"
     assert "el error de arriba no tiene una sola respuesta" in printed.err.lower()
