@@ -36,7 +36,9 @@ def test_what_is_no_source_says_why_with_its_place(tmp_path: Path) -> None:
 
 def test_what_the_sandbox_of_a_xacro_file_refuses_says_why_with_its_place(tmp_path: Path) -> None:
     """Whether the process that expands it refuses, or its keeper."""
-    file = tmp_path / "arm.urdf.xacro"
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    file = folder / "arm.urdf.xacro"
 
     def refused(content: str) -> Reason:
         head = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">'
@@ -51,9 +53,9 @@ def test_what_the_sandbox_of_a_xacro_file_refuses_says_why_with_its_place(tmp_pa
     )
     environment = because("import.xacro.environment", name="TOKEN")
     assert refused('<link name="$(env TOKEN)"/>') == because("file.wrong", environment, file=str(file))
-    (tmp_path.parent / "beside.yaml").write_text("a: 1")
+    (tmp_path / "beside.yaml").write_text("a: 1")
     outside = refused("<link name=\"${xacro.load_yaml('../beside.yaml')['a']}\"/>")
-    named = because("import.xacro.outside", file=str(tmp_path / "../beside.yaml"), folders=(str(tmp_path),))
+    named = because("import.xacro.outside", file=str(folder / "../beside.yaml"), folders=(str(folder),))
     assert outside == because("file.wrong", named, file=str(file))
 
 
