@@ -115,13 +115,13 @@ def test_a_change_of_the_scene_reaches_a_process_that_has_nothing_to_do(stack: S
     stack.ask(EASY)
     assert stack.answer().code is PlanCode.SUCCESS
     shown: SimpleQueue[PlanningScene] = SimpleQueue()
-    show = PlannerProcess.show
+    show = PlannerProcess.set_scene
 
     def seen(process: PlannerProcess, scene: PlanningScene, *others: Callable[[], None]) -> None:
         show(process, scene, *others)
         shown.put(scene)
 
-    monkeypatch.setattr(PlannerProcess, "show", seen)
+    monkeypatch.setattr(PlannerProcess, "set_scene", seen)
     stack.scene = PlanningScene(version=2)
     while shown.get(timeout=PATIENCE) is not stack.scene:
         pass
