@@ -1,4 +1,7 @@
-"""Incidents as a black box keeps them: a sentence, the events before and after; and the folder of black boxes."""
+"""Incidents as a black box keeps them: a sentence, the events before and after; and the folder of black boxes.
+
+Beside each English sentence is its reason, from which `in_language` makes it in another language.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,15 @@ from enum import StrEnum
 from pathlib import Path
 
 import msgspec
+from msgspec.structs import replace
 
 from gemelo.libraries.recordings.reader import BadRecording, RecordingReader
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import Reason, because, say
 
 INCIDENT = "incident"  # the name of the metadata record
 BLACK_BOX = "black box: "  # the logger's line about a new one begins with it
 FOLDER = "blackbox"  # in the folder of what runs leave
+LONGEST = 160  # letters of a line of the story, and of a margin
 
 
 SAVING_AT_MOST = 60.0  # [s] from an incident to its file; a mark that is older is that of a logger that was killed
@@ -34,6 +39,7 @@ class Happening(msgspec.Struct, frozen=True, kw_only=True):
 
     at: float
     text: str
+    why: Reason | None = None  # `text` as data
 
 
 class Incident(msgspec.Struct, frozen=True, kw_only=True):
@@ -44,6 +50,8 @@ class Incident(msgspec.Struct, frozen=True, kw_only=True):
     sentence: str  # what happened, when, and in what
     margins: tuple[str, ...] = ()  # the joints and their margins at that moment, a sentence each
     story: tuple[Happening, ...] = ()  # in the order of time
+    why: Reason | None = None  # `sentence` as data: its cause is what happened, without the time
+    margins_why: tuple[Reason, ...] = ()  # `margins` as data
 
 
 class BlackBoxFile(msgspec.Struct, frozen=True, kw_only=True):
@@ -93,6 +101,27 @@ def black_boxes(folder: Path, robot: str) -> list[BlackBoxFile]:
         except BadRecording:
             continue
     return found
+
+
+def in_language(incident: Incident, language: str) -> Incident:
+    """With its sentences in that language; those of a file without reasons stay as they are."""
+    if incident.why is None:
+        return incident
+    return replace(
+        incident,
+        sentence=say(incident.why, language),
+        margins=tuple(one_line(say(each, language)) for each in incident.margins_why),
+        story=tuple(
+            each if each.why is None else replace(each, text=one_line(say(each.why, language)))
+            for each in incident.story
+        ),
+    )
+
+
+def one_line(text: str, longest: int = LONGEST) -> str:
+    """Without line breaks, and cut to `longest` letters."""
+    line = " ".join(text.split())
+    return line if len(line) <= longest else line[: longest - 4] + " ..."
 
 
 def time_of(stamp: int) -> str:

@@ -44,6 +44,7 @@ def _short(name: str, convert: Callable[[float], float]) -> Written:
 
 
 _SAME: dict[str, Written] = {
+    "read m": _unit("mm", 1, _thousand),
     "typed ": _typed(""),
     "typed s": _typed("s"),
     "typed m": _typed("mm", 1000.0),
@@ -64,10 +65,11 @@ _SAME: dict[str, Written] = {
     "steps/s": _unit("steps/s", 0),
     "N": _unit("N", 1),
 }
-in_si_units: Mapping[str, Written] = {
+in_si_units: Mapping[str, Written] = {  # `read`: as a person compares it, with one digit behind the point
     **_SAME,
     "deg": _short(" deg", degrees),
     "deg/s": _short(" deg/s", degrees),
+    "read rad": _unit("deg", 1, degrees),
     "rad": _unit("rad", 4),
     "m": _unit("m", 4),
     "rad/s": _unit("rad/s", 4),
@@ -79,6 +81,7 @@ in_display_units: Mapping[str, Written] = {
     **_SAME,
     "deg": _short("°", degrees),
     "deg/s": _short("°/s", degrees),
+    "read rad": _unit("°", 1, degrees),
     "rad": _in_display("°", 1, degrees),
     "m": _in_display("mm", 1, _thousand),
     "rad/s": _in_display("°/s", 1, degrees),

@@ -2,122 +2,149 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import msgspec
+from msgspec.structs import replace
 
-from gemelo.libraries.arm.errors import DescriptionError
-from gemelo.libraries.arm.model.urdf import JointKind, UrdfJoint, urdf_of
 from gemelo.libraries.recordings.channels import Entry
-from gemelo.libraries.recordings.incidents import BLACK_BOX, Happening, Incident, time_of
+from gemelo.libraries.recordings.incidents import BLACK_BOX, Happening, Incident, one_line, time_of
 from gemelo.libraries.runtime.actions import keys
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceEvent, DeviceMode, DeviceState
-from gemelo.schemas.frames import RobotDescription
-from gemelo.schemas.joints import JointState, StepErrors
-from gemelo.schemas.ledger import StepLedger, StoppingDistance
-from gemelo.schemas.message import Message
-from gemelo.schemas.planning import PlanResponse
+from gemelo.schemas.planning import PlanResponse, Refusal
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.system import LogLevel, LogRecord, ParameterChange
-from gemelo.schemas.topics import EXCHANGES, FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, JOINT_STATES
-from gemelo.services.logger.incident_watch import STOPPED, Trigger
+from gemelo.schemas.topics import EXCHANGES, FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND
+from gemelo.services.logger.incident_margins import margins_of
+from gemelo.services.logger.incident_watch import SHORT, Trigger, reason_of, why_of_end
 
 SECOND = 1_000_000_000  # [ns]
 BEFORE, AFTER = 20, 20  # happenings that are told at most
-LONGEST = 160  # letters of one
-LONGEST_QUESTION = 90  # letters of what was asked
+LONGEST_QUESTION = 90  # letters of a request
 LATELY = 4  # happenings within which the same is not told again
 TOLD_ELSEWHERE = ("goal ", BLACK_BOX)  # beginnings of lines of the log
 SMALL = 5  # fields of a message that is told whole
 NOTHING = ("", (), None)
 UNTOLD = frozenset({"stamp", "request_id"})  # fields of a message that tell a person nothing
 REASONS = frozenset({"why", "warning_why"})  # fields whose sentences stand in others
+REPORTED = frozenset({"story.device", "story.node"})  # codes that name who has reported what
 MANY = 8  # elements of a list that are written out
 QUIET = frozenset({"state_validity", "ik", "fk", "device/echo"})  # questions that change nothing
 GOALS = tuple(keys.goal_request(action).key for action in (FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND))
 ENDS = tuple(keys.ended_topic(action).key for action in (FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND))
-MOVING = 1e-3  # [rad/s] or [m/s]
 
 
 def incident_of(trigger: Trigger, entries: Sequence[Entry]) -> Incident:
     """The incident, told from `entries` in the order of their arrival: latched ones first, then the last minute."""
     before = [entry for entry in entries if entry.arrival <= trigger.stamp]
-    at = [((arrival - trigger.stamp) / SECOND, text) for arrival, text in _story(entries)]
+    at = [((arrival - trigger.stamp) / SECOND, what) for arrival, what in _story(entries)]
     led = [each for each in at if each[0] <= 0.0][-BEFORE:]
     followed = [each for each in at if each[0] > 0.0][:AFTER]
-    motion = _motion(before, trigger.stamp)
+    why = because("incident.at", _in_goal(trigger, before), time=time_of(trigger.stamp))
+    margins = tuple(margins_of(before, trigger.joint))
     return Incident(
         stamp=trigger.stamp,
         kind=trigger.kind,
-        sentence=f"{time_of(trigger.stamp)}: {trigger.what}{f', {motion}' if motion else ''}",
-        margins=tuple(_margins(before, trigger.joint)),
-        story=tuple(Happening(at=round(seconds, 3), text=text) for seconds, text in (*led, *followed)),
+        sentence=str(why),
+        margins=tuple(one_line(str(each)) for each in margins),
+        story=tuple(
+            Happening(at=round(seconds, 3), text=one_line(str(what)), why=what) for seconds, what in (*led, *followed)
+        ),
+        why=why,
+        margins_why=margins,
     )
 
 
-def _story(entries: Iterable[Entry]) -> Iterator[tuple[int, str]]:
-    """What a person would tell, with its arrival [ns]; a line that is said again at once is told once."""
+def _story(entries: Iterable[Entry]) -> Iterator[tuple[int, Reason]]:
+    """What a person would tell, with its arrival [ns]; a line that comes again at once is told once."""
     mode: DeviceMode | None = None
-    said: list[str] = []
+    told: list[str] = []
     for entry in entries:
         message = entry.message
         if isinstance(message, DeviceState):
             if mode is not None and message.mode is not mode:
-                yield entry.arrival, f"device: {mode.name} -> {message.mode.name}"
+                yield entry.arrival, because("story.mode", before=mode.name, after=message.mode.name)
             mode = message.mode
-        else:
-            who, text = _told(entry)
-            if text and text not in said[-LATELY:]:
-                said.append(text)
-                yield entry.arrival, _cut(f"{who}: {text}" if who else text)
+        elif (what := _told(entry)) is not None:
+            text = str(what.causes[0] if what.code in REPORTED else what)
+            if text not in told[-LATELY:]:
+                told.append(text)
+                yield entry.arrival, what
 
 
-def _told(entry: Entry) -> tuple[str, str]:
-    """Who says it, and what; the gateway says an event of the device in its log too, and the end of a goal."""
+def _told(entry: Entry) -> Reason | None:
+    """What happened; the gateway reports an event of the device in its log too, and the end of a goal."""
     key, message = entry.topic.key, entry.message
     if key.startswith(EXCHANGES):
-        return "", _exchange(key.removeprefix(EXCHANGES), message)
+        return _exchange(key.removeprefix(EXCHANGES), message)
     if key in ENDS:
-        return "", _end(message)
+        return _end(message)
     match message:
         case DeviceEvent():
-            return "device", message.event + (f": {message.detail}" if message.detail else "")
+            return because("story.device", _event(message))
         case LogRecord() if message.level >= LogLevel.WARNING and not message.text.startswith(TOLD_ELSEWHERE):
-            return message.node, message.text
+            return because("story.node", plain(one_line(message.text)), node=message.node)
         case ParameterChange():
-            return message.node, f"{message.parameter.name} = {message.parameter.value}"
-    return "", ""
+            parameter = message.parameter
+            change = because("story.parameter", parameter=parameter.name, value=parameter.value)
+            return because("story.node", change, node=message.node)
+    return None
 
 
-def _exchange(key: str, exchange: Any) -> str:
-    """A question and its answer; of a goal that was accepted its id, by which its end names it."""
+def _event(event: DeviceEvent) -> Reason:
+    detail = reason_of(event.detail, event.why)
+    if detail is None:
+        return because("story.event", event=event.event)
+    return because("story.event.detail", detail, event=event.event)
+
+
+def _exchange(key: str, exchange: Any) -> Reason | None:
+    """A request and its answer; of a goal that was accepted its id, by which its end names it."""
     if key in QUIET:
-        return ""
+        return None
     question, answer = exchange.question, exchange.answer
-    asked = f"{key}: {_cut(brief(question), LONGEST_QUESTION)}"
     if exchange.failure is not None:
-        return f"{asked}: {exchange.failure.message}"
-    if key in GOALS and question is not None:
-        what = f"goal {question.goal_id[:8]} for {key.removesuffix('/goal')}"
-        return f"{what} accepted" if answer.accepted else f"{what} refused: {answer.reason}"
-    return f"{asked}: {_answer(answer)}"
+        answered = reason_of(exchange.failure.message, exchange.failure.why) or because("ended.unexplained")
+    elif key in GOALS and question is not None:
+        goal, action = question.goal_id[:SHORT], key.removesuffix("/goal")
+        if answer.accepted:
+            return because("story.goal.accepted", goal=goal, action=action)
+        return because("story.goal.refused", _why_not(answer), goal=goal, action=action)
+    else:
+        answered = _answer(answer)
+    return because("story.request", answered, request=key, question=one_line(brief(question), LONGEST_QUESTION))
 
 
-def _answer(answer: Any) -> str:
+def _answer(answer: Any) -> Reason:
     if isinstance(answer, PlanResponse):
-        return f"refused: {answer.refusal.message}" if answer.refusal else f"planned, {answer.duration:.2f} s"
+        if answer.refusal:
+            return because("story.refused", _of_refusal(answer.refusal))
+        return because("story.planned", duration=answer.duration)
     accepted = getattr(answer, "accepted", None)
     if accepted is None:
-        return brief(answer)
-    return "accepted" if accepted else f"refused: {getattr(answer, 'reason', '') or 'no reason was given'}"
+        return plain(one_line(brief(answer)))
+    return because("story.accepted") if accepted else because("story.refused", _why_not(answer))
 
 
-def _end(end: Any) -> str:
-    reason = getattr(end.result, "error_string", "")
-    status = GoalStatusCode(end.status).name.lower()
-    return f"goal {end.goal_id[:8]} {status}" + (f": {reason}" if reason else "")
+def _why_not(answer: Any) -> Reason:
+    """Of an answer that is no."""
+    found = reason_of(getattr(answer, "reason", ""), getattr(answer, "why", None))
+    return found or because("ended.unexplained")
+
+
+def _of_refusal(refusal: Refusal) -> Reason:
+    """Of a plan, without what would do."""
+    return replace(refusal.why, remedies=()) if refusal.why is not None else plain(refusal.message)
+
+
+def _end(end: Any) -> Reason:
+    goal, status = end.goal_id[:SHORT], GoalStatusCode(end.status).name
+    why = why_of_end(end)
+    if why is None:
+        return because("story.goal.ended", goal=goal, status=status)
+    return because("story.goal.ended.why", why, goal=goal, status=status)
 
 
 def brief(value: object) -> str:
@@ -140,83 +167,17 @@ def brief(value: object) -> str:
     return str(value)
 
 
-def _motion(before: Sequence[Entry], stamp: int) -> str:
-    """In what goal it happened; empty where none was under way."""
+def _in_goal(trigger: Trigger, before: Sequence[Entry]) -> Reason:
+    """What happened, and in what goal, where one was under way."""
     begun: dict[str, int] = {}
     for entry in before:
         message: Any = entry.message
         if entry.topic.key == EXCHANGES + GOALS[0] and message.answer is not None and message.answer.accepted:
             begun[message.question.goal_id] = entry.arrival
-        elif entry.topic.key == ENDS[0] and entry.arrival < stamp:  # one that ends now is what this is about
+        elif entry.topic.key == ENDS[0] and entry.arrival < trigger.stamp:  # one that ends now is what this is about
             begun.pop(message.goal_id, None)
     if not begun:
-        return ""
+        return trigger.what
     goal, since = next(reversed(begun.items()))
-    return f"{(stamp - since) / SECOND:.2f} s into goal {goal[:8]}"
-
-
-def _margins(before: Sequence[Entry], joint: str) -> Iterator[str]:
-    """A sentence on the joint concerned or the fastest one, and one each on steps, tool and queue."""
-    newest: dict[type[Message], Any] = {}
-    for entry in before:
-        is_other = isinstance(entry.message, JointState) and entry.topic.key != JOINT_STATES.key
-        is_after = isinstance(entry.message, DeviceState) and entry.message.mode in STOPPED
-        if not is_other and not is_after:
-            newest[type(entry.message)] = entry.message
-    limits = _limits(newest.get(RobotDescription))
-    if JointState in newest:
-        yield from _joint_margin(newest[JointState], limits, joint)
-    if StepErrors in newest and newest[StepErrors].error:
-        errors: StepErrors = newest[StepErrors]
-        worst, name = max((abs(error), name) for error, name in zip(errors.error, errors.name, strict=False))
-        yield f"largest step error {worst:.2f} steps, of {name}"
-    if StepLedger in newest and newest[StepLedger].name:
-        ledger: StepLedger = newest[StepLedger]
-        why = ledger.reason or (f"least of {ledger.doubtful}" if ledger.doubtful else "")
-        sure = f"{ledger.arm_confidence:.1%} sure that no step was lost".replace("%", " %")
-        yield _cut(f"{sure}, {why}" if why else sure)
-    if StoppingDistance in newest and newest[StoppingDistance].is_known:
-        stopping: StoppingDistance = newest[StoppingDistance]
-        yield f"the tool would have gone {1e3 * stopping.distance:.0f} mm further in {stopping.duration:.2f} s"
-    if DeviceState in newest:
-        state: DeviceState = newest[DeviceState]
-        yield f"{state.buffered:.2f} s of the path in the device's queue, round trip {1e3 * state.round_trip:.1f} ms"
-
-
-def _joint_margin(state: JointState, limits: dict[str, UrdfJoint], joint: str) -> Iterator[str]:
-    speeds = dict(zip(state.name, state.velocity, strict=False))
-    values = dict(zip(state.name, state.position, strict=False))
-    shares = {
-        name: abs(speed) / limits[name].limit.velocity  # type: ignore[union-attr]
-        for name, speed in speeds.items() if name in limits
-    }  # fmt: skip
-    fastest = max(shares, key=lambda name: shares[name], default="")
-    chosen = joint if joint in values else fastest
-    if chosen not in values or chosen not in limits:
-        return
-    drive = limits[chosen]
-    limit = drive.limit
-    assert limit is not None  # `_limits` takes no other
-    factor, unit = (1e3, "mm") if drive.kind is JointKind.PRISMATIC else (math.degrees(1.0), "deg")
-    value, speed = values[chosen], speeds.get(chosen, 0.0)
-    how = f"at {shares.get(chosen, 0.0):.0%} of its top speed".replace("%", " %") if abs(speed) > MOVING else "at rest"
-    text = f"{chosen} at {factor * value:.1f} {unit}, {how}"
-    if drive.kind is not JointKind.CONTINUOUS:
-        text += f", {factor * min(value - limit.lower, limit.upper - value):.1f} {unit} from its nearer limit"
-    yield text
-
-
-def _limits(description: RobotDescription | None) -> dict[str, UrdfJoint]:
-    """The joints of the URDF that have a limit of speed."""
-    if description is None:
-        return {}
-    try:
-        model, _ = urdf_of(description.urdf)
-    except DescriptionError:
-        return {}
-    return {each.name: each for each in model.joints if each.limit is not None and each.limit.velocity > 0.0}
-
-
-def _cut(text: str, longest: int = LONGEST) -> str:
-    line = " ".join(text.split())
-    return line if len(line) <= longest else line[: longest - 4] + " ..."
+    elapsed = (trigger.stamp - since) / SECOND
+    return because("incident.in_goal", trigger.what, elapsed=elapsed, goal=goal[:SHORT])

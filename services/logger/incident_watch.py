@@ -9,8 +9,9 @@ from gemelo.libraries.recordings.incidents import IncidentKind
 from gemelo.libraries.runtime.actions import keys
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.device import DeviceEvent, DeviceFault, DeviceMode, DeviceState
-from gemelo.schemas.device_faults import fault_text
+from gemelo.schemas.device_faults import fault_reason
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.roles import SERVICES
 from gemelo.schemas.system import NodeStatistics
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, Topic
@@ -19,6 +20,7 @@ STOPPED = (DeviceMode.FAULT, DeviceMode.ESTOP)
 ENDED = keys.ended_topic(FOLLOW_JOINT_TRAJECTORY).key
 SILENT_AFTER = 4_000_000_000  # [ns] without statistics, which come every second
 HEARD_LATELY = 2_000_000_000  # [ns] in which another node must have spoken: else it is we who did not listen
+SHORT = 8  # letters of a goal's id, by which a person knows it
 LONG_AGO = 30_000_000_000  # [ns] a start of before that was by another clock than ours
 WATCHED = frozenset(SERVICES) - {"logger"}  # whose own statistics are heard whatever has happened to all others
 
@@ -29,7 +31,7 @@ class Trigger:
 
     kind: IncidentKind
     stamp: int
-    what: str  # one clause for a person
+    what: Reason  # one clause for a person
     joint: str = ""  # whose fault it is, where that is known
 
 
@@ -51,10 +53,9 @@ class IncidentWatch:
             case DeviceState():
                 return self._on_state(message, now)
             case DeviceEvent(event="rebooted"):
-                return Trigger(IncidentKind.REBOOT, now, f"the device has rebooted: {message.detail}")
+                return Trigger(IncidentKind.REBOOT, now, because("incident.rebooted", _detail(message)))
             case DeviceEvent(event="disconnected"):
-                what = f"stepper_gateway has lost its link to the device: {message.detail}"
-                self._unlinked = Trigger(IncidentKind.LOST, now, what)
+                self._unlinked = Trigger(IncidentKind.LOST, now, because("incident.unlinked", _detail(message)))
             case DeviceEvent(event="connected"):
                 return self._take_unlinked()
             case NodeStatistics(node=node) if node != "logger":
@@ -72,7 +73,7 @@ class IncidentWatch:
         before, since, self._router, self._routed = self._router, self._routed, router, now
         if before in ("", router):
             return None
-        what = f"the router had ended, and was started again: nothing was heard for up to {(now - since) / 1e9:.1f} s"
+        what = because("incident.router", silence=(now - since) / 1e9)
         return Trigger(IncidentKind.LOST, max(since, now - LONG_AGO), what)
 
     def step(self, now: int) -> Trigger | None:
@@ -84,8 +85,7 @@ class IncidentWatch:
         for node, heard in self._heard.items():
             if now - heard > SILENT_AFTER:
                 del self._heard[node]
-                seconds = (now - heard) / 1e9
-                what = f"{node} has not been heard for {seconds:.1f} s: it has ended, hangs, or its host is cut off"
+                what = because("incident.silent", node=node, silence=(now - heard) / 1e9)
                 return Trigger(IncidentKind.LOST, now, what)
         return None
 
@@ -108,17 +108,16 @@ class IncidentWatch:
         before, self._started[node] = self._started.get(node), started
         if not was_heard or before == started:  # a silence that was told already is no second incident
             return None
-        return Trigger(
-            IncidentKind.LOST, min(max(started, now - LONG_AGO), now), f"{node} had ended, and was started again"
-        )
+        stamp = min(max(started, now - LONG_AGO), now)
+        return Trigger(IncidentKind.LOST, stamp, because("incident.restarted", node=node))
 
     def _on_state(self, state: DeviceState, now: int) -> Trigger | None:
         before, self._mode = self._mode, state.mode
         if before is None or before in STOPPED or state.mode not in STOPPED:
             return None
         if state.mode is DeviceMode.ESTOP or state.fault == DeviceFault.EMERGENCY_STOP:
-            return Trigger(IncidentKind.EMERGENCY_STOP, now, "emergency stop")
-        what = fault_text(state.fault, state.fault_joint) or "the device is in FAULT"
+            return Trigger(IncidentKind.EMERGENCY_STOP, now, because("incident.emergency_stop"))
+        what = fault_reason(state.fault, state.fault_joint) or because("incident.fault")
         return Trigger(IncidentKind.FAULT, now, what, state.fault_joint)
 
 
@@ -126,5 +125,19 @@ def _on_ended(end: Any, now: int) -> Trigger | None:
     """`end` is a `GoalEnd` with a typed result; one that was cancelled, or made room for another, is no incident."""
     if end.status is not GoalStatusCode.ABORTED:
         return None
-    reason = getattr(end.result, "error_string", "") or "no reason was given"
-    return Trigger(IncidentKind.ABORT, now, f"goal {end.goal_id[:8]} was aborted: {reason}")
+    why = why_of_end(end) or because("ended.unexplained")
+    return Trigger(IncidentKind.ABORT, now, because("incident.aborted", why, goal=end.goal_id[:SHORT]))
+
+
+def why_of_end(end: Any) -> Reason | None:
+    """Of a `GoalEnd` with a typed result; None where it does not say why."""
+    return reason_of(getattr(end.result, "error_string", ""), getattr(end.result, "why", None))
+
+
+def reason_of(text: str, why: Reason | None) -> Reason | None:
+    """`why`; the sentence alone, as an older program sends it; None where there is neither."""
+    return why or (plain(text) if text else None)
+
+
+def _detail(event: DeviceEvent) -> Reason:
+    return event.why or plain(event.detail)

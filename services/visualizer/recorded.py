@@ -21,7 +21,7 @@ import rerun as rr
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.recordings.foxglove import CAMERA, IMAGE
-from gemelo.libraries.recordings.incidents import Incident, incident_in
+from gemelo.libraries.recordings.incidents import Incident, in_language, incident_in
 from gemelo.libraries.recordings.reader import BadRecording, RecordingReader, Row
 from gemelo.libraries.recordings.shadow import recorded_robot, shadow_folder, write_shadow
 from gemelo.libraries.recordings.view_layout import LAYOUT, ViewLayout
@@ -31,6 +31,7 @@ from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.camera import CameraImage
 from gemelo.schemas.deployment import ViewerMode
 from gemelo.schemas.frames import RobotDescription
+from gemelo.schemas.reasons.catalogue import ENGLISH, languages
 from gemelo.schemas.scene import MeshShape, PlanningScene, SceneMesh
 from gemelo.schemas.scene_meshes import with_meshes
 from gemelo.schemas.topics import DESCRIPTION, SCENE
@@ -50,10 +51,11 @@ BATCH = 100_000_000  # [ns] of the recording that are drawn together, as live
 PERIOD = 0.5  # [s] between two looks at the viewer
 
 
-def write_view(file: Path, rrd: Path, shadow: Path) -> Incident | None:
+def write_view(file: Path, rrd: Path, shadow: Path, language: str = ENGLISH) -> Incident | None:
     """Writes the recording `file` as the view `rrd`; returns the incident, if it is a black box.
 
-    The robot's files as they were recorded are written to the folder `shadow`. Raises `BadRecording` or OSError.
+    Its story stands beside it in `language`. The robot's files as they were recorded are written to the folder
+    `shadow`. Raises `BadRecording` or OSError.
     """
     reader = RecordingReader(file)
     robot = recorded_robot(reader)
@@ -72,7 +74,7 @@ def write_view(file: Path, rrd: Path, shadow: Path) -> Incident | None:
     rrd.parent.mkdir(parents=True, exist_ok=True)
     make_own(rrd)
     stream.save(rrd)
-    moment = None if incident is None else OpeningMoment(incident.stamp, story_text(incident))
+    moment = None if incident is None else OpeningMoment(incident.stamp, story_text(in_language(incident, language)))
     layout = blueprint(ArmLayout(core.model, chosen.window, chosen.trail, cameras), moment)
     sink = Sink(stream, core.model, shadow, layout, story="" if moment is None else moment.story)
     drawn = 0
@@ -185,6 +187,7 @@ def main() -> None:
     parser.add_argument("file", type=Path)
     parser.add_argument("--save", type=Path, metavar="FILE", help="write the view as an .rrd there, and open none")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="save a PNG of the view, and open none")
+    parser.add_argument("--lang", choices=languages(), default=ENGLISH, help="the language of the story")
     options = parser.parse_args()
     stopping = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
@@ -193,7 +196,7 @@ def main() -> None:
         deployment = load_started()
         out = project_root() / deployment.paths.out
         rrd = options.save or out / "views" / f"{options.file.stem}.rrd"
-        incident = write_view(options.file, rrd, shadow_folder(out, options.file.stem))
+        incident = write_view(options.file, rrd, shadow_folder(out, options.file.stem), options.lang)
         if options.picture is not None:
             print(save_screenshot(rrd, options.picture, at=None if incident is None else incident.stamp))
         if options.save is not None:

@@ -10,6 +10,7 @@ import pytest
 
 from gemelo.libraries.recordings.incidents import Happening, Incident, IncidentKind, is_saving, saving_mark
 from gemelo.libraries.recordings.mcap_file import McapFile
+from gemelo.schemas.reasons import because
 from gemelo.services.logger.black_box import SavingMark, write_black_box
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
@@ -56,6 +57,62 @@ def test_one_is_told_with_its_margins_and_its_story(two, capsys):
     (older, _) = sorted(two.glob("*.mcap"))
     assert run(["blackbox", "show", str(older), "--json"]) is ExitCode.OK
     assert json.loads(capsys.readouterr().out)["kind"] == "fault"
+
+
+@pytest.fixture
+def reasoned(out: Path) -> Path:
+    """One whose sentences are those of reasons."""
+    why = because(
+        "incident.at",
+        because("incident.in_goal", because("incident.emergency_stop"), elapsed=2.5, goal="4a682f77"),
+        time="2026-11-18 11:06:43.500 UTC",
+    )
+    mode, still = because("story.mode", before="IDLE", after="ESTOP"), because("incident.at_rest")
+    margin = because("incident.joint", still, joint="brazo_joint", position=0.5, unit="rad")
+    incident = Incident(
+        stamp=START, kind=IncidentKind.EMERGENCY_STOP, sentence=str(why), margins=(str(margin),), why=why,
+        story=(Happening(at=-1.5, text=str(mode), why=mode),), margins_why=(margin,),
+    )  # fmt: skip
+    return write_black_box(out / "blackbox", "rm1", {}, incident, ())
+
+
+def test_a_story_is_in_the_language_of_the_command_line(reasoned, capsys):
+    assert run(["blackbox", "show"]) is ExitCode.OK
+    assert capsys.readouterr().out.splitlines() == [
+        "2026-11-18 11:06:43.500 UTC: emergency stop, 2.50 s into goal 4a682f77",
+        "  brazo_joint at 28.6 deg, at rest", "   -1.50 s  device: IDLE -> ESTOP",
+    ]  # fmt: skip
+    assert run(["--lang", "es", "blackbox", "show"]) is ExitCode.OK
+    assert capsys.readouterr().out.splitlines() == [
+        "2026-11-18 11:06:43.500 UTC: parada de emergencia, a los 2.50 s del movimiento 4a682f77",
+        "  brazo_joint en 28.6 deg, quieta", "   -1.50 s  equipo: en reposo -> en parada de emergencia",
+    ]  # fmt: skip
+    assert run(["--lang", "es", "blackbox", "list"]) is ExitCode.OK
+    row = capsys.readouterr().out.splitlines()[1]
+    assert row.count("parada de emergencia") == 2
+    assert "emergency" not in row
+
+
+def test_the_json_of_a_story_has_the_english_and_its_reasons_in_every_language(reasoned, capsys):
+    said = []
+    for chosen in ("en", "es"):
+        assert run(["--lang", chosen, "blackbox", "show", "--json"]) is ExitCode.OK
+        said.append(json.loads(capsys.readouterr().out))
+    assert said[0] == said[1]
+    assert said[0]["sentence"] == "2026-11-18 11:06:43.500 UTC: emergency stop, 2.50 s into goal 4a682f77"
+    assert said[0]["margins_why"][0]["values"] == {"joint": "brazo_joint", "position": 0.5, "unit": "rad"}
+    assert said[0]["story"][0]["why"]["code"] == "story.mode"
+
+
+def test_a_file_without_reasons_is_read_in_english_in_every_language(two, capsys):
+    shown = []
+    for chosen in ("en", "es"):
+        assert run(["--lang", chosen, "blackbox", "show"]) is ExitCode.OK
+        shown.append(capsys.readouterr().out)
+    assert shown[0] == shown[1]
+    assert "brazo_joint at rest" in shown[0]
+    assert run(["--lang", "es", "blackbox", "list"]) is ExitCode.OK
+    assert "number 1" in capsys.readouterr().out
 
 
 def test_nothing_has_happened_yet(out, capsys):

@@ -12,7 +12,15 @@ from msgspec import Raw
 from msgspec.structs import replace
 
 from gemelo.libraries.arm.model.description import load_arm
-from gemelo.libraries.recordings.incidents import Incident, IncidentKind, black_boxes, read_incident
+from gemelo.libraries.recordings.incidents import (
+    LONGEST,
+    Incident,
+    IncidentKind,
+    black_boxes,
+    in_language,
+    one_line,
+    read_incident,
+)
 from gemelo.libraries.recordings.reader import BadRecording
 from gemelo.libraries.recordings.table import action_topics, exchanges_of, goal_request_of
 from gemelo.schemas.actions import GoalResponse, GoalStatusCode
@@ -31,6 +39,7 @@ from gemelo.schemas.ledger import StepLedger, StoppingDistance
 from gemelo.schemas.message import Message
 from gemelo.schemas.motion import FollowErrorCode, FollowJointTrajectoryResult
 from gemelo.schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Refusal
+from gemelo.schemas.reasons import Reason, because, plain, remedy
 from gemelo.schemas.roles import SERVICES
 from gemelo.schemas.system import (
     Failure,
@@ -58,7 +67,8 @@ from gemelo.schemas.topics import (
     STOPPING_DISTANCE,
 )
 from gemelo.services.logger.black_box import MOST, MOST_BYTES, BlackBox, BlackBoxWriter
-from gemelo.services.logger.incident_story import LONGEST, brief
+from gemelo.services.logger.incident_story import brief
+from gemelo.services.planner.request.refusals import refusal_of
 from gemelo.services.state_publisher.main import describe
 
 SECOND = 1_000_000_000
@@ -66,6 +76,13 @@ START = 1_795_000_000 * SECOND
 ROOT = Path(__file__).parents[2]
 ENDED = action_topics(FOLLOW_JOINT_TRAJECTORY)[3]
 GOAL = exchanges_of(goal_request_of(FOLLOW_JOINT_TRAJECTORY))
+
+
+def require_one_sentence(incident: Incident) -> None:
+    """The English sentences are those of the reasons beside them."""
+    assert incident.sentence == str(incident.why)
+    assert incident.margins == tuple(one_line(str(why)) for why in incident.margins_why)
+    assert [each.text for each in incident.story] == [one_line(str(each.why)) for each in incident.story]
 
 
 class Rig:
@@ -90,19 +107,22 @@ class Rig:
         while self.now < end:
             self.now = min(self.now + SECOND // 2, end)
             told = self.box.step(self.now, self.router)
-            self.saved += [told] if told else []
+            if told is not None:
+                require_one_sentence(told[0])
+                self.saved.append(told)
 
     def exchange(self, request, question, answer, **fields) -> None:
         topic = exchanges_of(request)
         self.say(topic, topic.message(question=question, answer=answer, **fields))
 
-    def goal(self, goal_id: str, accepted: bool = True) -> None:
+    def goal(self, goal_id: str, accepted: bool = True, why: Reason | None = None) -> None:
         question = GOAL.message.__annotations__["question"].__args__[0](goal_id=goal_id)
-        reason = "" if accepted else "the device is not referenced"
-        self.say(GOAL, GOAL.message(question=question, answer=GoalResponse(accepted=accepted, reason=reason)))
+        reason = "" if accepted else str(why or "the device is not referenced")
+        answer = GoalResponse(accepted=accepted, reason=reason, why=why)
+        self.say(GOAL, GOAL.message(question=question, answer=answer))
 
-    def end(self, goal_id: str, status: GoalStatusCode, reason: str = "") -> None:
-        result = FollowJointTrajectoryResult(error_code=FollowErrorCode.DEVICE_FAILED, error_string=reason)
+    def end(self, goal_id: str, status: GoalStatusCode, reason: str = "", why: Reason | None = None) -> None:
+        result = FollowJointTrajectoryResult(error_code=FollowErrorCode.DEVICE_FAILED, error_string=reason, why=why)
         self.say(ENDED, ENDED.message(goal_id=goal_id, status=status, result=result))
 
     @property
@@ -120,7 +140,8 @@ def rig() -> Rig:
     return Rig()
 
 
-def test_an_emergency_stop_in_the_middle_of_a_goal_is_told_with_what_led_to_it_and_what_followed(rig):
+def stop_in_a_goal(rig: Rig) -> Incident:
+    """An emergency stop in the middle of a goal."""
     rig.say(DESCRIPTION, describe(load_arm(ROOT / "urdf/rm1")))
     rig.state(DeviceMode.IDLE)
     rig.exchange(
@@ -146,7 +167,11 @@ def test_an_emergency_stop_in_the_middle_of_a_goal_is_told_with_what_led_to_it_a
     rig.end("4a682f77aa", GoalStatusCode.ABORTED, "the device went into ESTOP")
     assert not rig.saved
     rig.wait(3.0)
-    incident = rig.incident
+    return rig.incident
+
+
+def test_an_emergency_stop_in_the_middle_of_a_goal_is_told_with_what_led_to_it_and_what_followed(rig):
+    incident = stop_in_a_goal(rig)
     assert incident.kind is IncidentKind.EMERGENCY_STOP
     assert incident.stamp == START + int(3.5 * SECOND)
     assert incident.sentence == "2026-11-18 11:06:43.500 UTC: emergency stop, 2.50 s into goal 4a682f77"
@@ -165,6 +190,89 @@ def test_an_emergency_stop_in_the_middle_of_a_goal_is_told_with_what_led_to_it_a
         "the tool would have gone 12 mm further in 0.40 s",
         "0.31 s of the path in the device's queue, round trip 4.0 ms",
     )
+
+
+def test_a_story_is_data_with_the_values_of_what_happened(rig):
+    incident = stop_in_a_goal(rig)
+    assert incident.why == because(
+        "incident.at",
+        because("incident.in_goal", because("incident.emergency_stop"), elapsed=2.5, goal="4a682f77"),
+        time="2026-11-18 11:06:43.500 UTC",
+    )
+    goal, asked = "4a682f77", "goal named (name left)"
+    assert [each.why for each in incident.story] == [
+        because("story.request", because("story.planned", duration=4.1), request="plan", question=asked),
+        because("story.goal.accepted", goal=goal, action="follow_joint_trajectory"),
+        because("story.mode", before="IDLE", after="RUN"),
+        because("story.request", because("story.accepted"), request="device/inject", question="kind estop, value 1"),
+        because("story.mode", before="RUN", after="ESTOP"),
+        because("story.goal.ended.why", plain("the device went into ESTOP"), goal=goal, status="ABORTED"),
+    ]  # fmt: skip
+    limit = next(joint for joint in load_arm(ROOT / "urdf/rm1").joints if joint.name == "brazo_joint")
+    joint, *others = incident.margins_why
+    assert joint.values == {"joint": "brazo_joint", "position": 0.5, "unit": "rad", "room": limit.upper - 0.5}
+    assert [each.code for each in (joint, *joint.causes)] == ["incident.joint.limited", "incident.speed"]
+    assert others == [
+        because("incident.step_error", error=1.75, joint="antebrazo_joint"),
+        because("incident.sure.least", confidence=0.994, joint="antebrazo_joint"),
+        because("incident.further", distance=0.012, duration=0.4),
+        because("incident.queue", buffered=0.31, round_trip=0.004),
+    ]
+
+
+def test_a_story_is_read_in_spanish(rig):
+    incident = in_language(stop_in_a_goal(rig), "es")
+    assert incident.sentence == (
+        "2026-11-18 11:06:43.500 UTC: parada de emergencia, a los 2.50 s del movimiento 4a682f77"
+    )
+    assert [each.text for each in incident.story] == [
+        "plan: goal named (name left): planificado, 4.10 s",
+        "movimiento 4a682f77 de follow_joint_trajectory aceptado",
+        "equipo: en reposo -> en movimiento",
+        "device/inject: kind estop, value 1: aceptado",
+        "equipo: en movimiento -> en parada de emergencia",
+        "el movimiento 4a682f77 terminó (antes de su meta): the device went into ESTOP",
+    ]
+    assert incident.margins[0].startswith("brazo_joint en 28.6 deg, al ")
+    assert incident.margins[0].endswith(" deg de su límite más cercano")
+    assert incident.margins[1:] == (
+        "el mayor error de pasos: 1.75, de antebrazo_joint",
+        "99.4 % de certeza de que no se perdió ningún paso; la menor, la de antebrazo_joint",
+        "la herramienta habría avanzado aún 12 mm en 0.40 s",
+        "0.31 s de trayectoria en la cola del equipo; ida y vuelta 4.0 ms",
+    )
+
+
+def test_the_reasons_of_others_stand_in_a_story_as_they_were_sent(rig):
+    beyond = because(
+        "goal.limit.position", remedy("stay_within", lower=-2.0, upper=2.0, unit="rad"),
+        joint="brazo_joint", value=3.0, limit=2.0, side="upper", unit="rad",
+    )  # fmt: skip
+    refusal = refusal_of(beyond, "joint limit")
+    rig.exchange(PLAN, PlanRequest(goal=NamedGoal(name="left")), PlanResponse(refusal=refusal))
+    busy = because("ended.unexplained")
+    rig.exchange(PLAN, PlanRequest(), None, failure=Failure(message=str(busy), why=busy))
+    rig.goal("123456789", accepted=False, why=beyond)
+    silent = because("device.silent", device="rm1", time=2.0)
+    rig.say(DEVICE_EVENTS, DeviceEvent(event="sensors_silent", detail=str(silent), why=silent))
+    rig.say(LOG, LogRecord(node="planner", level=LogLevel.WARNING, text="out of memory"))
+    rig.say(PARAMETER_CHANGES, ParameterChange(node="planner", parameter=Parameter(name="attempts", value=3)))
+    rig.say(STEP_LEDGER, StepLedger(name=("brazo_joint",), reason=str(silent), why=silent))
+    rig.end("4a682f77aa", GoalStatusCode.ABORTED, str(beyond), beyond)
+    rig.wait(5.0)
+    assert rig.incident.why.causes == (because("incident.aborted", beyond, goal="4a682f77"),)
+    assert rig.incident.margins_why == (because("incident.sure.because", silent, confidence=0.0),)
+    refused = because("story.refused", replace(beyond, remedies=()))
+    assert [each.why for each in rig.incident.story] == [
+        because("story.request", refused, request="plan", question="goal named (name left)"),
+        because("story.request", busy, request="plan", question=""),
+        because("story.goal.refused", beyond, goal="12345678", action="follow_joint_trajectory"),
+        because("story.device", because("story.event.detail", silent, event="sensors_silent")),
+        because("story.node", plain("out of memory"), node="planner"),
+        because("story.node", because("story.parameter", parameter="attempts", value=3), node="planner"),
+        because("story.goal.ended.why", beyond, goal="4a682f77", status="ABORTED"),
+    ]  # fmt: skip
+    assert rig.story[0] == f"plan: goal named (name left): refused: {refusal.message}"
 
 
 def test_a_device_that_was_stopped_before_the_logger_heard_it_is_no_incident(rig):

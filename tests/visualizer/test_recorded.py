@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.recordings.channels import Entry
@@ -17,6 +18,7 @@ from gemelo.libraries.recordings.view_layout import ViewLayout, layout_metadata
 from gemelo.schemas.device import DeviceMode, DeviceState
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.message import Message
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import DESCRIPTION, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS, Delivery, Topic
 from gemelo.services.state_publisher.main import describe
 from gemelo.services.visualizer.content import entities
@@ -114,6 +116,16 @@ def test_the_story_is_a_table_that_no_text_breaks():
     assert story_text(INCIDENT).splitlines() == [
         "### it stopped", "", "- brazo_joint at rest", "", "| | |", "|--:|:--|", "| -0.50 s | a \\| b |",
     ]  # fmt: skip
+
+
+def test_the_story_beside_the_view_is_in_its_language(tmp_path):
+    why = because("incident.at", because("incident.emergency_stop"), time="2026-11-18 11:06:43.500 UTC")
+    incident = replace(INCIDENT, sentence=str(why), why=why, margins=(), story=())
+    file = recording(tmp_path / "box.mcap", *moving("rm1"), incident=incident)
+    write_view(file, tmp_path / "view.rrd", tmp_path / "shadow", "es")
+    text = printed(tmp_path / "view.rrd", "-vvv")
+    assert "parada de emergencia" in text
+    assert "emergency stop" not in text
 
 
 def test_a_recording_of_no_robot_is_said(tmp_path):

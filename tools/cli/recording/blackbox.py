@@ -14,6 +14,7 @@ from gemelo.libraries.recordings.incidents import (
     BlackBoxFile,
     Incident,
     black_boxes,
+    in_language,
     is_saving,
     read_incident,
     time_of,
@@ -21,7 +22,7 @@ from gemelo.libraries.recordings.incidents import (
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
-from gemelo.tools.cli.common.language import columns, sentence
+from gemelo.tools.cli.common.language import columns, language, sentence, word
 from gemelo.tools.cli.common.session import load_robot
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options, Parser, json_option
@@ -44,7 +45,7 @@ def run_list(options: Options) -> ExitCode:
         print(sentence(saving or because("recording.black_box.none", folder=str(folder))))
     else:
         rows = [
-            (str(number), time_of(each.incident.stamp), str(each.incident.kind), _clause(each.incident))
+            (str(number), time_of(each.incident.stamp), word("incident", each.incident.kind), _clause(each.incident))
             for number, each in enumerate(found, 1)
         ]
         print(f"{table(columns('N', 'when', 'what', 'sentence'), rows)}\n")
@@ -80,15 +81,17 @@ def run_open(options: Options) -> ExitCode:
     print(story(incident), flush=True)
     wanted = {"--save": options.save, "--picture": options.picture}
     said = [text for name, value in wanted.items() if value is not None for text in (name, str(value))]
-    command = [sys.executable, "-m", "gemelo.services.visualizer.recorded", str(path), *said]
+    program = [sys.executable, "-m", "gemelo.services.visualizer.recorded"]
+    command = [*program, str(path), "--lang", language(), *said]
     os.execv(sys.executable, command)
 
 
 def story(incident: Incident) -> str:
-    """The incident as text."""
-    margins = [f"  {each}" for each in incident.margins]
-    lines = [f"{each.at:+8.2f} s  {each.text}" for each in incident.story]
-    return "\n".join([incident.sentence, *margins, *lines])
+    """The incident as text, in the language of this command line."""
+    worded = in_language(incident, language())
+    margins = [f"  {each}" for each in worded.margins]
+    lines = [f"{each.at:+8.2f} s  {each.text}" for each in worded.story]
+    return "\n".join([worded.sentence, *margins, *lines])
 
 
 def _which_option(parser: Parser) -> None:
@@ -119,5 +122,7 @@ def _found() -> tuple[Path, list[BlackBoxFile], Reason | None]:
 
 
 def _clause(incident: Incident) -> str:
-    """The sentence without its time."""
+    """What happened, without its time; an older file has the English sentence alone."""
+    if incident.why is not None:
+        return "; ".join(map(sentence, incident.why.causes))
     return incident.sentence.partition(" UTC: ")[2] or incident.sentence
