@@ -13,7 +13,6 @@ from gemelo.libraries.runtime.node_clock import NodeClock
 from gemelo.libraries.runtime.scene_meshes import SceneMeshes
 from gemelo.schemas.camera import CameraCondition, CameraImage
 from gemelo.schemas.cell import CameraRecord, FileSource, FolderSource, V4l2Source, VirtualSource
-from gemelo.schemas.reasons import plain
 from gemelo.schemas.topics import (
     GATEWAY,
     GRIPPER_STATE,
@@ -106,7 +105,7 @@ class _Camera:
         try:
             self._image.put(image)
         except TooLarge as error:
-            self._core.on_fault(fault_of(self._record.name, CameraCondition.REFUSED, plain(str(error))), now)
+            self._core.on_fault(fault_of(self._record.name, CameraCondition.REFUSED, error.reason), now)
 
     def _log(self) -> None:
         """A change of condition, once."""

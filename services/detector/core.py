@@ -29,7 +29,8 @@ from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import BoxThing, Colour, ColourThing, OnnxThing, TagRecord, TagThing
 from gemelo.schemas.detections import Detection, DetectionKind, Detections, Unclear
 from gemelo.schemas.frames import Transform
-from gemelo.schemas.reasons import Reason, because
+from gemelo.schemas.reasons import Reason, Value, because
+from gemelo.services.detector.images import NoPicture
 from gemelo.services.detector.regions import (
     DetectorView,
     distances_from,
@@ -69,12 +70,13 @@ class Detector:
     def look(self, image: ColourImage, info: CameraInfo, base_from_camera: Array | None, stamp: int) -> Detections:
         """Everything in `image` (h, w, 3; red first), taken at `stamp` [ns UNIX] from there.
 
-        ValueError where `info` is no camera's, or of another size than the image.
+        ValueError where `info` is no camera's, `NoPicture` where it is of another size than the image.
         """
         model, image = model_of(info), np.ascontiguousarray(image)
         if image.shape[:2] != (info.height, info.width):
-            size = f"{image.shape[1]} x {image.shape[0]}"
-            raise ValueError(f'camera "{info.name}": its image is {size}, not {info.width} x {info.height} pixels')
+            about: dict[str, Value] = {"wanted_width": info.width, "wanted_height": info.height}
+            height, width = image.shape[:2]
+            raise NoPicture(because("detect.image.size", camera=info.name, width=width, height=height, **about))
         known = self._cell.measured.get(info.name)
         error = known.mount.held_out if known is not None and known.mount is not None else 0.0
         view = DetectorView(image, model, base_from_camera, error)

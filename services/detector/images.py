@@ -7,9 +7,11 @@ import numpy as np
 
 from gemelo.libraries.vision.boxes import ColourImage
 from gemelo.schemas.camera import CameraImage
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import Value, because
 
 
-class NoPicture(ValueError):
+class NoPicture(ReasonedError, ValueError):
     """The message does not hold the picture that it says it holds."""
 
 
@@ -19,13 +21,14 @@ def decoded(image: CameraImage) -> ColourImage:
         case "jpeg":
             found = cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_COLOR_RGB) if image.data else None
             if found is None:
-                raise NoPicture(f"an image of {len(image.data)} bytes is no JPEG")
+                raise NoPicture(because("detect.image.jpeg", size=len(image.data)))
             return np.asarray(found, dtype=np.uint8)
         case "rgb8" | "mono8" as encoding:
             channels = 3 if encoding == "rgb8" else 1
             if len(image.data) != image.width * image.height * channels:
-                raise NoPicture(f"{len(image.data)} bytes are not {image.width} x {image.height} pixels of {encoding}")
+                about: dict[str, Value] = {"width": image.width, "height": image.height, "encoding": encoding}
+                raise NoPicture(because("detect.image.pixels", size=len(image.data), **about))
             pixels = np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, channels)
             return np.broadcast_to(pixels, (image.height, image.width, 3))
         case _:
-            raise NoPicture(f'the encoding "{image.encoding}" is none of jpeg, rgb8, mono8')
+            raise NoPicture(because("detect.image.encoding", encoding=image.encoding))

@@ -24,6 +24,7 @@ from gemelo.schemas.camera import CameraImage, CameraInfo
 from gemelo.schemas.cell import OnnxThing
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.joints import JointState
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import CAMERA, GATEWAY, JOINT_STATES, camera_detections, camera_image, camera_info
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def read_models(cell: Cell, warn: Callable[[str], object]) -> dict[Path, UserMod
                     found[path] = UserModel(path, thing.input)
                 found[path].number_of(thing.label)
             except BadModel as error:
-                warn(f'thing "{thing.name}" is not looked for: {error}')
+                warn(str(because("model.thing", error.reason, thing=thing.name)))
     return found
 
 

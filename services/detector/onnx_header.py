@@ -10,6 +10,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import because
+
 GRAPH, METADATA = 7, 14  # of ModelProto
 INITIALIZER, INPUT = 5, 11  # of GraphProto
 TENSOR_NAME = 8  # of TensorProto
@@ -21,7 +24,7 @@ VARINT, BYTES = 0, 2  # how a field is written: a number, or so many bytes
 Field = tuple[int, int, memoryview]  # its number, how it is written, and what it holds
 
 
-class NotOnnx(ValueError):
+class NotOnnx(ReasonedError, ValueError):
     """A file that is no such message."""
 
 
@@ -43,7 +46,7 @@ def read_header(path: Path) -> Header:
         elif number == METADATA and _text(_of(content, ENTRY_KEY)) == NAMES:
             names = _class_names(_text(_of(content, ENTRY_VALUE)))
     if not sizes:
-        raise NotOnnx("it has no graph with an input")
+        raise NotOnnx(because("model.onnx.no_input"))
     return Header(sizes, names)
 
 
@@ -108,9 +111,9 @@ def _fields(message: memoryview) -> Iterator[Field]:
             case 5:
                 at = start + 4
             case how:
-                raise NotOnnx(f"a field is written in way {how}, which protobuf does not have")
+                raise NotOnnx(because("model.onnx.field", way=how))
         if at > len(message):
-            raise NotOnnx("it ends within a field")
+            raise NotOnnx(because("model.onnx.cut.field"))
         yield key >> 3, key & 7, message[start:at]
 
 
@@ -119,9 +122,9 @@ def _number(message: memoryview, at: int) -> tuple[int, int]:
     value = 0
     for shift in range(0, 70, 7):
         if at >= len(message):
-            raise NotOnnx("it ends within a number")
+            raise NotOnnx(because("model.onnx.cut.number"))
         byte = message[at]
         value, at = value | (byte & 127) << shift, at + 1
         if byte < 128:
             return value, at
-    raise NotOnnx("a number is longer than 64 bits")
+    raise NotOnnx(because("model.onnx.long"))

@@ -18,6 +18,8 @@ from gemelo.libraries.vision.boxes import ColourImage, project_box, raised
 from gemelo.libraries.vision.camera_model import CameraModel
 from gemelo.libraries.vision.rigid import Array
 from gemelo.libraries.vision.tag_pose import flat, on_plane
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import Reason, Value, because, plain, remedy
 from gemelo.services.detector.onnx_header import Header, NotOnnx, read_header
 
 GREY = 114  # of the border around an image that is not square, as YOLO is trained
@@ -32,8 +34,8 @@ ROUNDS = 4
 NUDGE = 1e-5  # [m] for differences
 
 
-class BadModel(ValueError):
-    """A file that is no such model; one sentence with the remedy."""
+class BadModel(ReasonedError, ValueError):
+    """A file that is no such model; the reason has the remedy."""
 
 
 @dataclass(frozen=True)
@@ -65,23 +67,26 @@ class UserModel:
         try:
             self._net = cv2.dnn.readNetFromONNX(str(path))
         except cv2.error as error:
-            remedy = self._if_open() or f"{_first_line(error)}; export it with opset 12"
-            raise BadModel(f"{path} cannot be read by OpenCV: {remedy}") from error
+            why = self._if_open() or because("model.opencv", remedy("export_opset"), error=_first_line(error))
+            raise BadModel(because("model.unreadable", why, file=str(path))) from error
         self._require_shares(self._run(np.full((size, size, 3), GREY, dtype=np.uint8))[1])
 
     def number_of(self, label: int | str) -> int:
         """Of the class that is called or numbered so; raises `BadModel` where the model has none."""
-        known = ", ".join(f"{number} {name}" for number, name in sorted(self._names.items())[:MOST_NAMED])
+        file = str(self._path)
+        known = tuple(f"{number} {name}" for number, name in sorted(self._names.items())[:MOST_NAMED])
         if isinstance(label, str):
             found = [number for number, name in self._names.items() if name == label]
             if not self._names:
-                raise BadModel(f'{self._path} does not say the names of its classes: write the number for "{label}"')
+                raise BadModel(because("model.class.unnamed", remedy("write_number", label=label), file=file))
             if not found:
-                raise BadModel(f'{self._path} has no class "{label}"; it has {known}')
+                raise BadModel(because("model.class.name", file=file, label=label, classes=known))
             return found[0]
-        if (self._names and label not in self._names) or label >= self._classes > 0:
-            said = known or f"{self._classes}, counted from 0"
-            raise BadModel(f"{self._path} has no class {label}; it has {said}")
+        is_beyond = label >= self._classes > 0
+        if self._names and (is_beyond or label not in self._names):
+            raise BadModel(because("model.class.number", file=file, label=label, classes=known))
+        if is_beyond:
+            raise BadModel(because("model.class.beyond", file=file, label=label, count=self._classes))
         return label
 
     def look(self, image: ColourImage, threshold: float) -> list[Found]:
@@ -98,16 +103,16 @@ class UserModel:
             self._net.setInput(cv2.dnn.blobFromImage(square, 1.0 / 255.0))
             said = np.asarray(self._net.forward(), dtype=np.float64)
         except cv2.error as error:
-            remedy = self._if_open() or "write the size that it was exported with as `input` of the thing"
-            size = f"{self._path} does not take images of {self._size} x {self._size} pixels ({_first_line(error)})"
-            raise BadModel(f"{size}: {remedy}") from error
+            about: dict[str, Value] = {"file": str(self._path), "size": self._size, "error": _first_line(error)}
+            if (is_open := self._if_open()) is not None:
+                raise BadModel(because("model.size.open", is_open, **about)) from error
+            raise BadModel(because("model.size", remedy("write_exported_size"), **about)) from error
         sides, scores = self._boxes(said)
         return (sides + 0.5) / scale - 0.5, scores
 
-    def _if_open(self) -> str:
+    def _if_open(self) -> Reason | None:
         """Of many models that leave the size of their images open OpenCV cannot work out the shapes within."""
-        said = f"it leaves the size of its images open; export it for one, with `dynamic=False imgsz={self._size}`"
-        return said if self._is_open else ""
+        return because("model.open", remedy("export_one_size", size=self._size)) if self._is_open else None
 
     def _boxes(self, said: Array) -> tuple[Array, Array]:
         """(n, 4) sides [px of the square], and (n, classes) scores."""
@@ -122,26 +127,20 @@ class UserModel:
         if 5 < columns < rows:
             self._require_classes(columns - 5)
             return _sides(table[:, :4]), table[:, 5:] * table[:, 4:5]
-        raise BadModel(
-            f"{self._path} answers with numbers of shape {tuple(said.shape)}: a layout of YOLO is (1, 4 + classes, n), "
-            "(1, n, 5 + classes) or (1, n, 6)"
-        )
+        raise BadModel(because("model.layout", file=str(self._path), shape=str(tuple(said.shape))))
 
     def _require_classes(self, scores: int) -> None:
         """Models of outlines, poses and turned boxes say more numbers a box than they have classes."""
         self._classes = scores
         if self._names and len(self._names) != scores:
-            raise BadModel(
-                f"{self._path} says {scores} scores for each box and names {len(self._names)} classes: one that "
-                "detects is wanted, not one of outlines, poses or turned boxes"
-            )
+            why = because("model.task", file=str(self._path), scores=scores, classes=len(self._names))
+            raise BadModel(why)
 
     def _require_shares(self, scores: Array) -> None:
         if not np.isfinite(scores).all() or scores.min(initial=0.0) < -SLACK or scores.max(initial=0.0) > 1.0 + SLACK:
-            raise BadModel(
-                f"{self._path} answers with scores from {scores.min():.3g} to {scores.max():.3g}: those of YOLO are "
-                "from 0 to 1; export it with its last layer"
-            )
+            least, most = float(scores.min()), float(scores.max())
+            last = remedy("export_last_layer")
+            raise BadModel(because("model.scores", last, file=str(self._path), least=least, most=most))
 
 
 def _required_header(path: Path, size: int) -> Header:
@@ -149,22 +148,21 @@ def _required_header(path: Path, size: int) -> Header:
     try:
         header = read_header(path)
     except (OSError, NotOnnx) as error:
-        raise BadModel(f"{path} cannot be read by OpenCV: it is no ONNX file ({error})") from error
+        why = error.reason if isinstance(error, NotOnnx) else plain(str(error))
+        raise BadModel(because("model.unreadable", because("model.not_onnx", why), file=str(path))) from error
     if len(header.sizes) != 4:
-        raise BadModel(f"{path} takes an input of {len(header.sizes)} dimensions: (1, 3, height, width) is wanted")
+        raise BadModel(because("model.dimensions", file=str(path), count=len(header.sizes)))
     _, channels, height, width = header.sizes
     if channels not in (0, 3):
-        raise BadModel(f"{path} takes images of {channels} channels: 3 are wanted, red first")
+        raise BadModel(because("model.channels", file=str(path), channels=channels))
     edges = {height, width} - {0}
     if len(edges) > 1:
-        raise BadModel(
-            f"{path} takes images of {width} x {height} pixels: export it for square ones, with `imgsz={size}`"
-        )
+        square = remedy("export_square", size=size)
+        raise BadModel(because("model.not_square", square, file=str(path), width=width, height=height))
     if edges and edges != {size}:
         (edge,) = edges
-        raise BadModel(
-            f"{path} takes images of {edge} x {edge} pixels, not {size}: write `input = {edge}` in the thing"
-        )
+        write = remedy("write_input", size=edge)
+        raise BadModel(because("model.other_size", write, file=str(path), edge=edge, size=size))
     return header
 
 

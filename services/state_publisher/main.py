@@ -49,7 +49,7 @@ def run(node: Node, deployment: Deployment) -> None:
     try:
         node.publisher(DESCRIPTION).put(describe(arm))
     except TooLarge as error:
-        raise ConfigurationError(f"{arm.folder}: its files cannot be published: {error}") from error
+        raise ConfigurationError(because("message.robot", error.reason, folder=str(arm.folder))) from error
     node.publisher(STATIC_FRAMES).put(publisher.static_frames(node.now()))
 
     def on_joint_state(state: JointState) -> None:

@@ -19,9 +19,11 @@ from gemelo.schemas.camera import CameraInfo
 from gemelo.schemas.cell import BoxThing, Colour, ColourThing, VirtualSource
 from gemelo.schemas.detections import Detection, Detections
 from gemelo.schemas.joints import JointState
+from gemelo.schemas.reasons import because
 from gemelo.services.camera.virtual.virtual_camera import VirtualCamera, true_detections
 from gemelo.services.camera.virtual.world import CameraWorld
 from gemelo.services.detector.core import Detector
+from gemelo.services.detector.images import NoPicture
 
 ON_PLANE, OF_BOX = 0.1e-3, 0.5e-3  # [m]
 
@@ -232,8 +234,11 @@ def test_a_block_is_found_however_it_is_turned(rm1: ArmDescription, box: tuple[f
 
 def test_an_image_of_another_size_is_refused_with_both_sizes(rm1: ArmDescription) -> None:
     table = Table(rm1)
-    with pytest.raises(ValueError, match="its image is 320 x 240, not 640 x 480 pixels"):
+    with pytest.raises(NoPicture, match="its image is 320 x 240, not 640 x 480 pixels") as refused:
         table.look(cv2.resize(table.image(), (320, 240)))
+    assert refused.value.reason == because(
+        "detect.image.size", camera="overhead", width=320, height=240, wanted_width=640, wanted_height=480
+    )
 
 
 def test_a_camera_without_a_lens_is_refused(rm1: ArmDescription) -> None:

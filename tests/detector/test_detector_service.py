@@ -24,6 +24,7 @@ from gemelo.schemas.cell import VirtualSource
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.detections import Detections
 from gemelo.schemas.joints import JointState
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import JOINT_STATES, LOG, camera_detections, camera_image, camera_info
 from gemelo.services.camera.sources.source import encoded
@@ -136,10 +137,21 @@ def test_a_camera_on_a_link_is_where_the_link_was_when_it_took_the_image(arm: Ar
     assert places.base_from_camera(CameraInfo(name="new", parent=arm.base_frame), 0) is None  # never measured
 
 
-@pytest.mark.parametrize("image", [CameraImage(), CameraImage(encoding="bmp", data=b"x")])
-def test_what_is_no_image_is_refused(image: CameraImage) -> None:
-    with pytest.raises(NoPicture):
+@pytest.mark.parametrize(
+    ("image", "why"),
+    [
+        (CameraImage(), because("detect.image.jpeg", size=0)),
+        (CameraImage(encoding="bmp", data=b"x"), because("detect.image.encoding", encoding="bmp")),
+        (
+            CameraImage(encoding="mono8", width=2, height=2, data=b"x"),
+            because("detect.image.pixels", size=1, width=2, height=2, encoding="mono8"),
+        ),
+    ],
+)
+def test_what_is_no_image_is_refused(image: CameraImage, why: Reason) -> None:
+    with pytest.raises(NoPicture) as refused:
         decoded(image)
+    assert refused.value.reason == why
 
 
 def test_grey_and_coloured_rows_are_read() -> None:

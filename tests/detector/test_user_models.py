@@ -87,28 +87,42 @@ def test_what_is_no_model_is_named_and_the_others_are_looked_for(table: Table, t
     assert "cup" in names(table.look())
     assert "red_block" not in names(table.look())
     assert 'thing "red_block" is not looked for' in said[0]
+    with pytest.raises(BadModel) as refused:
+        UserModel(tmp_path / "bad.onnx", SIZE)
+    (why,) = refused.value.reason.causes
+    assert [why.code, *(each.code for each in why.causes)] == ["model.not_onnx", "model.onnx.field"]
     assert "cannot be read by OpenCV" in said[0]
 
 
 @pytest.mark.parametrize(
-    ("size", "model", "sentence"),
+    ("size", "model", "code", "values", "sentence"),
     [
-        (64, {}, "takes images of 320 x 320 pixels, not 64: write `input = 320`"),
-        (SIZE, {"layout": "turned"}, "a layout of YOLO"),
-        (SIZE, {"said": (0, 3, 0, 0)}, "leaves the size of its images open.*`dynamic=False imgsz=320`"),
-        (SIZE, {"said": (1, 1, SIZE, SIZE)}, "images of 1 channels"),
-        (SIZE, {"said": (1, 3, SIZE, 640)}, "takes images of 640 x 320 pixels: export it for square ones"),
-        (SIZE, {"said": (1, 512)}, "an input of 2 dimensions"),
-        (SIZE, {"names": "{0: 'red', 1: 'blue'}"}, "1 scores for each box and names 2 classes: one that detects"),
-        (SIZE, {"gain": -1e5}, "scores from -0.* to 0: those of YOLO are from 0 to 1"),
+        (64, {}, "model.other_size", {"edge": SIZE, "size": 64}, "320 x 320 pixels, not 64: write `input = 320`"),
+        (SIZE, {"layout": "turned"}, "model.layout", {"shape": "(1, 100, 5)"}, "a layout of YOLO"),
+        (SIZE, {"said": (0, 3, 0, 0)}, "model.unreadable", {}, "leaves the size .* open.*`dynamic=False imgsz=320`"),
+        (SIZE, {"said": (1, 1, SIZE, SIZE)}, "model.channels", {"channels": 1}, "images of 1 channels"),
+        (
+            SIZE,
+            {"said": (1, 3, SIZE, 640)},
+            "model.not_square",
+            {"width": 640, "height": SIZE},
+            "640 x 320 pixels: exp",
+        ),
+        (SIZE, {"said": (1, 512)}, "model.dimensions", {"count": 2}, "an input of 2 dimensions"),
+        (SIZE, {"names": "{0: 'red', 1: 'blue'}"}, "model.task", {"scores": 1, "classes": 2}, "names 2 classes: one"),
+        (SIZE, {"gain": -1e5}, "model.scores", {}, "scores from -0.* to 0: those of YOLO are from 0 to 1"),
     ],
 )
 def test_what_a_model_is_not_fit_for_is_said_with_the_remedy(
-    tmp_path: Path, size: int, model: dict[str, Any], sentence: str
+    tmp_path: Path, size: int, model: dict[str, Any], code: str, values: dict[str, Any], sentence: str
 ) -> None:
     path = red_finder(tmp_path / "red.onnx", SIZE, **model)
-    with pytest.raises(BadModel, match=sentence):
+    with pytest.raises(BadModel, match=sentence) as refused:
         UserModel(path, size)
+    reason = refused.value.reason
+    assert reason.code == code
+    assert reason.values["file"] == str(path)
+    assert {name: reason.values[name] for name in values} == values
 
 
 def test_a_thing_may_name_its_class_where_the_model_says_the_names(table: Table, tmp_path: Path) -> None:
@@ -118,19 +132,22 @@ def test_a_thing_may_name_its_class_where_the_model_says_the_names(table: Table,
 
 
 @pytest.mark.parametrize(
-    ("said", "label", "sentence"),
+    ("said", "label", "code", "sentence"),
     [
-        ("{0: 'red block'}", "red", 'no class "red"; it has 0 red block'),
-        ("{0: 'red block'}", 3, "no class 3; it has 0 red block"),
-        ("", 3, "no class 3; it has 1, counted from 0"),
-        ("", "red", 'does not say the names of its classes: write the number for "red"'),
+        ("{0: 'red block'}", "red", "model.class.name", 'no class "red"; it has 0 red block'),
+        ("{0: 'red block'}", 3, "model.class.number", "no class 3; it has 0 red block"),
+        ("", 3, "model.class.beyond", "no class 3; it has 1, counted from 0"),
+        ("", "red", "model.class.unnamed", 'does not say the names of its classes: write the number for "red"'),
     ],
 )
 def test_a_class_that_the_model_does_not_have_is_refused_and_the_others_are_looked_for(
-    table: Table, tmp_path: Path, said: str, label: int | str, sentence: str
+    table: Table, tmp_path: Path, said: str, label: int | str, code: str, sentence: str
 ) -> None:
     told: list[str] = []
     wanted = replace(thing(red_finder(tmp_path / "red.onnx", SIZE, names=said)), label=label)
+    with pytest.raises(BadModel) as refused:
+        UserModel(tmp_path / "red.onnx", SIZE).number_of(label)
+    assert refused.value.reason.code == code
     table.detector = looking(table, wanted, told.append)
     assert sentence in told[0]
     assert "red_block" not in names(table.look())

@@ -17,7 +17,6 @@ FOLDERS = {  # whose sentences stand in the code, and why
     "tools/demo/": "shows a checkout, in the words of its film",
     "tools/replay/": "compares a recording with the code, for who works on that",
     "tools/stack/": "starts and stops processes for `make`, before anything of the product is built",
-    "services/detector/": "not converted yet: what is wrong with a model of one's own",
     "services/visualizer/": "not converted yet: the view and its recordings",
     "tools/chaos/": "not converted yet: the report of a campaign",
 }
@@ -43,10 +42,8 @@ SINGLE = {  # by file and what carries it
     ("libraries/robot_import/xacro_sandbox/expressions.py", "NameError"): "Python's own words, which xacro quotes",
     ("libraries/robot_import/xacro_sandbox/process.py", "PermissionError"): "for code that breaks out of the sandbox",
     ("libraries/runtime/application.py", "ArgumentTypeError"): "the command line of a service, for its supervisor",
-    ("libraries/runtime/bus/wire.py", "TooLarge"): "not converted yet",
     ("libraries/runtime/process/shutdown.py", "print"): "a line of a service's log",
     ("services/planner/path/curve.py", "TurnsOnTheSpot"): "caught where the path is cut",
-    ("services/state_publisher/main.py", "ConfigurationError"): "not converted yet",
     ("tools/cli/bus/action_watch.py", "unknown"): "a kind of thing, which the catalogue has as `word.unknown`",
     ("tools/cli/robot/import_robot.py", "print"): "a line of shell to copy",
 }

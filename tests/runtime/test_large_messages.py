@@ -19,7 +19,7 @@ from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.message import Message, encode
 from gemelo.schemas.motion import MOST_POINTS, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, Refusal, WaypointGoal
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import because, remedy, say
 from gemelo.schemas.scene import MeshShape, SceneAdd, SceneObject, SceneRequest, SceneResponse
 from gemelo.schemas.system import Exchange, LogRecord
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND, LOG, PLAN, SCENE_EDIT, exchange_topic
@@ -63,8 +63,11 @@ def test_an_exchange_has_room_for_the_largest_question_with_its_answer_and_the_b
 def test_a_message_above_its_limit_names_size_limit_and_remedy(name: str, limit: int) -> None:
     kind = msgspec.defstruct(name, [("data", bytes)], bases=(Message,), frozen=True, kw_only=True)
     assert len(encoded(kind(data=bytes(limit - 32))).payload) <= limit
-    with pytest.raises(TooLarge, match=rf"^{limit + 1 + 7 + 4} bytes: a {name} has at most {limit}; \w+"):
+    with pytest.raises(TooLarge, match=rf"^{limit + 1 + 7 + 4} bytes: a {name} has at most {limit}; \w+") as refused:
         encoded(kind(data=bytes(limit + 1)))
+    why = refused.value.reason
+    assert (why.code, why.values) == ("message.too_large", {"message": name, "size": limit + 12, "limit": limit})
+    assert say(why, "es").startswith(f"{limit + 12} bytes: un mensaje {name} tiene como máximo {limit}; ")
 
 
 def test_a_mesh_of_25_megabytes_is_asked_and_recorded_whole(buses: Buses) -> None:
@@ -98,8 +101,9 @@ def test_a_plan_of_thirty_thousand_points_is_answered_and_a_larger_one_refused_b
     with spinning(server):
         assert client.call(PLAN, PlanRequest(request_id="long"), timeout=20.0) == long
         limit = limit_of("PlanResponse")
-        with pytest.raises(RequestRefused, match=rf"40000\d+ bytes: a PlanResponse has at most {limit}; split"):
+        with pytest.raises(RequestRefused, match=rf"40000\d+ bytes: a PlanResponse has at most {limit}; split") as late:
             client.call(PLAN, PlanRequest(), timeout=20.0)
+        assert late.value.reason.code == "message.too_large"
         assert client.call(PLAN, PlanRequest(request_id="long"), timeout=20.0).code is PlanCode.SUCCESS
 
 
@@ -109,8 +113,9 @@ def test_a_question_above_its_limit_is_refused_where_it_is_asked(buses: Buses) -
     with spinning(server):
         with pytest.raises(
             RequestRefused, match=r"40000\d+ bytes: a SceneRequest has at most \d+; add the objects one"
-        ):
+        ) as early:
             client.call(SCENE_EDIT, add_mesh(40_000_000))
+        assert early.value.reason.remedies == (remedy("add_one_by_one"),)
         assert client.call(SCENE_EDIT, add_mesh(0)).accepted
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,10 +11,13 @@ import pytest
 
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from gemelo.libraries.runtime.bus.wire import limit_of
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.schemas.deployment import Deployment, PathsSection
+from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.joints import JointState
+from gemelo.schemas.reasons import remedy
 from gemelo.schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
 from gemelo.services.state_publisher.main import run
 
@@ -47,6 +51,24 @@ def test_a_late_joiner_gets_the_description_and_static_frames(listener: Node, rm
     assert description.message.robot == "rm1"
     assert description.message.urdf == rm1.urdf_path.read_text()
     assert static.message is not None
+
+
+def test_files_that_are_too_large_to_be_published_are_named(tmp_path: Path, rm1: ArmDescription):
+    folder = Path(shutil.copytree(rm1.folder, tmp_path / "rm1"))
+    urdf = folder / rm1.urdf_path.relative_to(rm1.folder)
+    urdf.write_text(urdf.read_text() + f"<!--{'x' * limit_of('RobotDescription')}-->\n")
+    deployment = Deployment(robot=str(folder), paths=PathsSection(run=str(tmp_path)))
+    with (
+        Node("state_publisher", deployment, bus=MemoryBus(MemoryNetwork()), stop=ShutdownRequest()) as node,
+        pytest.raises(ConfigurationError) as refused,
+    ):
+        run(node, deployment)
+    why = refused.value.reason
+    assert (why.code, why.values) == ("message.robot", {"folder": str(folder)})
+    (cause,) = why.causes
+    assert (cause.code, cause.values["message"]) == ("message.too_large", "RobotDescription")
+    assert cause.remedies == (remedy("simplify_urdf"),)
+    assert str(why).startswith(f"{folder}: its files cannot be published: {cause.values['size']} bytes: a Robot")
 
 
 def test_frames_come_with_the_states_stamp_and_readiness_with_them(listener: Node, rm1: ArmDescription, tmp_path: Path):

@@ -14,9 +14,11 @@ from gemelo.libraries.runtime.bus.interface import Arrival
 from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.camera import CameraImage
 from gemelo.schemas.device import GatewayInputs
+from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.frames import RobotDescription
 from gemelo.schemas.message import BadMessage, Message, decode, encode
 from gemelo.schemas.planning import PlanRequest, PlanResponse
+from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.scene import PlanningScene, SceneMesh, SceneRequest
 from gemelo.schemas.system import Exchange
 
@@ -38,25 +40,26 @@ MAX_PAYLOAD_OF: dict[str, int] = {  # [bytes]
     Exchange.__name__: TRAJECTORY + 9 * MEGABYTE,  # a question, its answer (one of them is small), and who asked
 }
 LARGEST = max(MAX_PAYLOAD_OF.values())
-REMEDY_OF: dict[str, str] = {
-    PlanRequest.__name__: "split the path, and plan its parts one after the other",
-    PlanResponse.__name__: "split the path, and plan its parts one after the other",
-    GoalRequest.__name__: "send the trajectory in parts",
-    SceneRequest.__name__: "add the objects one by one, and simplify their meshes",
-    SceneMesh.__name__: "simplify the mesh",
-    PlanningScene.__name__: "remove objects, or give them shorter names",
-    RobotDescription.__name__: "simplify the URDF",
-    CameraImage.__name__: "choose a smaller image",
+REMEDY_OF: dict[str, str] = {  # the code
+    PlanRequest.__name__: "plan_in_parts",
+    PlanResponse.__name__: "plan_in_parts",
+    GoalRequest.__name__: "trajectory_in_parts",
+    SceneRequest.__name__: "add_one_by_one",
+    SceneMesh.__name__: "simplify_mesh",
+    PlanningScene.__name__: "fewer_objects",
+    RobotDescription.__name__: "simplify_urdf",
+    CameraImage.__name__: "smaller_image",
 }
-ANY_REMEDY = "send it in parts"
+ANY_REMEDY = "in_parts"
 
 
-class TooLarge(BadMessage):
-    """A message that no receiver would take; the text has its size, the limit and the remedy."""
+class TooLarge(ReasonedError, BadMessage):
+    """A message that no receiver would take; the reason has its size, the limit and the remedy."""
 
-    def __init__(self, text: str, size: int, limit: int) -> None:
+    def __init__(self, schema: str, size: int, limit: int) -> None:
         """`size` and `limit` [bytes]."""
-        super().__init__(text)
+        what = remedy(REMEDY_OF.get(schema, ANY_REMEDY))
+        super().__init__(because("message.too_large", what, message=schema, size=size, limit=limit))
         self.size, self.limit = size, limit
 
 
@@ -102,5 +105,4 @@ def limit_of(schema: str) -> int:
 def _check_size(schema: str, size: int) -> None:
     limit = limit_of(schema)
     if size > limit:
-        remedy = REMEDY_OF.get(schema, ANY_REMEDY)
-        raise TooLarge(f"{size} bytes: a {schema} has at most {limit}; {remedy}", size, limit)
+        raise TooLarge(schema, size, limit)

@@ -104,7 +104,7 @@ def _payload_of(question: Message) -> bytes:
     try:
         return to_payload(question)
     except TooLarge as error:
-        raise RequestRefused(str(error), TOO_LARGE) from error
+        raise RequestRefused(error.reason, TOO_LARGE) from error
 
 
 def response_in(request: Request[Q, R], answer: BusReply) -> R:

@@ -113,7 +113,7 @@ class PendingQuery(Generic[R]):
         try:
             self.send(encoded(response))
         except TooLarge as error:
-            self.refuse(TOO_LARGE, str(error))
+            self.refuse(TOO_LARGE, error.reason)
 
     def send(self, response: Encoded[R]) -> None:
         """As `reply`, with what is encoded already."""
@@ -158,7 +158,7 @@ class PendingGroup(Generic[R]):
         try:
             self.send(encoded(response))
         except TooLarge as error:
-            self.refuse(TOO_LARGE, str(error))
+            self.refuse(TOO_LARGE, error.reason)
 
     def send(self, response: Encoded[R]) -> None:
         """As `reply`, with what is encoded already."""
