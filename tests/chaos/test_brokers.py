@@ -18,4 +18,4 @@ def test_the_broker_is_mosquitto_where_it_is_installed(
 def test_a_soak_says_how_far_it_is() -> None:
     sample = ProcessSample(at=300.0, memory=80.0, resident=90.0, cpu=1.0, files=3, sockets=1, threads=4)
     line = progress(301.0, 3600.0, 120, 1, {"planner": [sample], "logger": [sample, sample]})
-    assert line == "5 of 60 min: 120 moves, 1 failed, 160 MB in all"
+    assert str(line) == "5 of 60 min: 120 moves, 1 failed, 160 MB in all"

@@ -10,11 +10,13 @@ from argparse import ArgumentParser
 import msgspec
 
 from gemelo.schemas.deployment import Deployment, Wire
+from gemelo.schemas.reasons import because, say
 from gemelo.tools.chaos.campaign import Episode, meddled, order, unexpected_hands, words_of
 from gemelo.tools.chaos.faults import FAULTS, Fault
-from gemelo.tools.chaos.main import chosen_faults, possible_faults, unfit
+from gemelo.tools.chaos.main import chosen_faults, line_of, possible_faults, unfit
 from gemelo.tools.chaos.report import ChaosReport, page_of, rows_of, summary, text_of
 from gemelo.tools.chaos.site import processes_of
+from gemelo.tools.cli.common.language import choose
 from gemelo.tools.cli.recording.chaos import add_chaos_options
 from gemelo.tools.stack.not_ready import NotReady
 from gemelo.tools.stack.stack import PROCESSES, StackError
@@ -104,7 +106,10 @@ def test_the_reports_name_each_violation_and_the_command_that_repeats_it() -> No
         ("hold", 1, 0),
         ("stop", 2, 1),
     ]
-    assert "3 faults in 60 s (3.0 a minute), seed 7: 1 faults and 0 checks violated" in summary(found)
+    whole = summary(found)
+    assert (whole.code, whole.values["count"], whole.values["seed"]) == ("chaos.summary", 3, 7)
+    assert [why.code for why in whole.causes] == ["chaos.not_held", "chaos.judged", "chaos.lost"]
+    assert str(whole).startswith("3 faults in 60 s (3.0 a minute), seed 7: 1 faults and 0 checks violated; 0 slots")
     assert "again: gemelo chaos --seed 7 --broker mosquitto --episode 1\n" in f"{text_of(found)}\n"
     some = msgspec.structs.replace(found, only=("stop", "clock steps"))
     assert "--seed 7 --only stop 'clock steps' --broker mosquitto --episode 1" in text_of(some)
@@ -125,12 +130,45 @@ def test_a_report_says_of_each_process_that_is_not_ready_why_and_what_it_said_la
 
 
 def test_what_cannot_be_run_is_said(monkeypatch) -> None:
-    assert "--minutes nan" in unfit(float("nan"), FAULTS, [])
+    assert unfit(0.0, FAULTS, []) == because("chaos.minutes", minutes=0.0)
+    assert str(unfit(float("nan"), FAULTS, [])) == "--minutes nan: it must be above 0"
     assert chosen_faults(["router"])
-    assert "no fault is called nothing" in unfit(1.0, chosen_faults(["nothing"]), ["nothing"])
-    assert unfit(1.0, FAULTS, []) == ""
+    none = unfit(1.0, chosen_faults(["nothing", "none"]), ["nothing", "none"])
+    assert none == because("chaos.no_fault", words=("nothing", "none"))
+    assert say(none, "es").startswith("ninguna falla se llama nothing o none")
+    assert unfit(1.0, FAULTS, []) is None
     monkeypatch.setenv("GEMELO_DEVICE", "board")
-    assert "virtual devices only" in unfit(1.0, FAULTS, [])
+    assert unfit(1.0, FAULTS, []) == because("chaos.board")
+
+
+def test_the_line_of_an_episode_has_what_was_done_by_hand_and_what_was_violated() -> None:
+    assert str(line_of(episode(3, "stop"))) == "   3 stop: succeeded"
+    found = msgspec.structs.replace(episode(12, "stop", "it jumped"), hands=("reset", "arm"), was_late=True)
+    line = line_of(found)
+    assert str(line) == "  12 stop: succeeded; by hand: reset, arm; the machine was late; VIOLATED: it jumped"
+    assert [why.code for why in line.causes] == ["chaos.by_hand", "chaos.late", "chaos.violated"]
+
+
+def test_a_report_is_in_the_language_that_was_chosen_and_its_data_is_not() -> None:
+    late = because("chaos.not_recorded", count=2, first=5)
+    found = report(episode(0, "stop"), msgspec.structs.replace(episode(1, "stop", "it jumped"), hands=("reset",)))
+    found = msgspec.structs.replace(found, violations=(str(late),), why=(late,))
+    english, data = (text_of(found), page_of(found)), msgspec.json.encode(found)
+    choose("es")
+    try:
+        text, page = text_of(found), page_of(found)
+        assert msgspec.json.encode(found) == data
+    finally:
+        choose("en")
+    assert "2 fallas en 60 s (2.0 por minuto), semilla 7: violaciones en 1 fallas y 1 comprobaciones" in text
+    assert "el movimiento" in text.splitlines()[0]
+    assert "borrar el fallo" in text.splitlines()[2]
+    assert "episodio 1, stop: it jumped" in text
+    assert "2 estados de las articulaciones no están grabados, el primero en 5" in text
+    assert '<html lang="es">' in page
+    assert "Violaciones" in page
+    assert (text_of(found), page_of(found)) == english
+    assert "2 joint states are not recorded, the first at 5" in english[0]
 
 
 def test_every_process_is_killed_restarted_and_frozen():

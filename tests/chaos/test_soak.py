@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gemelo.schemas.reasons import because
 from gemelo.tools.chaos.soak import (
     EVERY,
     FEW,
@@ -19,6 +20,7 @@ from gemelo.tools.chaos.soak import (
     ProcessSample,
     complaints,
     growth_of,
+    text_of,
 )
 
 COUNT = int(HOUR / EVERY)
@@ -66,10 +68,16 @@ def test_one_sample_has_no_slope():
 def test_only_what_grows_beyond_its_limit_is_complained_of():
     assert complaints(grown(memory_slope=STEEPEST, files=FEW, sockets=FEW, threads=FEW), COUNT) == []
     assert complaints(grown(memory_slope=-20.0, files=-9), COUNT) == []
-    assert complaints(grown(memory_slope=1.26), COUNT) == ["planner: +1.3 MB/h of memory, limit 1"]
-    assert complaints(grown(files=5, sockets=6, threads=7), COUNT) == [
-        "planner: +5 files", "planner: +6 sockets", "planner: +7 threads",
-    ]  # fmt: skip
+    (slope,) = complaints(grown(memory_slope=1.26), COUNT)
+    assert slope == because("soak.memory", process="planner", slope=1.26, limit=STEEPEST)
+    assert str(slope) == "planner: +1.3 MB/h of memory, limit 1"
+    more = complaints(grown(files=5, sockets=6, threads=7), COUNT)
+    assert [(why.code, why.values["more"]) for why in more] == [("soak.more", 5), ("soak.more", 6), ("soak.more", 7)]
+    assert [str(why) for why in more] == ["planner: +5 files", "planner: +6 sockets", "planner: +7 threads"]
+    table = text_of([grown(memory_slope=1.26)], 9, [slope]).splitlines()
+    assert table[0].split() == ["process", "CPU", "[%]", "memory", "[MB]", "[MB/h]", "files", "sockets", "threads"]
+    assert table[2].split() == ["planner", "1.0", "80", "+1.26", "+0", "+0", "+0"]
+    assert table[-2:] == ["9 moves; 1 complaints", "planner: +1.3 MB/h of memory, limit 1"]
 
 
 def test_a_slope_of_few_samples_is_no_complaint():

@@ -18,7 +18,7 @@ FOLDERS = {  # whose sentences stand in the code, and why
     "tools/replay/": "compares a recording with the code, for who works on that",
     "tools/stack/": "starts and stops processes for `make`, before anything of the product is built",
     "services/visualizer/": "not converted yet: the view and its recordings",
-    "tools/chaos/": "not converted yet: the report of a campaign",
+    "tools/chaos/": "not converted yet: what a campaign found wrong in an episode",
 }
 FOR_DEVELOPERS = {  # exceptions that no person is shown: a traceback or a log has them
     "AttributeError": "a mistake in a program",

@@ -21,13 +21,15 @@ from mcap.stream_reader import StreamReader
 from gemelo.libraries.runtime.deployment import load_deployment
 from gemelo.libraries.runtime.process.ending import ended_by_signals
 from gemelo.schemas.deployment import DeviceKind
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.topics import JOINT_STATES
 from gemelo.tools.chaos.campaign import Campaign, Episode, order
 from gemelo.tools.chaos.faults import FAULTS, Fault
 from gemelo.tools.chaos.invariants import missing_records
 from gemelo.tools.chaos.report import ChaosReport, page_of, text_of
 from gemelo.tools.chaos.site import ChaosSite, installed_broker, processes_of
-from gemelo.tools.cli.recording.chaos import add_chaos_options
+from gemelo.tools.cli.common.language import choose, sentence
+from gemelo.tools.cli.recording.chaos import add_chaos_options, language_option
 from gemelo.tools.stack.results import new_results
 from gemelo.tools.stack.stack import StackError
 
@@ -39,13 +41,15 @@ def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(prog="gemelo chaos", description="faults in the middle of moves, judged")
     add_chaos_options(parser)
+    language_option(parser)
     options = parser.parse_args()
+    choose(options.lang)
     if options.list:
         print("\n".join(f"{fault.name:<28} {fault.about}" for fault in FAULTS))
         return
     faults = possible_faults(chosen_faults(options.only), processes_of(load_deployment()))
-    if reason := unfit(options.minutes, faults, options.only):
-        sys.exit(f"chaos: {reason}")
+    if (reason := unfit(options.minutes, faults, options.only)) is not None:
+        sys.exit(f"chaos: {sentence(reason)}")
     seed = randrange(1_000_000) if options.seed is None else options.seed
     wanted = order(seed, faults)
     if options.episode is not None:
@@ -58,7 +62,7 @@ def main() -> None:
     except StackError as error:
         sys.exit(f"chaos: {error}")
     except KeyboardInterrupt:
-        sys.exit("chaos: interrupted: its stack has been stopped, and there is no report")
+        sys.exit(f"chaos: {sentence(because('chaos.interrupted'))}")
 
 
 def chosen_faults(words: Sequence[str]) -> tuple[Fault, ...]:
@@ -71,15 +75,13 @@ def possible_faults(faults: Sequence[Fault], processes: Sequence[str]) -> tuple[
     return tuple(fault for fault in faults if not fault.of or fault.of in processes)
 
 
-def unfit(minutes: float, faults: Sequence[Fault], words: Sequence[str]) -> str:
-    """Why chaos cannot run for `minutes` [min] as it was asked for, or ""."""
+def unfit(minutes: float, faults: Sequence[Fault], words: Sequence[str]) -> Reason | None:
+    """Why chaos cannot run for `minutes` [min] with these options; None where it can."""
     if not 0.0 < minutes < float("inf"):
-        return f"--minutes {minutes}: it must be above 0"
+        return because("chaos.minutes", minutes=minutes)
     if not faults:
-        return f"no fault is called {' or '.join(words)}: see gemelo chaos --list"
-    if load_deployment().device is DeviceKind.BOARD:
-        return 'this deployment drives a real board (device = "board"): chaos is for virtual devices only'
-    return ""
+        return because("chaos.no_fault", words=tuple(words))
+    return because("chaos.board") if load_deployment().device is DeviceKind.BOARD else None
 
 
 def run(
@@ -95,43 +97,45 @@ def run(
     new_results(out)
     episodes: list[Episode] = []
     with ChaosSite(out, broker, seed) as site:
-        say(f"seed {seed}, all ready after {site.stack.ready_seconds:.1f} s")
+        say(sentence(because("chaos.ready", seed=seed, time=site.stack.ready_seconds)))
         campaign, begun = Campaign(site, say), time.monotonic()
         while time.monotonic() < begun + seconds and (next_one := next(wanted, None)) is not None:
             episode = campaign.episode(*next_one)
             episodes.append(episode)
-            say(line_of(episode))
+            say(sentence(line_of(episode)))
         took = time.monotonic() - begun
         robot, logs = site.arm.name, {name: site.stack.logs(name) for name in site.stack.processes}
         last = time.time_ns() - int(LAST_WORDS * 1e9)
     heard = [stamp for stamp in campaign.person.stamps if stamp < last]
     stamps, found = recorded(out)
     missing = missing_records(heard, stamps, campaign.muted)
-    found += [f"{len(missing)} joint states are not recorded, the first at {missing[0]}"] if missing else []
-    found += [f"{name} has raised an error: see {out / 'logs' / name}.log" for name, text in logs.items()
+    found += [because("chaos.not_recorded", count=len(missing), first=missing[0])] if missing else []
+    found += [because("chaos.raised", name=name, file=f"{out / 'logs' / name}.log") for name, text in logs.items()
               if "Traceback" in text]  # fmt: skip
     report = ChaosReport(
         seed=seed, robot=robot, broker=broker, seconds=took, episodes=tuple(episodes),
-        only=only, states_heard=len(heard), states_lost=len(missing), violations=tuple(found),
+        only=only, states_heard=len(heard), states_lost=len(missing), violations=tuple(map(str, found)),
+        why=tuple(found),
     )  # fmt: skip
     (out / "report.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
-    (out / "report.html").write_text(page_of(report))
-    print(f"\n{text_of(report)}\n\nreport: {out / 'report.html'}")
+    (out / "report.html").write_text(page_of(report), encoding="utf-8")
+    print(f"\n{text_of(report)}\n\n{sentence(because('chaos.report', file=str(out / 'report.html')))}")
     return report.is_good
 
 
-def line_of(episode: Episode) -> str:
+def line_of(episode: Episode) -> Reason:
     """One line about an episode that has just ended."""
-    violated = f"; VIOLATED: {'; '.join(episode.violations)}" if episode.violations else ""
-    hands = f"; by hand: {', '.join(episode.hands)}" if episode.hands else ""
-    hands += "; the machine was late" if episode.was_late else ""
-    return f"{episode.number:>4} {episode.chosen or episode.fault}: {episode.ended}{hands}{violated}"
+    notes = [because("chaos.by_hand", hands=episode.hands)] if episode.hands else []
+    notes += [because("chaos.late")] if episode.was_late else []
+    notes += [because("chaos.violated", *map(plain, episode.violations))] if episode.violations else []
+    code = "chaos.ended.notes" if notes else "chaos.ended"
+    return because(code, *notes, number=episode.number, fault=episode.chosen or episode.fault, ended=episode.ended)
 
 
-def recorded(out: Path) -> tuple[set[int], list[str]]:
-    """Stamps [ns] of all joint states in the recordings below `out`, and a sentence for each that cannot be read."""
+def recorded(out: Path) -> tuple[set[int], list[Reason]]:
+    """Stamps [ns] of all joint states in the recordings below `out`, and a reason for each that cannot be read."""
     stamps: set[int] = set()
-    found: list[str] = []
+    found: list[Reason] = []
     files = sorted(out.rglob("*.mcap"))
     for path in files:
         try:
@@ -140,8 +144,8 @@ def recorded(out: Path) -> tuple[set[int], list[str]]:
         except EndOfFile:
             pass  # the chunk that was open when the logger was killed
         except McapError as error:
-            found.append(f"{path.name} cannot be read: {error}")
-    return stamps, found if files else [f"there is no recording in {out}"]
+            found.append(because("chaos.unreadable", file=path.name, error=str(error)))
+    return stamps, found if files else [because("chaos.no_recording", folder=str(out))]
 
 
 def _joint_states(path: Path) -> Iterator[int]:

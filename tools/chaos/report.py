@@ -10,10 +10,14 @@ from statistics import median
 
 import msgspec
 
+from gemelo.schemas.reasons import Reason, Value, because, plain
 from gemelo.tools.chaos.campaign import Episode
+from gemelo.tools.cli.common.language import columns, language, sentence, word
+from gemelo.tools.cli.common.text_table import table
 
 WIDTH, ROW = 720, 18  # [px] of the drawing, and of one fault's line
 LONGEST = 25.0  # [s] at its right end
+COLUMNS = ("fault", "n", "the move", "told [s]", "ready [s]", "max", "by hand", "violated")
 
 
 class ChaosReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -28,6 +32,7 @@ class ChaosReport(msgspec.Struct, frozen=True, kw_only=True):
     states_heard: int
     states_lost: int  # heard, not recorded, and not while logger or router were away
     violations: tuple[str, ...] = ()
+    why: tuple[Reason, ...] = ()  # the same as data
 
     @property
     def is_good(self) -> bool:
@@ -61,11 +66,12 @@ def _row(name: str, episodes: Sequence[Episode]) -> FaultRow:
     return FaultRow(
         fault=name,
         count=len(episodes),
-        ended=", ".join(f"{count} {word}" for word, count in ends.most_common()),
+        ended=", ".join(f"{count} {word('chaos', name)}" for name, count in ends.most_common()),
         to_end=median(each.to_end for each in episodes),
         to_ready=median(each.to_ready for each in episodes),
         to_ready_max=max(each.to_ready for each in episodes),
-        hands=", ".join(sorted({word for each in episodes for word in each.hands})) or "-",
+        hands=", ".join(word("hand", name) for name in sorted({name for each in episodes for name in each.hands}))
+        or "-",
         violations=sum(bool(each.violations) for each in episodes),
     )
 
@@ -73,20 +79,28 @@ def _row(name: str, episodes: Sequence[Episode]) -> FaultRow:
 def text_of(report: ChaosReport) -> str:
     """The table, then every violation with the command that repeats it."""
     rows = rows_of(report.episodes)
-    wide = max((len(row.fault) for row in rows), default=5)
-    ends = max((len(row.ended) for row in rows), default=5)
-    lines = [f"{'fault':<{wide}}     n  {'the move':<{ends}}  told [s]  ready [s]   max  by hand"]
-    lines += [
-        f"{row.fault:<{wide}}  {row.count:>4}  {row.ended:<{ends}}  {row.to_end:>8.1f}  {row.to_ready:>9.1f}"
-        f"  {row.to_ready_max:>4.1f}  {row.hands}{'   VIOLATED' if row.violations else ''}"
-        for row in rows
-    ]
-    lines += ["", summary(report)]
+    lines = [] if not rows else [table(columns(*COLUMNS), [_cells(row) for row in rows])]
+    lines += ["", sentence(summary(report))]
     for episode in report.episodes:
-        lines += [f"episode {episode.number}, {episode.chosen or episode.fault}: {each}" for each in episode.violations]
+        lines += map(sentence, violations_of(episode))
         if episode.violations:
-            lines.append(f"  again: {again(report, episode)}")
-    return "\n".join([*lines, *report.violations])
+            lines.append(f"  {sentence(because('chaos.again', command=again(report, episode)))}")
+    return "\n".join([*lines, *_of_no_episode(report)])
+
+
+def _cells(row: FaultRow) -> tuple[str, ...]:
+    times = (f"{row.to_end:.1f}", f"{row.to_ready:.1f}", f"{row.to_ready_max:.1f}")
+    return (row.fault, f"{row.count}", row.ended, *times, row.hands, f"{row.violations or '-'}")
+
+
+def violations_of(episode: Episode) -> list[Reason]:
+    """Each with its episode."""
+    about: dict[str, Value] = {"number": episode.number, "fault": episode.chosen or episode.fault}
+    return [because("chaos.episode", plain(each), **about) for each in episode.violations]
+
+
+def _of_no_episode(report: ChaosReport) -> list[str]:
+    return list(map(sentence, report.why)) or list(report.violations)
 
 
 def again(report: ChaosReport, episode: Episode) -> str:
@@ -95,38 +109,40 @@ def again(report: ChaosReport, episode: Episode) -> str:
     return f"gemelo chaos --seed {report.seed}{only} --broker {report.broker} --episode {episode.number}"
 
 
-def summary(report: ChaosReport) -> str:
+def summary(report: ChaosReport) -> Reason:
     """One sentence."""
     bad = sum(bool(each.violations) for each in report.episodes)
-    verdict = "every invariant held" if report.is_good else f"{bad} faults and {len(report.violations)} checks violated"
-    lost = f"{report.states_lost} of {report.states_heard} joint states heard are not recorded"
-    count, slots = len(report.episodes), sum(each.slots for each in report.episodes)
-    rate = f"{60.0 * count / report.seconds:.1f} a minute" if report.seconds else "none"
-    faults = f"{count} faults in {report.seconds:.0f} s ({rate}), seed {report.seed}"
-    return f"{faults}: {verdict}; {slots} slots with steps judged; {lost}"
+    not_held = because("chaos.not_held", faults=bad, checks=len(report.violations))
+    found = (
+        because("chaos.held") if report.is_good else not_held,
+        because("chaos.judged", slots=sum(each.slots for each in report.episodes)),
+        because("chaos.lost", lost=report.states_lost, heard=report.states_heard),
+    )
+    count = len(report.episodes)
+    about: dict[str, Value] = {"count": count, "time": report.seconds, "seed": report.seed}
+    if not report.seconds:
+        return because("chaos.summary.no_time", *found, **about)
+    return because("chaos.summary", *found, rate=60.0 * count / report.seconds, **about)
 
 
 def page_of(report: ChaosReport) -> str:
     """The page: summary, drawing, table, violations; everything in one file."""
     escape = html.escape
-    cells = "".join(
-        f"<tr{' class=bad' if row.violations else ''}><td>{escape(row.fault)}<td>{row.count}<td>{escape(row.ended)}"
-        f"<td>{row.to_end:.1f}<td>{row.to_ready:.1f}<td>{row.to_ready_max:.1f}<td>{escape(row.hands)}</tr>"
+    rows = "".join(
+        f"<tr{' class=bad' if row.violations else ''}>{''.join(f'<td>{escape(cell)}' for cell in _cells(row))}</tr>"
         for row in rows_of(report.episodes)
     )
-    bad = "".join(
-        f"<li>episode {each.number}, {escape(each.chosen or each.fault)}: {escape(word)}"
-        for each in report.episodes
-        for word in each.violations
-    ) + "".join(f"<li>{escape(word)}" for word in report.violations)
+    headings = "".join(f"<th>{escape(name)}" for name in columns(*COLUMNS))
+    told = [sentence(why) for each in report.episodes for why in violations_of(each)] + _of_no_episode(report)
+    bad = "".join(f"<li>{escape(text)}" for text in told) or f"<li>{escape(word('chaos_page', 'none'))}"
     return f"""<!doctype html>
-<html lang="en"><meta charset="utf-8"><title>gemelo chaos, seed {report.seed}</title>
+<html lang="{language()}"><meta charset="utf-8"><title>gemelo chaos, seed {report.seed}</title>
 <style>body{{font:14px system-ui;margin:2em;max-width:60em}}table{{border-collapse:collapse}}td,th{{padding:2px 10px;
 text-align:left;border-bottom:1px solid #ddd}}.bad{{background:#fdd}}text{{font:12px system-ui}}</style>
-<h1>Chaos on {escape(report.robot)}</h1><p>{escape(summary(report))}
-<h2>From the end of the fault until everything is ready [s]</h2>{drawing_of(report.episodes)}
-<h2>Faults</h2><table><tr><th>fault<th>n<th>the move<th>told [s]<th>ready [s]<th>max<th>by hand</tr>{cells}</table>
-<h2>Violations</h2><ul>{bad or "<li>none"}</ul></html>
+<h1>{escape(sentence(because("chaos.title", robot=report.robot)))}</h1><p>{escape(sentence(summary(report)))}
+<h2>{escape(word("chaos_page", "until ready"))}</h2>{drawing_of(report.episodes)}
+<h2>{escape(word("chaos_page", "faults"))}</h2><table><tr>{headings}</tr>{rows}</table>
+<h2>{escape(word("chaos_page", "violations"))}</h2><ul>{bad}</ul></html>
 """
 
 

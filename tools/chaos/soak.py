@@ -26,9 +26,12 @@ from gemelo.libraries.runtime.endpoints import parameter_request
 from gemelo.libraries.runtime.errors import NoAnswer
 from gemelo.libraries.runtime.process.ending import ended_by_signals
 from gemelo.schemas.deployment import DeviceKind
+from gemelo.schemas.reasons import Reason, Value, because, plain
 from gemelo.schemas.system import SetParameter
 from gemelo.tools.chaos.site import ChaosSite, installed_broker
-from gemelo.tools.cli.recording.chaos import add_soak_options
+from gemelo.tools.cli.common.language import choose, columns, sentence
+from gemelo.tools.cli.common.text_table import table
+from gemelo.tools.cli.recording.chaos import add_soak_options, language_option
 from gemelo.tools.stack.results import new_results
 from gemelo.tools.stack.stack import StackError
 
@@ -42,6 +45,7 @@ FEW = 4  # files, sockets or threads that come and go
 TO_END = 10.0  # [s] beyond a move's own time
 FEWEST = 20  # samples after the warm-up below which a slope says nothing
 HOUR, MB = 3600.0, 1e6
+COLUMNS = ("process", "CPU [%]", "memory [MB]", "[MB/h]", "files", "sockets", "threads")
 
 
 class ProcessSample(msgspec.Struct, frozen=True):
@@ -72,25 +76,29 @@ def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(prog="gemelo soak", description="moves for hours; does anything grow?")
     add_soak_options(parser)
+    language_option(parser)
     options = parser.parse_args()
+    choose(options.lang)
     if not 0.0 < options.hours < float("inf"):
-        sys.exit(f"soak: --hours {options.hours}: it must be above 0")
+        sys.exit(f"soak: {sentence(because('soak.hours', hours=options.hours))}")
     if load_deployment().device is DeviceKind.BOARD:
-        sys.exit('soak: this deployment drives a real board (device = "board"): soak is for virtual devices only')
+        sys.exit(f"soak: {sentence(because('soak.board'))}")
     broker = options.broker or installed_broker()
     try:
         with ended_by_signals():
             sys.exit(0 if run(options.hours * HOUR, options.seed, broker, options.out.resolve()) else 1)
-    except (StackError, NoAnswer) as error:
+    except NoAnswer as error:
+        sys.exit(f"soak: {sentence(error.reason)}")
+    except StackError as error:
         sys.exit(f"soak: {error}")
     except KeyboardInterrupt:
-        sys.exit("soak: interrupted: its stack has been stopped, and there is no report")
+        sys.exit(f"soak: {sentence(because('soak.interrupted'))}")
 
 
 def run(seconds: float, seed: int, broker: str, out: Path) -> bool:
     """Moves for `seconds` [s]; writes and prints the report; True if nothing grew and every move succeeded."""
     new_results(out)
-    random, samples, failures, moves = Random(seed), dict[str, list[ProcessSample]](), list[str](), 0
+    random, samples, failures, moves = Random(seed), dict[str, list[ProcessSample]](), list[Reason](), 0
     with ChaosSite(out, broker, seed, is_judged=False) as site:
         change_files_often(site.arm, seconds)
         person, begun = site.person, time.monotonic()
@@ -101,7 +109,7 @@ def run(seconds: float, seed: int, broker: str, out: Path) -> bool:
                 motion.wait(motion.plan.duration + TO_END)
                 moves += 1
             except (gemelo.Error, TimeoutError) as error:
-                failures.append(str(error))
+                failures.append(error.message if isinstance(error, gemelo.Error) else plain(str(error)))
                 person.pause(1.0)
             if now >= due:
                 due = now + EVERY
@@ -110,10 +118,11 @@ def run(seconds: float, seed: int, broker: str, out: Path) -> bool:
                         samples.setdefault(name, []).append(sample_of(pid, now - begun))
             if now >= told:
                 told = now + TOLD_EVERY
-                print(progress(now - begun, seconds, moves, len(failures), samples), flush=True)
+                print(sentence(progress(now - begun, seconds, moves, len(failures), samples)), flush=True)
     growths = [growth_of(name, kept) for name, kept in sorted(samples.items())]
-    found = [word for growth in growths for word in complaints(growth, len(samples[growth.process]))] + failures
-    report = {"seconds": seconds, "moves": moves, "processes": growths, "violations": found, "samples": samples}
+    found = [why for growth in growths for why in complaints(growth, len(samples[growth.process]))] + failures
+    violations = list(map(str, found))
+    report = {"seconds": seconds, "moves": moves, "processes": growths, "violations": violations, "samples": samples}
     (out / "report.json").write_bytes(msgspec.json.encode(report) + b"\n")
     print(text_of(growths, moves, found))
     return not found
@@ -128,10 +137,11 @@ def change_files_often(arm: gemelo.Arm, seconds: float) -> None:
 
 def progress(
     elapsed: float, seconds: float, moves: int, failed: int, samples: Mapping[str, Sequence[ProcessSample]]
-) -> str:
+) -> Reason:
     """One line of a soak that goes on; `elapsed` of `seconds` [s]."""
     memory = sum(of_one[-1].memory for of_one in samples.values())
-    return f"{elapsed / 60.0:.0f} of {seconds / 60.0:.0f} min: {moves} moves, {failed} failed, {memory:.0f} MB in all"
+    about: dict[str, Value] = {"moves": moves, "failed": failed, "memory": memory}
+    return because("soak.progress", elapsed=elapsed / 60.0, total=seconds / 60.0, **about)
 
 
 def sample_of(pid: int, at: float) -> ProcessSample:
@@ -179,24 +189,25 @@ def growth_of(name: str, samples: Sequence[ProcessSample]) -> Growth:
     )
 
 
-def complaints(growth: Growth, count: int) -> list[str]:
+def complaints(growth: Growth, count: int) -> list[Reason]:
     """What of a process grew although it should not; nothing of a slope where there were few of `count` samples."""
     found = []
     if growth.memory_slope > STEEPEST and count * (1.0 - WARM_UP) >= FEWEST:
-        found.append(f"{growth.process}: {growth.memory_slope:+.1f} MB/h of memory, limit {STEEPEST:g}")
+        found.append(because("soak.memory", process=growth.process, slope=growth.memory_slope, limit=STEEPEST))
     counts: Mapping[str, int] = {"files": growth.files, "sockets": growth.sockets, "threads": growth.threads}
-    return found + [f"{growth.process}: {more:+d} {what}" for what, more in counts.items() if more > FEW]
+    about = {what: more for what, more in counts.items() if more > FEW}
+    return found + [because("soak.more", process=growth.process, more=more, what=what) for what, more in about.items()]
 
 
-def text_of(growths: Sequence[Growth], moves: int, found: Sequence[str]) -> str:
+def text_of(growths: Sequence[Growth], moves: int, found: Sequence[Reason]) -> str:
     """A table, a line a process, and what was found."""
-    lines = [f"{'process':<16} CPU [%]  memory [MB]    [MB/h]  files  sockets  threads"]
-    lines += [
-        f"{each.process:<16} {each.cpu_percent:>7.1f}  {each.memory:>11.0f}  {each.memory_slope:>+8.2f}"
-        f"  {each.files:>+5d}  {each.sockets:>+7d}  {each.threads:>+7d}"
+    rows = [
+        (each.process, f"{each.cpu_percent:.1f}", f"{each.memory:.0f}", f"{each.memory_slope:+.2f}",
+         f"{each.files:+d}", f"{each.sockets:+d}", f"{each.threads:+d}")
         for each in growths
-    ]
-    return "\n".join([*lines, "", f"{moves} moves; {len(found)} complaints", *found])
+    ]  # fmt: skip
+    total = because("soak.total", moves=moves, complaints=len(found))
+    return "\n".join([table(columns(*COLUMNS), rows), "", *map(sentence, (total, *found))])
 
 
 if __name__ == "__main__":

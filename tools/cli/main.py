@@ -26,8 +26,12 @@ EPILOG = (
 
 
 def parse(arguments: Sequence[str]) -> Options:
-    """The options of one command line; ends the process with a sentence if it cannot be understood."""
+    """The options of one command line; ends the process with a sentence if it cannot be understood.
+
+    `behind` is what was typed behind the command, for one that becomes a program of its own.
+    """
     options: Options = build(COMMANDS, GROUPS, ABOUT, EPILOG, arguments).parse_args(arguments)
+    options.behind = tuple(arguments[len(options.command.words) :])
     return options
 
 

@@ -11,6 +11,7 @@ from typing import NoReturn
 
 from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
+from gemelo.tools.cli.common.language import ENGLISH, known, language
 from gemelo.tools.cli.parser import Options
 
 BROKERS = ("embedded", "mosquitto")
@@ -36,18 +37,23 @@ def add_soak_options(parser: ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, default=Path("out/soak"), help="folder of the results")
 
 
+def language_option(parser: ArgumentParser) -> None:
+    """Of the programs themselves: the command line has it before the command."""
+    parser.add_argument("--lang", choices=known(), default=ENGLISH, help="the language of what is printed")
+
+
 def run_chaos(options: Options) -> ExitCode:
     """Becomes `python -m gemelo.tools.chaos` with the same options."""
-    _become("gemelo.tools.chaos")
+    _become("gemelo.tools.chaos", options)
 
 
 def run_soak(options: Options) -> ExitCode:
     """Becomes `python -m gemelo.tools.chaos.soak` with the same options."""
-    _become("gemelo.tools.chaos.soak")
+    _become("gemelo.tools.chaos.soak", options)
 
 
-def _become(program: str) -> NoReturn:
+def _become(program: str, options: Options) -> NoReturn:
     """Raises `CommandError` where the project is installed without its own tests' tools."""
     if find_spec("gemelo.tools.chaos") is None:
-        raise CommandError(because("cli.checkout", command=sys.argv[1]))
-    os.execv(sys.executable, [sys.executable, "-m", program, *sys.argv[2:]])
+        raise CommandError(because("cli.checkout", command=options.command.words[0]))
+    os.execv(sys.executable, [sys.executable, "-m", program, "--lang", language(), *options.behind])

@@ -14,4 +14,4 @@ __all__ = ["add_options", "run"]
 
 def run(options: Options) -> ExitCode:
     """Becomes `python -m gemelo.tools.replay` with the same options."""
-    os.execv(sys.executable, [sys.executable, "-m", "gemelo.tools.replay", *sys.argv[2:]])
+    os.execv(sys.executable, [sys.executable, "-m", "gemelo.tools.replay", *options.behind])
