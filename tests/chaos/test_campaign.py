@@ -10,7 +10,7 @@ from argparse import ArgumentParser
 import msgspec
 
 from gemelo.schemas.deployment import Deployment, Wire
-from gemelo.schemas.reasons import because, say
+from gemelo.schemas.reasons import because, plain, say
 from gemelo.tools.chaos.campaign import Episode, meddled, order, unexpected_hands, words_of
 from gemelo.tools.chaos.faults import FAULTS, Fault
 from gemelo.tools.chaos.main import chosen_faults, line_of, possible_faults, unfit
@@ -76,22 +76,26 @@ def test_every_fault_comes_once_before_any_comes_twice() -> None:
 
 def test_a_person_may_only_do_what_the_fault_asks_for() -> None:
     assert unexpected_hands(fault("stop"), ["stop"]) == []
-    assert unexpected_hands(fault("kill planner"), ["reference"]) == ["a person had to reference"]
+    assert unexpected_hands(fault("kill planner"), ["reference"]) == [because("chaos.hand", hand="reference")]
     assert unexpected_hands(fault("kill planner"), ["reference"], was_late=True) == []
     assert unexpected_hands(fault("device reboots"), ["arm", "reference"]) == []
-    assert unexpected_hands(fault("device reboots"), ["reset"]) == ["a person had to reset"]
+    (reset,) = unexpected_hands(fault("device reboots"), ["reset"])
+    assert str(reset) == "a person had to reset"
     assert unexpected_hands(fault("e-stop"), ["reset", "arm", "reference"]) == []
 
 
 def test_what_takes_no_part_in_a_move_may_not_end_it() -> None:
     for name in ("kill panel", "restart planner", "freeze viewer long", "kill camera", "freeze detector shortly"):
-        assert meddled(fault(name), "succeeded", "") == []
-        assert meddled(fault(name), "aborted", 'device "rm1" is silent for more than 0.5 s: check its power') == []
-        (said,) = meddled(fault(name), "canceled", "")
-        assert said == f"{name.split()[1]} takes no part in a move, and yet it ended canceled: no reason was given"
-    (said,) = meddled(fault("kill panel"), "aborted", "its client has gone")
-    assert said.endswith("it ended aborted: its client has gone")
-    assert meddled(fault("kill stepper_gateway"), "lost", "") == meddled(fault("stop"), "canceled", "") == []
+        assert meddled(fault(name), "succeeded", None) == []
+        silent = because("ended.aborted", because("device.silent", device="rm1", time=0.5), time=0.5)
+        assert meddled(fault(name), "aborted", silent) == []
+        (said,) = meddled(fault(name), "canceled", None)
+        process = name.split()[1]
+        assert said == because("chaos.meddled", because("ended.unexplained"), process=process, ended="canceled")
+        assert str(said) == f"{process} takes no part in a move, and yet it ended canceled: no reason was given"
+    (said,) = meddled(fault("kill panel"), "aborted", plain("its client has gone"))
+    assert str(said).endswith("it ended aborted: its client has gone")
+    assert meddled(fault("kill stepper_gateway"), "lost", None) == meddled(fault("stop"), "canceled", None) == []
 
 
 def test_a_run_is_good_only_if_nothing_was_violated() -> None:
@@ -122,7 +126,9 @@ def test_the_reports_name_each_violation_and_the_command_that_repeats_it() -> No
 
 def test_a_report_says_of_each_process_that_is_not_ready_why_and_what_it_said_last() -> None:
     unready = (NotReady("planner", "it is frozen", ("one", "two")), NotReady("logger", "it does not run", ()))
-    assert words_of(StackError("not ready after 20 s: planner, logger\n--- planner", unready)) == [
+    assert [
+        str(why) for why in words_of(StackError("not ready after 20 s: planner, logger\n--- planner", unready))
+    ] == [
         "not ready after 20 s: planner, logger",
         "planner is not ready: it is frozen; its last lines: one | two",
         "logger is not ready: it does not run; it has printed nothing",
@@ -151,7 +157,9 @@ def test_the_line_of_an_episode_has_what_was_done_by_hand_and_what_was_violated(
 
 def test_a_report_is_in_the_language_that_was_chosen_and_its_data_is_not() -> None:
     late = because("chaos.not_recorded", count=2, first=5)
-    found = report(episode(0, "stop"), msgspec.structs.replace(episode(1, "stop", "it jumped"), hands=("reset",)))
+    jump = because("chaos.jump", joint="brazo_joint", steps=90, time=0.02, allowed=40.0)
+    bad = msgspec.structs.replace(episode(1, "stop", str(jump)), hands=("reset",), why=(jump,))
+    found = report(episode(0, "stop"), bad)
     found = msgspec.structs.replace(found, violations=(str(late),), why=(late,))
     english, data = (text_of(found), page_of(found)), msgspec.json.encode(found)
     choose("es")
@@ -163,7 +171,8 @@ def test_a_report_is_in_the_language_that_was_chosen_and_its_data_is_not() -> No
     assert "2 fallas en 60 s (2.0 por minuto), semilla 7: violaciones en 1 fallas y 1 comprobaciones" in text
     assert "el movimiento" in text.splitlines()[0]
     assert "borrar el fallo" in text.splitlines()[2]
-    assert "episodio 1, stop: it jumped" in text
+    assert "episodio 1, stop: brazo_joint avanzó +90 pasos en 20.0 ms; se permiten 40" in text
+    assert say(line_of(bad), "es").endswith("VIOLACIÓN: brazo_joint avanzó +90 pasos en 20.0 ms; se permiten 40")
     assert "2 estados de las articulaciones no están grabados, el primero en 5" in text
     assert '<html lang="es">' in page
     assert "Violaciones" in page

@@ -8,6 +8,7 @@ from random import Random
 import pytest
 
 import gemelo
+from gemelo.schemas.reasons import because
 from gemelo.tools.chaos.flutters import LONG, fluttering_holds, fluttering_stops, goal_and_stop, long_goal, unended
 from tests.chaos.simulated_site import SimulatedSite
 
@@ -35,7 +36,7 @@ def test_every_move_that_is_stopped_soon_ends(site: SimulatedSite) -> None:
 def test_a_motion_that_a_stop_does_not_end_is_seen(site: SimulatedSite) -> None:
     motion = site.arm.start(named="left", speed=0.02)
     (found,) = unended(motion)
-    assert found == "a stopped motion has not ended within 10 s"
+    assert found == because("chaos.stop.unended", time=10.0)
     site.arm.stop()
     assert unended(motion) == []
 

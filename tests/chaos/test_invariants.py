@@ -39,7 +39,8 @@ def test_a_step_beyond_the_velocity_limit_is_a_jump(rm1: ArmDescription) -> None
     most = joint.velocity * joint.steps.per_unit * 0.021
     assert jumps(rm1, states(rm1, [0, int(most)])) == []
     (found,) = jumps(rm1, states(rm1, [0, int(most) + 4]))
-    assert found.startswith(f"{joint.name} went +")
+    assert (found.code, found.values["joint"], found.values["time"]) == ("chaos.jump", joint.name, SLOT * 1e-6)
+    assert str(found).startswith(f"{joint.name} went +")
 
 
 def test_twice_the_acceleration_is_a_jerk(rm1: ArmDescription) -> None:
@@ -51,7 +52,8 @@ def test_a_stop_from_one_slot_to_the_next_is_a_jerk(rm1: ArmDescription) -> None
     joint = rm1.joints[0]
     fast = round(0.8 * joint.velocity * joint.steps.per_unit * 0.02)
     (found,) = jerks(rm1, states(rm1, [0, fast, 2 * fast, 3 * fast, 3 * fast, 3 * fast]))
-    assert "at once" in found
+    assert found.code == "chaos.jerk"
+    assert "at once" in str(found)
 
 
 def test_a_boot_a_reference_and_a_late_machine_begin_a_new_segment(rm1: ArmDescription) -> None:
@@ -71,9 +73,11 @@ def test_what_moved_by_itself_and_what_was_falsely_reached_is_named(rm1: ArmDesc
     rest = tuple(0.0 for _ in rm1.joints)
     away = (0.01, *rest[1:])
     assert moved(rm1, rest, rest) == []
-    assert "moved by itself" in moved(rm1, rest, away)[0]
+    assert [why.code for why in moved(rm1, rest, away)] == ["chaos.moved"] * len(moved(rm1, rest, away))
+    assert "moved by itself" in str(moved(rm1, rest, away)[0])
     assert misses(rm1, rest, rest) == []
-    assert "its shaft is at 0.010000" in misses(rm1, rest, away)[0]
+    assert misses(rm1, rest, away)[0].values["true"] == 0.01
+    assert "its shaft is at 0.010000" in str(misses(rm1, rest, away)[0])
 
 
 @pytest.mark.parametrize(("muted", "expected"), [([], [3, 4]), ([(3, 3)], [4]), ([(2, 4)], []), ([(5, 9)], [3, 4])])

@@ -38,5 +38,5 @@ class StandIn:
 def test_a_device_is_configured_by_hand_only_where_it_has_another_configuration(device_crc32, hands):
     silent = DeviceConfiguration(crc32=7, device_crc32=device_crc32, accepted=False, reason=SILENT)
     person = Person(StandIn(silent, silent, DeviceConfiguration(crc32=7, device_crc32=7, accepted=True)))
-    assert person.make_ready(5.0, reference=False) == ""
+    assert person.make_ready(5.0, reference=False) is None
     assert person.hands == hands

@@ -63,13 +63,14 @@ def test_a_goal_that_is_sent_again_during_another_move_leaves_that_alone(site: S
 def test_an_arm_that_moves_for_a_goal_of_before_is_seen(site: SimulatedSite) -> None:
     replayed_later(by_none_other)(site, Random(1))
     assert site.found
-    assert "a goal of before, sent again (accepted), moved the arm in" in site.found[0]
+    assert (site.found[0].code, site.found[0].values["answer"]) == ("chaos.replay.moved", "accepted")
 
 
 def test_a_move_that_ends_elsewhere_or_not_as_it_should_is_seen(site: SimulatedSite) -> None:
     site.arm.stop()
     (found,) = disturbed(site, site.motion)
-    assert found.startswith("a goal of before that was sent again has ended a move: ")
+    assert found.code == "chaos.replay.ended"
+    assert str(found).startswith("a goal of before that was sent again has ended a move: ")
 
 
 def test_a_motion_is_recorded_as_the_gateway_was_sent_it(site: SimulatedSite) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from gemelo.schemas.reasons import because
 from gemelo.tools.chaos import twins
 from gemelo.tools.chaos.twins import TwinClient, TwinProcess
 from tests.broker.running import Client, RunningBroker
@@ -74,7 +75,8 @@ def test_a_second_one_that_ends_with_a_sentence_gives_way(started: Started) -> N
 def test_a_second_one_that_ends_without_a_sentence_is_seen(started: Started, program: str) -> None:
     _, twin = started(program)
     (found,) = twin.gave_way()
-    assert found.startswith("a second planner ended without a sentence: ")
+    assert found.code == "chaos.twin.silent"
+    assert str(found).startswith("a second planner ended without a sentence: ")
 
 
 def test_two_that_go_on_are_seen_and_the_second_one_ends_with_chaos(
@@ -83,8 +85,8 @@ def test_two_that_go_on_are_seen_and_the_second_one_ends_with_chaos(
     monkeypatch.setattr(twins, "TO_GIVE_WAY", 0.3)
     _, twin = started(STAYS)
     assert twin.has_begun()
-    assert twin.gave_way() == ["a second planner goes on beside the first for 0.3 s"]
-    assert twin.one_is_left() == ["two of planner go on beside each other for 0.3 s"]
+    assert twin.gave_way() == [because("chaos.twin.beside", name="planner", time=0.3)]
+    assert twin.one_is_left() == [because("chaos.twin.both", name="planner", time=0.3)]
     twin.end()
     assert twin.has_ended
 
@@ -96,8 +98,8 @@ def test_a_first_one_that_ends_for_a_later_one_is_seen_unless_it_was_frozen(star
     stack.own.wait()
     assert twin.one_is_left() == []
     twin.end()
-    (found,) = (each for each in twin.gave_way() if "has ended for" in each)
-    assert found == "planner has ended for a second one that started after it"
+    (found,) = (each for each in twin.gave_way() if each.code == "chaos.twin.first_ended")
+    assert str(found) == "planner has ended for a second one that started after it"
 
 
 def test_a_second_one_that_ends_at_once_has_not_begun(started: Started) -> None:

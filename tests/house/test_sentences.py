@@ -18,11 +18,11 @@ FOLDERS = {  # whose sentences stand in the code, and why
     "tools/replay/": "compares a recording with the code, for who works on that",
     "tools/stack/": "starts and stops processes for `make`, before anything of the product is built",
     "services/visualizer/": "not converted yet: the view and its recordings",
-    "tools/chaos/": "not converted yet: what a campaign found wrong in an episode",
 }
 FOR_DEVELOPERS = {  # exceptions that no person is shown: a traceback or a log has them
     "AttributeError": "a mistake in a program",
     "EOFError": "between two processes of one node",
+    "IndexError": "of a packet that is not whole, which is looked at again when it is",
     "FileNotFoundError": "an installation that is not whole, the catalogue itself among it",
     "RuntimeError": "a mistake in the project's own code",
     "TimeoutError": "a script's own wait",

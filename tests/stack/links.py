@@ -137,7 +137,7 @@ class Links:
         heard = json.loads(self._hear()) if case.lasts else heard
         self._wait_rest()
         rested = self._slots.path.stat().st_mtime - began
-        faults = violations(self._config, self._slots.rows(first))
+        faults = [str(each) for each in violations(self._config, self._slots.rows(first))]
         stood = self._slots.size
         time.sleep(WATCHED)
         if steps_in(self._slots.rows(stood)):
@@ -176,7 +176,7 @@ class Links:
         ready = self._wait_ready() - began
         self._hear()
         self._wait_rest()
-        faults = violations(self._config, self._slots.rows(first))
+        faults = [str(each) for each in violations(self._config, self._slots.rows(first))]
         stood = self._slots.size
         time.sleep(WATCHED)
         if steps_in(self._slots.rows(stood)):
@@ -191,7 +191,7 @@ class Links:
         assert self._hear() == "moving\n"
         came = json.loads(self._hear())
         self._wait_rest()
-        return came, violations(self._config, self._slots.rows(first))
+        return came, [str(each) for each in violations(self._config, self._slots.rows(first))]
 
     def logs(self) -> str:
         return self.lab.logs()

@@ -7,10 +7,13 @@ import subprocess
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import because
+
 SOURCE = Path(__file__).with_name("shifted_clock.c")
 
 
-class ClockError(Exception):
+class ClockError(ReasonedError):
     """There is no compiler for the library, or it does not compile; the text says the remedy."""
 
 
@@ -24,9 +27,9 @@ def shifted(folder: Path, clocks: Mapping[str, tuple[float, float]]) -> dict[str
     try:
         subprocess.run(command, check=True, capture_output=True, text=True)
     except FileNotFoundError:
-        raise ClockError("there is no c++ to make clocks that step: sudo apt-get install g++") from None
+        raise ClockError(because("chaos.clock.no_compiler")) from None
     except subprocess.CalledProcessError as error:
-        raise ClockError(f"{SOURCE.name} does not compile: {error.stderr.strip()}") from error
+        raise ClockError(because("chaos.clock.not_compiled", file=SOURCE.name, error=error.stderr.strip())) from error
     table = ",".join(f"{name}={ahead}:{drift}" for name, (ahead, drift) in clocks.items())
     return {"LD_PRELOAD": str(library), "SHIFTED_CLOCKS": table}
 

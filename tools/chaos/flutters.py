@@ -14,6 +14,7 @@ from gemelo.schemas.actions import GoalRequest, GoalStatusCode, ResultRequest
 from gemelo.schemas.device import DeviceStopRequest
 from gemelo.schemas.message import encode
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.topics import DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY
 from gemelo.tools.chaos.invariants import is_starved
 from gemelo.tools.chaos.person import random_goal
@@ -53,16 +54,16 @@ def fluttering_stops(site: ChaosSite, random: Random) -> str:
     return f"{count} moves, each stopped at once"
 
 
-def unended(motion: gemelo.Motion) -> list[str]:
+def unended(motion: gemelo.Motion) -> list[Reason]:
     """What is wrong about the end of a motion that was stopped soon after its begin."""
     try:
         motion.wait(TO_END)
     except TimeoutError:
-        return [f"a stopped motion has not ended within {TO_END:g} s"]
+        return [because("chaos.stop.unended", time=TO_END)]
     except gemelo.Error:
         return []
     is_early = motion.status is GoalStatusCode.SUCCEEDED and motion.elapsed < motion.plan.duration / 2.0
-    return [f"a motion that was stopped after {motion.elapsed:.2f} s succeeded"] if is_early else []
+    return [because("chaos.stop.succeeded", time=motion.elapsed)] if is_early else []
 
 
 def goal_and_stop(site: ChaosSite, random: Random) -> str:
@@ -71,7 +72,7 @@ def goal_and_stop(site: ChaosSite, random: Random) -> str:
     for _ in range(count):
         site.arm.stop()
         if not site.stands_within(STOPPED):
-            site.found.append(f"the arm goes on for {STOPPED:g} s after a stop")
+            site.found.append(because("chaos.stop.goes_on", time=STOPPED))
         _breath(site, random, long_goal(site, random))
     return f"a goal and a stop in one breath, {count} times"
 
@@ -87,7 +88,7 @@ def long_goal(site: ChaosSite, random: Random) -> FollowJointTrajectoryGoal:
             continue
         if plan.duration > LONG:
             return FollowJointTrajectoryGoal(trajectory=plan.trajectory)
-    raise error or gemelo.Error(f"no plan takes longer than {LONG:g} s")
+    raise error or gemelo.Error(because("chaos.no_long_plan", time=LONG))
 
 
 def _breath(site: ChaosSite, random: Random, goal: FollowJointTrajectoryGoal) -> None:
@@ -99,13 +100,13 @@ def _breath(site: ChaosSite, random: Random, goal: FollowJointTrajectoryGoal) ->
     try:
         node.call(DEVICE_STOP, DeviceStopRequest(), TO_ANSWER)
     except (RequestRefused, NoAnswer) as error:
-        site.found += [] if is_starved(str(error)) else [f"a stop in one breath with a goal was not answered: {error}"]
+        site.found += [] if is_starved(error.reason) else [because("chaos.breath.unanswered", error.reason)]
     if not site.stands_within(STOPPED):
-        site.found.append(f"the arm goes on for {STOPPED:g} s after a stop in one breath with its goal")
+        site.found.append(because("chaos.breath.goes_on", time=STOPPED))
     with suppress(RequestRefused, NoAnswer):
         asked = ResultRequest(goal_id=goal_id, wait=1.0)
         if node.call(keys.result_request(FOLLOW_JOINT_TRAJECTORY), asked).status is GoalStatusCode.SUCCEEDED:
-            site.found.append("a goal that a stop came with has succeeded")
+            site.found.append(because("chaos.breath.succeeded"))
 
 
 def _nothing() -> None: ...

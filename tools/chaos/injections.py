@@ -13,6 +13,7 @@ from random import Random
 import psutil
 
 import gemelo
+from gemelo.schemas.reasons import because
 from gemelo.tools.chaos.descriptors import give_descriptors, take_descriptors
 from gemelo.tools.chaos.noisy_line import NoisyLine
 from gemelo.tools.chaos.site import ChaosSite, program
@@ -89,7 +90,7 @@ def twin_of_a_frozen(name: str) -> Begin:
         site.stack.kill(name, signal.SIGSTOP)
         site.twin.start()
         if not site.twin.has_begun():
-            site.found.append(f"a second {name} has not taken the place of one that is frozen")
+            site.found.append(because("chaos.twin.not_taken", name=name))
         thawed(name)(site)
         return f"freeze {name}, a second one in its place, then thaw"
 
@@ -105,7 +106,7 @@ def twin_of_the_devices_client(site: ChaosSite, random: Random) -> str:
     prefix = f"gemelo-device-{site.arm.description.device.name}-"
     client_id = site.link.newest_client(prefix)
     if not client_id:
-        raise StackError(f"no client {prefix}... has joined the broker")
+        raise StackError(because("chaos.no_client", begin=prefix))
     comes_back = random.random() < 0.5
     site.twin_client = TwinClient(site.broker_port, client_id, comes_back)
     return f"a second client {prefix}..., {'again and again' if comes_back else 'once'}"
@@ -134,7 +135,7 @@ def deaf(to_device: bool) -> Begin:
 def line_of(site: ChaosSite) -> NoisyLine:
     """Raises `StackError` where the wire is no serial line."""
     if site.line is None:
-        raise StackError("there is no serial line")
+        raise StackError(because("chaos.no_line"))
     return site.line
 
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceState
+from gemelo.schemas.reasons import Reason, because
 
 SLOT = 0.001  # [s] of the device's path: a state may be one older than it says
 STEPS = 2.0  # by which two rounded positions may be off
@@ -14,13 +15,13 @@ SHORTEST = 0.015  # [s] between two states of which an acceleration is computed
 AROUND = 50_000_000  # [ns] between what the device said of a late slot and the states that show it
 FREE = 1.3  # an acceleration computed from positions 20 ms apart may be above the limit by this factor
 
-# Reasons of a machine without time for gateway and device.
-STARVED = ("lost the gateway's heartbeat", "is silent for more than", "has been silent for")
+# Codes of a machine without time for gateway and device.
+STARVED = frozenset(("ending.held.heartbeat", "device.silent", "answer.goal.silent"))
 
 
-def is_starved(reason: str) -> bool:
-    """True if `reason` says that the machine had no time for gateway or device."""
-    return any(words in reason for words in STARVED)
+def is_starved(why: Reason | None) -> bool:
+    """True if `why`, or a reason behind it, says that the machine had no time for gateway or device."""
+    return why is not None and (why.code in STARVED or any(map(is_starved, why.causes)))
 
 
 def segments(states: Sequence[DeviceState], late: Sequence[int]) -> list[list[DeviceState]]:
@@ -40,7 +41,7 @@ def segments(states: Sequence[DeviceState], late: Sequence[int]) -> list[list[De
     return pieces
 
 
-def jumps(arm: ArmDescription, states: Sequence[DeviceState]) -> list[str]:
+def jumps(arm: ArmDescription, states: Sequence[DeviceState]) -> list[Reason]:
     """Every place where a joint went farther between two states of one segment than its velocity limit allows."""
     found = []
     for before, after in pairwise(states):
@@ -48,11 +49,11 @@ def jumps(arm: ArmDescription, states: Sequence[DeviceState]) -> list[str]:
         for joint, old, new in zip(arm.joints, before.steps, after.steps, strict=True):
             allowed = joint.velocity * abs(joint.steps.per_unit) * (dt + SLOT) + STEPS
             if abs(new - old) > allowed:
-                found.append(f"{joint.name} went {new - old:+d} steps in {dt * 1e3:.1f} ms, allowed {allowed:.0f}")
+                found.append(because("chaos.jump", joint=joint.name, steps=new - old, time=dt, allowed=allowed))
     return found
 
 
-def jerks(arm: ArmDescription, states: Sequence[DeviceState]) -> list[str]:
+def jerks(arm: ArmDescription, states: Sequence[DeviceState]) -> list[Reason]:
     """Every place where a joint's velocity changed faster over three states than its acceleration limit allows.
 
     Velocities are differences of counters, so each is off by rounding to steps and by a slot of time; both are taken
@@ -70,23 +71,23 @@ def jerks(arm: ArmDescription, states: Sequence[DeviceState]) -> list[str]:
             unsure = (STEPS + max(abs(before), abs(after)) * SLOT) * (1.0 / one + 1.0 / two)
             allowed = FREE * joint.acceleration * abs(joint.steps.per_unit) * (one + two) / 2.0 + unsure
             if abs(after - before) > allowed:
-                found.append(f"{joint.name} changed by {after - before:+.0f} steps/s at once, allowed {allowed:.0f}")
+                found.append(because("chaos.jerk", joint=joint.name, change=after - before, allowed=allowed))
     return found
 
 
-def moved(arm: ArmDescription, at_rest: Sequence[float], now: Sequence[float]) -> list[str]:
+def moved(arm: ArmDescription, at_rest: Sequence[float], now: Sequence[float]) -> list[Reason]:
     """Every joint that is elsewhere [rad] or [m] than where it rested, by more than rounding."""
     return [
-        f"{joint.name} moved by itself from {old:.6f} to {new:.6f}"
+        because("chaos.moved", joint=joint.name, old=old, new=new)
         for joint, old, new in zip(arm.joints, at_rest, now, strict=True)
         if abs(new - old) > STEPS / joint.steps.per_unit
     ]
 
 
-def misses(arm: ArmDescription, goal: Sequence[float], shaft: Sequence[float]) -> list[str]:
+def misses(arm: ArmDescription, goal: Sequence[float], shaft: Sequence[float]) -> list[Reason]:
     """Every joint whose true shaft [rad] or [m] is not at the goal that was called reached."""
     return [
-        f"{joint.name} was called at {wanted:.6f}, its shaft is at {true:.6f}"
+        because("chaos.missed", joint=joint.name, wanted=wanted, true=true)
         for joint, wanted, true in zip(arm.joints, goal, shaft, strict=True)
         if abs(true - wanted) > STEPS / joint.steps.per_unit
     ]

@@ -21,12 +21,12 @@ from mcap.stream_reader import StreamReader
 from gemelo.libraries.runtime.deployment import load_deployment
 from gemelo.libraries.runtime.process.ending import ended_by_signals
 from gemelo.schemas.deployment import DeviceKind
-from gemelo.schemas.reasons import Reason, because, plain
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.topics import JOINT_STATES
 from gemelo.tools.chaos.campaign import Campaign, Episode, order
 from gemelo.tools.chaos.faults import FAULTS, Fault
 from gemelo.tools.chaos.invariants import missing_records
-from gemelo.tools.chaos.report import ChaosReport, page_of, text_of
+from gemelo.tools.chaos.report import ChaosReport, page_of, reasons_of, text_of
 from gemelo.tools.chaos.site import ChaosSite, installed_broker, processes_of
 from gemelo.tools.cli.common.language import choose, sentence
 from gemelo.tools.cli.recording.chaos import add_chaos_options, language_option
@@ -60,7 +60,7 @@ def main() -> None:
             is_good = run(wanted, seed, options.minutes * 60.0, broker, options.out.resolve(), tuple(options.only))
             sys.exit(0 if is_good else 1)
     except StackError as error:
-        sys.exit(f"chaos: {error}")
+        sys.exit(f"chaos: {sentence(error.reason)}")
     except KeyboardInterrupt:
         sys.exit(f"chaos: {sentence(because('chaos.interrupted'))}")
 
@@ -127,7 +127,7 @@ def line_of(episode: Episode) -> Reason:
     """One line about an episode that has just ended."""
     notes = [because("chaos.by_hand", hands=episode.hands)] if episode.hands else []
     notes += [because("chaos.late")] if episode.was_late else []
-    notes += [because("chaos.violated", *map(plain, episode.violations))] if episode.violations else []
+    notes += [because("chaos.violated", *reasons_of(episode))] if episode.violations else []
     code = "chaos.ended.notes" if notes else "chaos.ended"
     return because(code, *notes, number=episode.number, fault=episode.chosen or episode.fault, ended=episode.ended)
 

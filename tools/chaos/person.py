@@ -12,6 +12,7 @@ from gemelo import DeviceMode
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceEvent, DeviceState, ShaftPositions
 from gemelo.schemas.joints import JointState
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.topics import DEVICE_EVENTS, DEVICE_SHAFT, DEVICE_STATE, JOINT_STATES
 
 SHARES = (0.2, 0.8)  # of a joint's travel between which goals lie
@@ -96,33 +97,35 @@ class Person:
         newest = lambda: self._shaft.message is not None and self._shaft.message.stamp > asked  # noqa: E731
         seen: ShaftPositions | None = self._shaft.message if self.arm.wait_for(newest, 3.0) else None
         if seen is None:
-            raise gemelo.Lost("the virtual device does not say where its shafts are")
+            raise gemelo.Lost(because("chaos.no_shafts"))
         positions = dict(zip(seen.name, seen.position, strict=True))
         return tuple(positions[name] for name in self.arm.joint_names)
 
-    def make_ready(self, seconds: float, reference: bool) -> str:
-        """Does what the device's mode asks for until it is idle; why it is not after `seconds` [s], or "".
+    def make_ready(self, seconds: float, reference: bool) -> Reason | None:
+        """Does what the device's mode asks for until it is idle; why it is not after `seconds` [s], None where it is.
 
         `reference`: the shafts may not be where the counters say, so the arm is referenced in any case.
         """
-        end, reason = time.monotonic() + seconds, "nothing was tried"
+        end = time.monotonic() + seconds
+        why: Reason | None = because("chaos.untried")
         while time.monotonic() < end:
             try:
-                reason = self._next_step(reference)
+                why = self._next_step(reference)
             except gemelo.Error as error:
-                reason = str(error)
-            if not reason:
-                return ""
+                why = error.message
+            if why is None:
+                return None
             reference = reference and "reference" not in self.hands
             self.pause(0.1)
-        return reason
+        return why
 
-    def _next_step(self, reference: bool) -> str:
+    def _next_step(self, reference: bool) -> Reason | None:
         device = self.arm.device
         mode, configuration = device.mode, device.configuration
         if not configuration.accepted:
             if configuration.device_crc32 == configuration.crc32:
-                return configuration.reason or "the device is out of reach"  # it has the configuration
+                text = configuration.reason  # it has the configuration
+                return configuration.why or (plain(text) if text else because("chaos.out_of_reach"))
             return self._do("configure", lambda: device.configure())
         if mode in (DeviceMode.FAULT, DeviceMode.ESTOP):
             return self._do("reset", device.reset)
@@ -132,19 +135,19 @@ class Person:
             return self._do("arm", device.arm)
         if mode is DeviceMode.UNREFERENCED or reference:
             return self._do("reference", self._reference)
-        return "" if mode is DeviceMode.IDLE else f"the device is in {mode.name}"
+        return None if mode is DeviceMode.IDLE else because("chaos.mode", mode=mode.name)
 
     def _reference(self) -> None:
         """A person looks where the arm stands: a virtual one says where its shafts are."""
         joints = self.arm.description.joints
         self.arm.reference({joint.name: joint.clamp(at) for joint, at in zip(joints, self.shaft(), strict=True)})
 
-    def _do(self, word: str, act: object) -> str:
+    def _do(self, word: str, act: object) -> Reason:
         assert callable(act)
         act()
         if word not in self.hands:
             self.hands.append(word)
-        return f"{word} has just been done"
+        return because("chaos.just_done", hand=word)
 
 
 def random_goal(arm: ArmDescription, random: Random) -> dict[str, float]:

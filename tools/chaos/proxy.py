@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import os
 import threading
 from asyncio import StreamReader, StreamWriter
 from collections.abc import Awaitable, Callable
@@ -22,7 +24,7 @@ class ProxyThread:
         self._thread = threading.Thread(target=self._run, name="proxy", daemon=True)
         self._thread.start()
         if not (self._has_begun.wait(PATIENCE) and self._is_listening):
-            raise OSError(f"nothing can listen on 127.0.0.1:{port}")
+            raise OSError(errno.EADDRNOTAVAIL, os.strerror(errno.EADDRNOTAVAIL), f"127.0.0.1:{port}")
 
     def call(self, work: Callable[[], object]) -> None:
         """Has the loop do it soon."""

@@ -11,7 +11,9 @@ from gemelo.libraries.runtime.actions import keys
 from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
 from gemelo.schemas.actions import GoalRequest, GoalResponse
 from gemelo.schemas.message import decode, encode
+from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY
+from gemelo.tools.chaos.causes import cause_of
 from gemelo.tools.chaos.invariants import STEPS, is_starved
 from gemelo.tools.chaos.site import ChaosSite
 from gemelo.tools.stack.stack import StackError
@@ -90,32 +92,33 @@ def replayed_during_another_move(site: ChaosSite, random: Random) -> str:
     return f"the goal again during another move: {', '.join(sorted(set(answers)))}"
 
 
-def disturbed(site: ChaosSite, motion: gemelo.Motion) -> list[str]:
+def disturbed(site: ChaosSite, motion: gemelo.Motion) -> list[Reason]:
     """What is wrong about the end of a move during which a goal of before was sent again."""
     try:
         motion.wait(motion.plan.duration + TO_END)
     except (gemelo.Error, TimeoutError) as error:
-        return [] if is_starved(str(error)) else [f"a goal of before that was sent again has ended a move: {error}"]
+        why = cause_of(error)
+        return [] if is_starved(why) else [because("chaos.replay.ended", why)]
     goal, at = motion.plan.end, motion.stopped_at
     away = [
         joint.name
         for joint in site.arm.description.joints
         if abs(at[joint.name] - goal[joint.name]) * abs(joint.steps.per_unit) > STEPS
     ]
-    return [f"{name} is elsewhere than its goal, as one of before was sent again" for name in away]
+    return [because("chaos.replay.elsewhere", joint=name) for name in away]
 
 
 def _sent_at_rest(site: ChaosSite, send: Send, request: GoalRequest) -> str:
     """Sends it to an arm that stands; reports every step that comes of it."""
     if not site.stands_within(STOPPED):
-        raise StackError(f"the arm does not stand within {STOPPED:g} s")
+        raise StackError(because("chaos.not_standing", time=STOPPED))
     answers = list[str]()
     for _ in range(TRIES):
         before = site.slots.size
         answers.append(send(site, request))
         site.pause(WATCHED)
         if steps := site.steps_since(before):
-            site.found.append(f"a goal of before, sent again ({answers[-1]}), moved the arm in {steps} slots")
+            site.found.append(because("chaos.replay.moved", answer=answers[-1], slots=steps))
     return ", ".join(sorted(set(answers)))
 
 

@@ -96,7 +96,12 @@ def _cells(row: FaultRow) -> tuple[str, ...]:
 def violations_of(episode: Episode) -> list[Reason]:
     """Each with its episode."""
     about: dict[str, Value] = {"number": episode.number, "fault": episode.chosen or episode.fault}
-    return [because("chaos.episode", plain(each), **about) for each in episode.violations]
+    return [because("chaos.episode", each, **about) for each in reasons_of(episode)]
+
+
+def reasons_of(episode: Episode) -> tuple[Reason, ...]:
+    """Of its violations."""
+    return episode.why or tuple(map(plain, episode.violations))
 
 
 def _of_no_episode(report: ChaosReport) -> list[str]:

@@ -22,6 +22,7 @@ from gemelo.libraries.runtime.saved_parameters import SavedParameters
 from gemelo.schemas.actions import GoalRequest
 from gemelo.schemas.deployment import Deployment, Wire
 from gemelo.schemas.message import BadMessage, decode
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.system import Exchange
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, exchange_topic
 from gemelo.services.broker import mosquitto
@@ -93,7 +94,7 @@ class ChaosSite:
         self.twin: TwinProcess | None = None  # while there are two of one process
         self.twin_client: TwinClient | None = None  # while there are two of one client of the broker
         self.motion: gemelo.Motion  # of this episode
-        self.found: list[str] = []  # what the injections of this episode saw themselves and must not be
+        self.found: list[Reason] = []  # what the injections of this episode saw themselves and must not be
         self.slots = SlotFile(out / "slots")
         self._out = out
         self._port, self.broker_port = free_ports(2)
@@ -127,7 +128,7 @@ class ChaosSite:
         try:
             return SteppingClocks(self._out, [*map(program, PROCESSES), "mosquitto"])  # which takes a broker's place
         except ClockError as error:
-            raise StackError(str(error)) from error
+            raise StackError(error.reason) from error
 
     def __enter__(self) -> ChaosSite:
         with ExitStack() as closing:
@@ -180,7 +181,7 @@ class ChaosSite:
             if self.arm.node.monotonic() > end:
                 return False
 
-    def end_twin(self, judge: Callable[[TwinProcess], list[str]]) -> list[str]:
+    def end_twin(self, judge: Callable[[TwinProcess], list[Reason]]) -> list[Reason]:
         """Ends the second process, if there is one; what `judge` has found of it before."""
         twin, self.twin = self.twin, None
         if twin is None:
@@ -195,7 +196,7 @@ class ChaosSite:
         if self.twin_client is not None:
             self.twin_client.close()
 
-    def take_found(self) -> list[str]:
+    def take_found(self) -> list[Reason]:
         """What the injections saw themselves since the last call."""
         found, self.found = self.found, []
         return found
@@ -204,7 +205,7 @@ class ChaosSite:
         """The request that began this episode's motion, as the gateway has published it; raises `StackError`."""
         goal_id = self.motion.goal_id
         if not self.arm.wait_for(lambda: goal_id in self._goals, TO_RECORD):
-            raise StackError(f"the gateway has not published its goal {goal_id} within {TO_RECORD:g} s")
+            raise StackError(because("chaos.goal_unpublished", goal=goal_id, time=TO_RECORD))
         return self._goals[goal_id]
 
     def restart(self, name: str) -> None:
@@ -213,7 +214,7 @@ class ChaosSite:
         end = time.monotonic() + TO_RESTART
         while (pid := self.stack.pid(name)) in (0, before):
             if time.monotonic() > end:
-                raise StackError(f"{name} (process {before or pid}) is not started again within {TO_RESTART:g} s")
+                raise StackError(because("chaos.not_restarted", name=name, pid=before or pid, time=TO_RESTART))
             self.pause(0.05)
 
     def use_wire(self, wire: Wire) -> None:
@@ -238,7 +239,8 @@ class ChaosSite:
                 return NoisyLine(path, self._seed)
             except OSError as error:
                 if time.monotonic() > end:
-                    raise StackError(f"no serial line at {path} within {TO_RESTART:g} s: {error}") from error
+                    why = because("chaos.line_late", file=str(path), time=TO_RESTART, error=str(error))
+                    raise StackError(why) from error
             self.pause(0.05)
 
     def _close_line(self) -> None:
@@ -263,4 +265,5 @@ class ChaosSite:
             return gemelo.connect(name="chaos", timeout=TO_CONNECT)
         except gemelo.Error as error:
             unready = self.stack.why_not_ready()
-            raise StackError("\n".join([f"no arm to move: {error}", *map(str, unready)]), unready) from error
+            lines = (plain(str(each)) for each in unready)
+            raise StackError(because("chaos.no_arm", error.message, *lines), unready) from error

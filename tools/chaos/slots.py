@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gemelo.firmware.platform.host.slot_record import JOINTS, ROW, SLOT, STOOD
 from gemelo.schemas.device_config import DeviceConfig, JointConfig
+from gemelo.schemas.reasons import Reason, because
 
 ROWS = np.dtype([("time", "<i8"), ("boot", "<u8"), ("steps", "<i4", (JOINTS,))])
 SPANS = (1, 2, 5, 10, 20, 40, 80)  # slots over which velocity and acceleration are taken
@@ -72,12 +73,12 @@ def steps_in(rows: Rows) -> int:
     return int((rows["boot"] != STOOD).sum())
 
 
-def violations(config: DeviceConfig, rows: Rows, may_stop_at_once: bool = False) -> list[str]:
+def violations(config: DeviceConfig, rows: Rows, may_stop_at_once: bool = False) -> list[Reason]:
     """Every joint that went or changed faster than its limits, over any span of slots, with the worst of each.
 
     `may_stop_at_once`: drivers that go off let the counters stop from one slot to the next, and only velocities count.
     """
-    found: list[str] = []
+    found: list[Reason] = []
     for counts in segments(rows):
         for index, joint in enumerate(config.joints):
             found += too_fast(joint, counts[:, index])
@@ -85,19 +86,19 @@ def violations(config: DeviceConfig, rows: Rows, may_stop_at_once: bool = False)
     return found
 
 
-def too_fast(joint: JointConfig, place: Counts) -> Iterator[str]:
+def too_fast(joint: JointConfig, place: Counts) -> Iterator[Reason]:
     """Where `place` [steps] changes faster than the joint may; it is rounded, so a difference is off by one at most."""
     for span in SPANS:
         went = int(np.abs(place[span:] - place[:-span]).max(initial=0))
         allowed = joint.max_velocity_q8 / Q8 * span / SECOND + 1.0
         if went > allowed:
-            yield f"{joint.name} went {went} steps in {span} ms, allowed {allowed:.1f}"
+            yield because("chaos.slots.jump", joint=joint.name, steps=went, span=span, allowed=allowed)
 
 
-def too_steep(joint: JointConfig, place: Counts) -> Iterator[str]:
+def too_steep(joint: JointConfig, place: Counts) -> Iterator[Reason]:
     """Where the velocity of `place` [steps] changes faster than the joint may; rounding makes up two steps at most."""
     for span in SPANS:
         turn = int(np.abs(place[2 * span :] - 2 * place[span:-span] + place[: -2 * span]).max(initial=0))
         allowed = (1.0 + MARGIN) * joint.max_acceleration_q8 / Q8 * (span / SECOND) ** 2 + 2.0
         if turn > allowed:
-            yield f"{joint.name} changed by {turn} steps over 2 x {span} ms, allowed {allowed:.1f}"
+            yield because("chaos.slots.jerk", joint=joint.name, steps=turn, span=span, allowed=allowed)

@@ -26,8 +26,9 @@ from gemelo.libraries.runtime.endpoints import parameter_request
 from gemelo.libraries.runtime.errors import NoAnswer
 from gemelo.libraries.runtime.process.ending import ended_by_signals
 from gemelo.schemas.deployment import DeviceKind
-from gemelo.schemas.reasons import Reason, Value, because, plain
+from gemelo.schemas.reasons import Reason, Value, because
 from gemelo.schemas.system import SetParameter
+from gemelo.tools.chaos.causes import cause_of
 from gemelo.tools.chaos.site import ChaosSite, installed_broker
 from gemelo.tools.cli.common.language import choose, columns, sentence
 from gemelo.tools.cli.common.text_table import table
@@ -87,10 +88,8 @@ def main() -> None:
     try:
         with ended_by_signals():
             sys.exit(0 if run(options.hours * HOUR, options.seed, broker, options.out.resolve()) else 1)
-    except NoAnswer as error:
+    except (StackError, NoAnswer) as error:
         sys.exit(f"soak: {sentence(error.reason)}")
-    except StackError as error:
-        sys.exit(f"soak: {error}")
     except KeyboardInterrupt:
         sys.exit(f"soak: {sentence(because('soak.interrupted'))}")
 
@@ -109,7 +108,7 @@ def run(seconds: float, seed: int, broker: str, out: Path) -> bool:
                 motion.wait(motion.plan.duration + TO_END)
                 moves += 1
             except (gemelo.Error, TimeoutError) as error:
-                failures.append(error.message if isinstance(error, gemelo.Error) else plain(str(error)))
+                failures.append(cause_of(error))
                 person.pause(1.0)
             if now >= due:
                 due = now + EVERY

@@ -9,6 +9,7 @@ from random import Random
 
 import gemelo
 from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import JOINT_TARGETS
 from gemelo.tools.chaos.site import ChaosSite
 
@@ -75,7 +76,7 @@ def stream_of_two(site: ChaosSite, random: Random) -> str:
 def expect_rest(site: ChaosSite) -> None:
     """Notes an arm that does not come to rest by itself."""
     if not site.stands_within(RESTS):
-        site.found.append(f"the arm still moves {RESTS:g} s after the last target")
+        site.found.append(because("chaos.stream.moves", time=RESTS))
 
 
 def _ready(site: ChaosSite) -> None:

@@ -12,6 +12,7 @@ from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
 from gemelo.libraries.mqtt.client import stop_loop
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.stack.stack import Stack, StackError
 
 TO_BEGIN = 60.0  # [s] until a second process has loaded all and shows itself, on a machine without time
@@ -56,25 +57,25 @@ class TwinProcess:
         """True if the second process has ended by itself."""
         return self._process is None or self._process.poll() is not None
 
-    def gave_way(self) -> list[str]:
+    def gave_way(self) -> list[Reason]:
         """Waits until the second one has ended; what of that is wrong."""
         if not _until(self._has_shown_itself, TO_BEGIN):
-            return [f"a second {self.name} has not begun within {TO_BEGIN:g} s: the machine gives it no time"]
+            return [because("chaos.twin.not_begun", name=self.name, time=TO_BEGIN)]
         if not _until(lambda: self.has_ended, TO_GIVE_WAY):
-            return [f"a second {self.name} goes on beside the first for {TO_GIVE_WAY:g} s"]
+            return [because("chaos.twin.beside", name=self.name, time=TO_GIVE_WAY)]
         found = self._untold()
         if self._stack.pid(self.name) != self.first:
-            found.append(f"{self.name} has ended for a second one that started after it")
+            found.append(because("chaos.twin.first_ended", name=self.name))
         return found
 
     def has_begun(self) -> bool:
         """Waits until the second one has begun its work: it says so where a process says that it is alive."""
         return _until(lambda: self.has_ended or self._is_at_work(), TO_BEGIN) and not self.has_ended
 
-    def one_is_left(self) -> list[str]:
+    def one_is_left(self) -> list[Reason]:
         """Waits until one of both has ended; what of that is wrong."""
         if not _until(lambda: self.has_ended or not psutil.pid_exists(self.first), TO_GIVE_WAY):
-            return [f"two of {self.name} go on beside each other for {TO_GIVE_WAY:g} s"]
+            return [because("chaos.twin.both", name=self.name, time=TO_GIVE_WAY)]
         return self._untold() if self.has_ended else []
 
     def _is_at_work(self) -> bool:
@@ -84,9 +85,10 @@ class TwinProcess:
     def _has_shown_itself(self) -> bool:
         return self.has_ended or self._log.stat().st_size > 0 or self._is_at_work()
 
-    def _untold(self) -> list[str]:
+    def _untold(self) -> list[Reason]:
         said = self._log.read_text(errors="replace").strip()
-        return [] if said and "Traceback" not in said else [f"a second {self.name} ended without a sentence: {said!r}"]
+        is_told = said and "Traceback" not in said
+        return [] if is_told else [because("chaos.twin.silent", name=self.name, text=said)]
 
 
 class TwinClient:

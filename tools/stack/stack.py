@@ -17,6 +17,8 @@ from types import TracebackType
 from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.process.readiness import says_ready
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import Reason
 from gemelo.tools.stack.compose import Compose, ComposeError
 from gemelo.tools.stack.guard import Guard
 from gemelo.tools.stack.not_ready import NotReady, not_ready
@@ -39,13 +41,13 @@ POLL = 0.05  # [s]
 STOP = 20.0  # [s] for all to end by themselves
 
 
-class StackError(Exception):
+class StackError(ReasonedError):
     """The stack did not start or did not do what was asked; the text holds the end of the logs concerned.
 
     `unready` says of each process that is not ready why.
     """
 
-    def __init__(self, text: str, unready: Sequence[NotReady] = ()) -> None:
+    def __init__(self, text: Reason | str, unready: Sequence[NotReady] = ()) -> None:
         super().__init__(text)
         self.unready = tuple(unready)
 
