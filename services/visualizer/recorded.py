@@ -30,7 +30,9 @@ from gemelo.libraries.runtime.process.own_files import make_own
 from gemelo.libraries.runtime.started import load_started
 from gemelo.schemas.camera import CameraImage
 from gemelo.schemas.deployment import ViewerMode
+from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.frames import RobotDescription
+from gemelo.schemas.reasons import Reason, because, plain, say
 from gemelo.schemas.reasons.catalogue import ENGLISH, languages
 from gemelo.schemas.scene import MeshShape, PlanningScene, SceneMesh
 from gemelo.schemas.scene_meshes import with_meshes
@@ -69,7 +71,7 @@ def write_view(file: Path, rrd: Path, shadow: Path, language: str = ENGLISH) -> 
         core = _core(description, folders)
         taken = _takers(core, shadow, cameras, _meshes_in(reader))
     except (DescriptionError, ValueError) as error:
-        raise BadRecording(f'"{file}": its robot cannot be drawn: {error}') from error
+        raise BadRecording(because("recording.robot.not_drawn", _why(error), file=str(file))) from error
     stream = rr.RecordingStream(APPLICATION, recording_id=file.stem)
     rrd.parent.mkdir(parents=True, exist_ok=True)
     make_own(rrd)
@@ -102,7 +104,7 @@ def _cell(text: str) -> str:
 def _description_in(reader: RecordingReader) -> RobotDescription:
     for row in reader.rows(DESCRIPTION.key.__eq__):
         return msgspec.json.decode(row.message.data, type=RobotDescription)
-    raise BadRecording(f'"{reader.path}" has no description of its robot: it was recorded without state_publisher')
+    raise BadRecording(because("recording.robot.no_description", file=str(reader.path)))
 
 
 def _cameras_in(reader: RecordingReader) -> tuple[str, ...]:
@@ -163,6 +165,10 @@ def _decoding_image(camera: str, take: Callable[[CameraImage], None]) -> Callabl
     return take_row
 
 
+def _why(error: Exception) -> Reason:
+    return error.reason if isinstance(error, ReasonedError) else plain(str(error))
+
+
 def show(rrd: Path, stopping: threading.Event) -> int:
     """Runs a viewer of its own on `rrd` until it is closed, or asked to stop; returns its exit code."""
     deployment = load_started()
@@ -204,7 +210,7 @@ def main() -> None:
         if options.picture is None and options.save is None:
             sys.exit(show(rrd, stopping))
     except (BadRecording, DeploymentError, RuntimeError, OSError) as error:
-        sys.exit(f"gemelo: {error}")
+        sys.exit(f"gemelo: {say(_why(error), options.lang)}")
 
 
 if __name__ == "__main__":

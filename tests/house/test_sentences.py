@@ -17,7 +17,7 @@ FOLDERS = {  # whose sentences stand in the code, and why
     "tools/demo/": "shows a checkout, in the words of its film",
     "tools/replay/": "compares a recording with the code, for who works on that",
     "tools/stack/": "starts and stops processes for `make`, before anything of the product is built",
-    "services/visualizer/": "not converted yet: the view and its recordings",
+    "services/visualizer/": "not converted yet: the view",
 }
 FOR_DEVELOPERS = {  # exceptions that no person is shown: a traceback or a log has them
     "AttributeError": "a mistake in a program",

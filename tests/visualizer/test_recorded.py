@@ -138,3 +138,17 @@ def test_a_recording_of_no_robot_is_said(tmp_path):
     file.close()
     with pytest.raises(BadRecording, match=r"robot\.toml cannot be read"):
         write_view(file.path, tmp_path / "view.rrd", tmp_path / "shadow")
+
+
+@pytest.mark.parametrize("change", ["", "<link"])
+def test_a_recording_whose_robot_cannot_be_drawn_is_said_with_its_code(tmp_path, change):
+    robot = describe(load_arm(ROOT / "urdf/rm1"))
+    files = {"robot": "rm1", "robot_toml": robot.robot_toml, "urdf": robot.urdf, "srdf": robot.srdf}
+    file = McapFile(tmp_path / "box.mcap", {ROBOT: files})
+    if change:
+        file.write([Entry(DESCRIPTION, replace(robot, urdf=robot.urdf.replace(change, "<other")), START)])
+    file.close()
+    with pytest.raises(BadRecording) as refused:
+        write_view(tmp_path / "box.mcap", tmp_path / "view.rrd", tmp_path / "shadow")
+    code = "recording.robot.not_drawn" if change else "recording.robot.no_description"
+    assert (refused.value.reason.code, refused.value.reason.values) == (code, {"file": str(tmp_path / "box.mcap")})
