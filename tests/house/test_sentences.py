@@ -17,7 +17,6 @@ FOLDERS = {  # whose sentences stand in the code, and why
     "tools/demo/": "shows a checkout, in the words of its film",
     "tools/replay/": "compares a recording with the code, for who works on that",
     "tools/stack/": "starts and stops processes for `make`, before anything of the product is built",
-    "services/visualizer/": "not converted yet: the view",
 }
 FOR_DEVELOPERS = {  # exceptions that no person is shown: a traceback or a log has them
     "AttributeError": "a mistake in a program",
@@ -44,6 +43,7 @@ SINGLE = {  # by file and what carries it
     ("libraries/runtime/application.py", "ArgumentTypeError"): "the command line of a service, for its supervisor",
     ("libraries/runtime/process/shutdown.py", "print"): "a line of a service's log",
     ("services/planner/path/curve.py", "TurnsOnTheSpot"): "caught where the path is cut",
+    ("services/visualizer/viewer.py", "say"): "a line of a service's log",
     ("tools/cli/bus/action_watch.py", "unknown"): "a kind of thing, which the catalogue has as `word.unknown`",
     ("tools/cli/robot/import_robot.py", "print"): "a line of shell to copy",
 }

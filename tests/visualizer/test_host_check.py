@@ -170,8 +170,14 @@ def test_more_connections_than_it_holds_are_closed_and_the_others_go_on(echo: Ec
 
 
 def test_a_port_that_is_taken_is_named() -> None:
-    with socket.create_server((LOOPBACK, 0)) as taken, pytest.raises(PortTaken, match="cannot listen on 127"):
+    with (
+        socket.create_server((LOOPBACK, 0)) as taken,
+        pytest.raises(PortTaken, match="cannot listen on 127") as refused,
+    ):
         HostCheck({taken.getsockname(): (LOOPBACK, 1)}, frozenset())
+    why = refused.value.reason
+    assert why.code == "port.viewer"
+    assert f"{why.values['port']}" in str(why)
 
 
 def test_the_program_s_own_address_is_loopback_s_and_another_each_time() -> None:

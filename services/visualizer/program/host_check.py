@@ -21,6 +21,7 @@ from typing import Self
 
 from gemelo.libraries.runtime.process.own_names import host_objection
 from gemelo.libraries.runtime.process.ports import PortTaken
+from gemelo.schemas.reasons import because
 
 Address = tuple[str, int]
 
@@ -127,7 +128,7 @@ def _listening(address: Address) -> socket.socket:
     try:
         return socket.create_server(address, family=family, dualstack_ipv6=is_dual)
     except OSError as error:
-        raise PortTaken(f"cannot listen on {host} port {port} ({error}): stop what does, or choose another") from None
+        raise PortTaken(because("port.viewer", host=host, port=port, error=str(error))) from None
 
 
 def _forbidden(reason: str) -> bytes:

@@ -17,6 +17,8 @@ from pathlib import Path
 import numpy as np
 from rerun.experimental import ViewerClient
 
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import because
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.program.rerun_program import LOOPBACK, environment, free_port, rerun_binary
 
@@ -26,7 +28,7 @@ DRAWN = 1.5  # [s] until another time is drawn
 NOTHING_DRAWS = re.compile(r"(?i)render context|no suitable .*adapter|adapter.*not found|(?:create|request).*adapter")
 
 
-class NoGraphics(RuntimeError):
+class NoGraphics(ReasonedError, RuntimeError):
     """Nothing draws on this machine."""
 
 
@@ -65,7 +67,7 @@ def _headless_viewer(rrd: Path, log: Path, size: tuple[int, int]) -> Iterator[tu
     except Exception as error:
         words = log.read_text(errors="replace")
         if NOTHING_DRAWS.search(words):
-            raise NoGraphics("no Vulkan driver draws here without a display") from error
+            raise NoGraphics(because("recording.no_graphics")) from error
         raise RuntimeError(f"no picture of {rrd}: {error}; the viewer says: {_main_words(words)}") from error
     finally:
         viewer.kill()
