@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from gemelo.schemas.reasons import because
 from gemelo.services.visualizer.content import entities
+from gemelo.services.visualizer.program import screenshot
 from gemelo.services.visualizer.program.rerun_program import rerun_binary
-from gemelo.services.visualizer.program.screenshot import save_screenshot
+from gemelo.services.visualizer.program.screenshot import NoPicture, save_screenshot
 from tests.optional import need
 
 
@@ -54,8 +56,23 @@ def test_the_picture_shows_an_arm_and_its_plots(recording, tmp_path):
 
 
 def test_a_missing_recording_is_said(tmp_path):
-    with pytest.raises(RuntimeError, match=r"there is no recording .*none\.rrd"):
+    with pytest.raises(NoPicture, match=r"there is no recording .*none\.rrd") as refused:
         save_screenshot(tmp_path / "none.rrd", tmp_path / "view.png")
+    assert refused.value.reason == because("recording.picture.none", file=str(tmp_path / "none.rrd"))
+
+
+def test_a_viewer_that_ends_at_once_is_said_with_its_words(tmp_path, monkeypatch):
+    viewer = tmp_path / "rerun"
+    viewer.write_text("#!/bin/sh\necho 'Error: no room' >&2\nexit 1\n")
+    viewer.chmod(0o755)
+    monkeypatch.setattr(screenshot, "rerun_binary", lambda: viewer)
+    (tmp_path / "a.rrd").touch()
+    with pytest.raises(NoPicture) as refused:
+        save_screenshot(tmp_path / "a.rrd", tmp_path / "view.png")
+    assert refused.value.reason == because(
+        "recording.picture.failed", because("recording.picture.not_started"), file=str(tmp_path / "a.rrd"),
+        text="Error: no room",
+    )  # fmt: skip
 
 
 def test_a_broken_recording_is_said_with_the_viewers_words(tmp_path):

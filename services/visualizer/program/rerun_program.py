@@ -12,21 +12,28 @@ from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.reasons import because
+
 LOOPBACK = "127.0.0.1"
 PATIENCE = 2.0  # [s] between asking and killing
 _PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
+class NoViewer(ReasonedError, RuntimeError):
+    """The viewer's program is not installed."""
+
+
 def rerun_binary() -> Path:
-    """The path of the program in the installed package; raises RuntimeError with the remedy where there is none."""
+    """The path of the program in the installed package; raises `NoViewer` with the remedy where there is none."""
     spec = find_spec("rerun_cli")
     if spec is None or spec.origin is None:
-        raise RuntimeError("rerun is not installed: install gemelo with its extra `view`, or run `make setup`")
+        raise NoViewer(because("recording.viewer.not_installed"))
     folder = Path(spec.origin).parent
     for candidate in (folder / "Rerun.app/Contents/MacOS/Rerun", folder / "rerun", folder / "rerun.exe"):
         if candidate.exists():
             return candidate
-    raise RuntimeError(f"{folder} holds no rerun program: reinstall the package rerun-sdk")
+    raise NoViewer(because("recording.viewer.no_program", folder=str(folder)))
 
 
 def environment(inherited: Mapping[str, str]) -> dict[str, str]:

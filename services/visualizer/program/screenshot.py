@@ -18,7 +18,7 @@ import numpy as np
 from rerun.experimental import ViewerClient
 
 from gemelo.schemas.errors import ReasonedError
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import because, plain
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.program.rerun_program import LOOPBACK, environment, free_port, rerun_binary
 
@@ -28,19 +28,23 @@ DRAWN = 1.5  # [s] until another time is drawn
 NOTHING_DRAWS = re.compile(r"(?i)render context|no suitable .*adapter|adapter.*not found|(?:create|request).*adapter")
 
 
-class NoGraphics(ReasonedError, RuntimeError):
+class NoPicture(ReasonedError, RuntimeError):
+    """The viewer takes no picture of a recording."""
+
+
+class NoGraphics(NoPicture):
     """Nothing draws on this machine."""
 
 
 def save_screenshot(
     rrd: Path, png: Path, size: tuple[int, int] = (1600, 900), timeout: float = 60.0, at: int | None = None
 ) -> Path:
-    """Write `png` of `size` [pixels] from the recording `rrd`; raises RuntimeError with the viewer's own words.
+    """Write `png` of `size` [pixels] from the recording `rrd`; raises `NoPicture` with the viewer's own words.
 
     `at` [ns] UNIX is the time on the timeline "time" that it shows; absent: where the recording opens.
     """
     if not rrd.is_file():
-        raise RuntimeError(f"there is no recording {rrd}")
+        raise NoPicture(because("recording.picture.none", file=str(rrd)))
     png.parent.mkdir(parents=True, exist_ok=True)
     deadline = time.monotonic() + timeout
     with _headless_viewer(rrd, png.with_suffix(".viewer.log"), size) as (viewer, port):
@@ -68,7 +72,8 @@ def _headless_viewer(rrd: Path, log: Path, size: tuple[int, int]) -> Iterator[tu
         words = log.read_text(errors="replace")
         if NOTHING_DRAWS.search(words):
             raise NoGraphics(because("recording.no_graphics")) from error
-        raise RuntimeError(f"no picture of {rrd}: {error}; the viewer says: {_main_words(words)}") from error
+        why = error.reason if isinstance(error, ReasonedError) else plain(str(error))
+        raise NoPicture(because("recording.picture.failed", why, file=str(rrd), text=_main_words(words))) from error
     finally:
         viewer.kill()
         viewer.wait()
@@ -89,7 +94,7 @@ def _connected(viewer: subprocess.Popen[bytes], port: int, deadline: float) -> V
             if probe.connect_ex((LOOPBACK, port)) == 0:
                 return ViewerClient.connect(f"rerun+http://{LOOPBACK}:{port}/proxy")
         time.sleep(0.1)
-    raise RuntimeError("the viewer did not start")
+    raise NoPicture(because("recording.picture.not_started"))
 
 
 def _settle(client: ViewerClient, deadline: float) -> None:
@@ -97,7 +102,7 @@ def _settle(client: ViewerClient, deadline: float) -> None:
     loaded_since = time.monotonic()
     while time.monotonic() - loaded_since < SETTLE:
         if time.monotonic() > deadline:
-            raise RuntimeError("the recording was not loaded in time")
+            raise NoPicture(because("recording.picture.not_loaded"))
         state = client.get_state()
         if state.loading or not any(recording.timelines for recording in state.recordings):
             loaded_since = time.monotonic()
