@@ -14,6 +14,7 @@ import msgspec
 from msgspec import Meta
 
 from gemelo.libraries.runtime.process.own_files import own_folder
+from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.services.logger.core import Batch, Logger
 from gemelo.services.logger.files import is_due, prune, stem_of
 from gemelo.services.logger.recording import Recording
@@ -46,6 +47,10 @@ SHARE = 20  # of a disk, one of so many parts at most is left free; chosen: a sm
 class NoReserve(OSError):
     """What is free on the disk is for others."""
 
+    def __init__(self, reason: Reason) -> None:
+        super().__init__(errno.ENOSPC, str(reason))
+        self.reason = reason
+
 
 @dataclass
 class RecordingWriter:
@@ -55,7 +60,7 @@ class RecordingWriter:
     metadata: dict[str, dict[str, str]]  # by the name of its record
     warn: Callable[[str], None]  # a warning for a person
     recording: Recording | None = field(default=None, init=False)
-    problem: str = field(default="", init=False)  # why nothing can be written at present
+    problem: Reason | None = field(default=None, init=False)  # why nothing can be written at present
     files: list[Path] = field(default_factory=list, init=False)  # begun since the start
     _retry_at: float = field(default=0.0, init=False)  # [s] monotonic
     _opened_at: float = field(default=0.0, init=False)  # [s] monotonic, of the present recording
@@ -126,7 +131,8 @@ class RecordingWriter:
             self._forget_if_empty(self.recording)
             self.recording = None
         self._retry_at = monotonic + RETRY
-        problem = f"cannot write to {folder}: {error.strerror or error}"
+        why = error.reason if isinstance(error, NoReserve) else plain(error.strerror or str(error))
+        problem = because("recording.unwritable", why, folder=str(folder))
         if problem != self.problem:
             remedy = "free space or set the parameter `log_dir`; tried again every 2 s, messages wait in memory"
             self.warn(f"{problem}; {remedy}")
@@ -141,7 +147,7 @@ class RecordingWriter:
     def _recovered(self, recording: Recording) -> None:
         if self.problem:
             self.warn(f"writing again, to {recording.path}")
-        self.problem = ""
+        self.problem = None
         self._retry_at = 0.0
 
 
@@ -150,5 +156,4 @@ def require_reserve(folder: Path, reserve_mb: float) -> None:
     disk = os.statvfs(folder)
     reserve = min(reserve_mb * 1e6, disk.f_blocks * disk.f_frsize / SHARE)
     if disk.f_bavail * disk.f_frsize < reserve:
-        reason = f"less than {reserve / 1e6:.3g} MB are free, which recordings leave (parameter `reserve_mb`)"
-        raise NoReserve(errno.ENOSPC, reason)
+        raise NoReserve(because("recording.reserve", reserve_mb=reserve / 1e6))

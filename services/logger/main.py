@@ -69,7 +69,7 @@ def run(node: Node, deployment: Deployment) -> None:
         write(now, logger.step(now))
         save(black_box.step(now, node.router))
         mark.show(parameters.value.keep_black_boxes > 0 and (black_box.is_pending or saver.is_writing))
-        node.set_ready(not disk.problem, disk.problem)
+        node.set_ready(disk.problem is None, disk.problem or "")
 
     node.spin(step, rate=WRITE_RATE)
     now = node.now()

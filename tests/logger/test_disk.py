@@ -108,7 +108,7 @@ def test_an_unwritable_folder_is_said_once_and_nothing_is_lost(rig):
     rig.write(START + SECOND)
     assert len(rig.warnings) == 1
     assert "log_dir" in rig.warnings[0]
-    assert rig.disk.problem
+    assert rig.disk.problem.code == "recording.unwritable"
     rig.folder.unlink()
     rig.write(START + round(2 * RETRY * SECOND))
     rig.disk.close()
@@ -172,18 +172,20 @@ def test_recordings_leave_room_on_their_disk_and_go_on_when_there_is_more(tmp_pa
         rig = Rig(small.folder)
         rig.put(10, START)
         rig.write(START)
-        assert rig.disk.problem == ""
+        assert rig.disk.problem is None
         small.refuse()
         with (small.folder / BALLAST).open("r+b") as ballast:
             ballast.truncate(ballast.seek(0, os.SEEK_END) - SIZE // SHARE // 2)  # half of the reserve is free
         rig.put(10, START + SECOND)
         rig.write(START + SECOND)
-        assert "reserve_mb" in rig.disk.problem
+        (why,) = rig.disk.problem.causes
+        assert (rig.disk.problem.code, why.code) == ("recording.unwritable", "recording.reserve")
+        assert "reserve_mb" in str(rig.disk.problem)
         assert (small.folder / "the_rest").write_bytes(bytes(16 * 1024)) == 16 * 1024
         small.take()
         rig.write(START + 4 * SECOND)
         rig.disk.close()
-        assert rig.disk.problem == ""
+        assert rig.disk.problem is None
         assert [each for path in rig.recordings() for each in rig.topics(path)] == ["joint_states"] * 20
         assert rig.logger.losses.sentence == ""
 
