@@ -88,7 +88,7 @@ def test_a_story_is_in_the_language_of_the_command_line(reasoned, capsys):
         "  brazo_joint en 28.6 deg, quieta", "   -1.50 s  equipo: en reposo -> en parada de emergencia",
     ]  # fmt: skip
     assert run(["--lang", "es", "blackbox", "list"]) is ExitCode.OK
-    row = capsys.readouterr().out.splitlines()[1]
+    row = capsys.readouterr().out.splitlines()[2]
     assert row.count("parada de emergencia") == 2
     assert "emergency" not in row
 
