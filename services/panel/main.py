@@ -167,8 +167,7 @@ def _connected(config: Path | None, log: logging.Logger, stop: ShutdownRequest) 
             arm = gemelo.connect(deployment=config, name=NAME, timeout=LOOK_FOR_TWIN)
             arm.control.shares = False  # the page is for whoever opens it, not for whose process it is
             try:
-                assert arm.joints
-                arm.fk()
+                require_known(arm)
                 return arm
             except BaseException:
                 arm.close()
@@ -178,6 +177,14 @@ def _connected(config: Path | None, log: logging.Logger, stop: ShutdownRequest) 
                 told = str(lost)
                 log.warning(f"waiting: {told}")
     return None
+
+
+def require_known(arm: gemelo.Arm) -> None:
+    """Raises `Lost` until both the gateway and the planner answer.
+
+    The planner is asked of all joints by name: one that has just started knows no joint state yet, and would refuse.
+    """
+    arm.fk(arm.joints)
 
 
 def main() -> None:

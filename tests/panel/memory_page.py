@@ -32,6 +32,8 @@ from gemelo.schemas.planning import FkRequest, FkResponse, PlanCode
 from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.topics import DEVICE_STATE, DEVICE_STATUS, DEVICE_STOP, FK, JOINT_STATES, SCENE, STEP_ERRORS
 from gemelo.services.panel.main import TEXTS, Panel
+from gemelo.services.planner.request.refusals import stale_state
+from gemelo.services.planner.request.start_state import STALE_AFTER
 from gemelo.tools.bench.bare_browser import BareBrowser, Said, bare_browser
 from tests.runtime.support import free_port, spinning, until
 
@@ -83,6 +85,10 @@ class Gateway:
         return DeviceCommandResponse(accepted=True, mode=DeviceMode.IDLE)
 
     def _on_fk(self, request: FkRequest) -> FkResponse:
+        """As a planner that has got no joint state yet: of all joints or of none."""
+        if len(request.name) < len(self._arm.joints):
+            stale = stale_state(None, STALE_AFTER)
+            return FkResponse(code=stale.code, refusal=stale.refusal)
         pose = Transform(translation=(0.3, 0.0, 0.2), rotation=(0.0, 0.0, 0.0, 1.0))
         return FkResponse(code=PlanCode.SUCCESS, links=(self._arm.tool_frame,), poses=(pose,))
 
