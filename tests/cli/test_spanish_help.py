@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gemelo.schemas.reasons.catalogue import HELP, entries, help_text
+from gemelo.schemas.topics import ACTIONS, REQUESTS, TOPICS
+from gemelo.tools.chaos.faults import FAULTS
 from gemelo.tools.cli.commands import COMMANDS, GROUPS
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import ABOUT, EPILOG, run
 from gemelo.tools.cli.parser import ONE_OF, Parser, complete
 from tests.table import table
+
+SERVICES = Path(__file__).parents[2] / "services"
+DESCRIPTION = re.compile(r'Meta\([^)]*description="([^"]+)"')
+SAME = {"kill -9", "SIGTERM"}  # in Spanish too
 
 
 class Listed(Parser):
@@ -56,6 +64,12 @@ def texts() -> set[str]:
     return found - {"", argparse.SUPPRESS}
 
 
+def of_lists() -> set[str]:
+    """What the lists say of topics, requests, actions, faults of chaos, and the parameters of the processes."""
+    rows = {row.about for rows in (TOPICS, REQUESTS, ACTIONS, FAULTS) for row in rows if row.about}
+    return rows | {each for file in SERVICES.rglob("*.py") for each in DESCRIPTION.findall(file.read_text())}
+
+
 def shown(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
     with pytest.raises(SystemExit) as ended:
         run(["--lang", "es", *words])
@@ -70,10 +84,14 @@ def test_what_the_help_says_is_in_the_catalogue():
     assert len(missing) < 0.02 * len(every), sorted(missing)
 
 
+def test_what_the_lists_say_is_in_the_catalogue() -> None:
+    assert [each for each in of_lists() - SAME if help_text(each, "es") == each] == []
+
+
 def test_a_text_of_the_catalogue_is_one_that_is_there():
     own = {name for context, name in entries("es") if context == HELP}
     argparses = {text for text in own if ("%" in text and "(" in text) or text.startswith(("expected ", "show this"))}
-    stale = own - texts() - argparses
+    stale = own - texts() - of_lists() - argparses
     assert len(stale) < 20, sorted(stale)
 
 

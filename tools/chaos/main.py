@@ -28,7 +28,7 @@ from gemelo.tools.chaos.faults import FAULTS, Fault
 from gemelo.tools.chaos.invariants import missing_records
 from gemelo.tools.chaos.report import ChaosReport, page_of, reasons_of, text_of
 from gemelo.tools.chaos.site import ChaosSite, installed_broker, processes_of
-from gemelo.tools.cli.common.language import choose, sentence
+from gemelo.tools.cli.common.language import choose, sentence, translated
 from gemelo.tools.cli.recording.chaos import add_chaos_options, language_option
 from gemelo.tools.stack.results import new_results
 from gemelo.tools.stack.stack import StackError
@@ -45,7 +45,7 @@ def main() -> None:
     options = parser.parse_args()
     choose(options.lang)
     if options.list:
-        print("\n".join(f"{fault.name:<28} {fault.about}" for fault in FAULTS))
+        print("\n".join(f"{fault.name:<28} {translated(fault.about)}" for fault in FAULTS))
         return
     faults = possible_faults(chosen_faults(options.only), processes_of(load_deployment()))
     if (reason := unfit(options.minutes, faults, options.only)) is not None:

@@ -16,7 +16,7 @@ from gemelo.schemas.topics import ACTIONS, Action
 from gemelo.tools.cli.bus.messages import dump, fields_of, message_of
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown, usage
 from gemelo.tools.cli.common.forms import json_line, print_value
-from gemelo.tools.cli.common.language import columns, sentence
+from gemelo.tools.cli.common.language import columns, sentence, translated
 from gemelo.tools.cli.common.session import CommandSession, connect, share_control
 from gemelo.tools.cli.common.terminal import CANCELLING, two_stage_interrupt
 from gemelo.tools.cli.common.text_table import table
@@ -74,7 +74,9 @@ def choices(robot: Robot | None) -> Choices:
 
 def listing() -> str:
     """The table of all actions."""
-    rows = [(a.key, a.goal.__name__, a.feedback.__name__, a.result.__name__, a.server, a.about) for a in ACTIONS]
+    rows = [
+        (a.key, a.goal.__name__, a.feedback.__name__, a.result.__name__, a.server, translated(a.about)) for a in ACTIONS
+    ]
     return table(columns("action", "goal", "feedback", "result", "server", "about"), rows)
 
 

@@ -17,7 +17,7 @@ from gemelo.schemas.reasons import because
 from gemelo.schemas.topics import ACTIONS, REQUESTS, TOPICS
 from gemelo.tools.cli.common.errors import ExitCode, unknown
 from gemelo.tools.cli.common.forms import print_value
-from gemelo.tools.cli.common.language import sentence
+from gemelo.tools.cli.common.language import sentence, translated
 from gemelo.tools.cli.parser import Choices, Options, Parser
 
 if TYPE_CHECKING:
@@ -111,7 +111,11 @@ def _named_in(kind: type[Message], known: dict[str, type[Message]]) -> list[str]
 
 
 def _uses(kind: type[Message]) -> Iterator[str]:
-    uses = [because("cli.interface.topic", key=each.key, about=each.about) for each in TOPICS if each.message is kind]
+    uses = [
+        because("cli.interface.topic", key=each.key, about=translated(each.about))
+        for each in TOPICS
+        if each.message is kind
+    ]
     uses += [because("cli.interface.request", key=each.key) for each in REQUESTS if each.request is kind]
     uses += [because("cli.interface.answer", key=each.key) for each in REQUESTS if each.response is kind]
     yield from map(sentence, uses)

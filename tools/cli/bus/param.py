@@ -13,7 +13,7 @@ from gemelo.tools.cli.bus.messages import dump
 from gemelo.tools.cli.bus.node import TIMEOUT, living, node_option, require_alive
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, hint_of, usage
 from gemelo.tools.cli.common.forms import print_value
-from gemelo.tools.cli.common.language import columns, sentence
+from gemelo.tools.cli.common.language import columns, sentence, translated
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options, Parser, json_option
@@ -91,7 +91,15 @@ class NodeParameters(NamedTuple):
 def parameter_table(found: Iterable[NodeParameters]) -> str:
     """The table for a person."""
     rows = [
-        (name, each.name, each.type, written(each.value), written(each.default), range_of(each), each.description)
+        (
+            name,
+            each.name,
+            each.type,
+            written(each.value),
+            written(each.default),
+            range_of(each),
+            translated(each.description),
+        )
         for name, declared in found
         for each in declared
     ]

@@ -14,7 +14,7 @@ from gemelo.tools.cli.bus.node import information_of, living
 from gemelo.tools.cli.bus.topic import echo
 from gemelo.tools.cli.common.errors import ExitCode, unknown
 from gemelo.tools.cli.common.forms import count_options, form_of, form_options, print_value, yaml_document
-from gemelo.tools.cli.common.language import columns
+from gemelo.tools.cli.common.language import columns, translated
 from gemelo.tools.cli.common.session import CommandSession, connect, share_control
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option
@@ -73,7 +73,7 @@ def choices(robot: Robot | None) -> Choices:
 
 def listing() -> str:
     """The table of all requests."""
-    rows = [(r.key, r.request.__name__, r.response.__name__, r.server, r.about) for r in REQUESTS]
+    rows = [(r.key, r.request.__name__, r.response.__name__, r.server, translated(r.about)) for r in REQUESTS]
     return table(columns("request", "asked with", "answered with", "server", "about"), rows)
 
 

@@ -17,7 +17,7 @@ from gemelo.tools.cli.bus.messages import dump, fields_of, message_of
 from gemelo.tools.cli.bus.topic_ends import Ends, ends
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown
 from gemelo.tools.cli.common.forms import Form, count_options, form_of, form_options, print_value, yaml_document
-from gemelo.tools.cli.common.language import columns, sentence
+from gemelo.tools.cli.common.language import columns, sentence, translated
 from gemelo.tools.cli.common.session import CommandSession, connect
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option, positive_integer, positive_number
@@ -114,7 +114,7 @@ def topic_of(name: str) -> Topic[Any]:
 def listing(topics: Sequence[Topic[Any]] = TOPICS) -> str:
     """The table of topics."""
     rows = [
-        (topic.key, topic.message.__name__, rate_of(topic), topic.delivery.value, topic.writer, topic.about)
+        (topic.key, topic.message.__name__, rate_of(topic), topic.delivery.value, topic.writer, translated(topic.about))
         for topic in topics
     ]
     return table(columns("topic", "message", "rate [Hz]", "delivery", "writer", "about"), rows)
