@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from gemelo.api import planning as planning
     from gemelo.api import scene as scene
     from gemelo.api import seeing as seeing
+    from gemelo.api import streaming as streaming
     from gemelo.api import targets as targets
     from gemelo.api import verification as verification
 else:

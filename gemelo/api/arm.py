@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Self, Unpack
 
@@ -620,18 +620,25 @@ class Arm:
         """
         return self._parts.jogging.end()
 
-    def stream(self, joints: Joints) -> None:
+    def stream(
+        self, joints: Joints, velocity: Joints | None = None, *, ahead: Iterable[Joints] = (), period: float = 0.0
+    ) -> None:
         """A target [rad] or [m] that the arm follows within its limits, now; the newest wins. No path is planned.
 
-        Say 20 to 100 a second: the arm brakes 0.11 s after the last one, and rests there where it is near. The stream
-        ends 0.5 s after it. A target that the gateway has refused raises `Refused` at the next call, a gateway that
-        says nothing for 1 s `Lost`.
+        Call it 20 to 100 times a second: the arm brakes 0.11 s after the last one, and rests there where it is near.
+        The stream ends 0.5 s after it. `velocity` [rad/s] or [m/s] there is estimated if left out; zeros are a place to
+        rest at. `ahead` is a chunk: one more target every `period` [s], which the arm plays until it rests at the last
+        one. A new call replaces what of it is not due yet. A target that the gateway has refused raises `Refused` at
+        the next call, a gateway that says nothing for 1 s `Lost`.
 
         >>> for step in range(20):
         ...     arm.stream({"brazo_joint": arm.joints["brazo_joint"] + 0.002})
+        >>> at = arm.joints["brazo_joint"]
+        >>> chunk = [{"brazo_joint": at - 0.001 * step} for step in range(50)]
+        >>> arm.stream(chunk[0], ahead=chunk[1:], period=0.02)
         """
         self._parts.require_motion()
-        self._parts.streaming.say(joints)
+        self._parts.streaming.say(joints, velocity, ahead, period)
 
     def grip(
         self,

@@ -1,4 +1,4 @@
-"""Moving by hand: jog commands and streamed targets. Both stop by themselves when nothing more is said."""
+"""Moving by hand: jog commands, which stop by themselves when nothing more is said."""
 
 from __future__ import annotations
 
@@ -10,19 +10,17 @@ from msgspec.structs import replace
 from gemelo.api.arguments import Joints, Vector
 from gemelo.api.errors import BadArgument, Interrupted, Lost, Refused
 from gemelo.api.session import Session
-from gemelo.api.targets import joint_state, named_joints, require_within, vector
+from gemelo.api.targets import named_joints, vector
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.schemas.device import DeviceEvent
-from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.planning import JogCommand, JogStatus
 from gemelo.schemas.reasons import Reason, Remedy, because, plain, remedy
-from gemelo.schemas.topics import DEVICE_EVENTS, JOG, JOG_STATUS, JOINT_STATES, JOINT_TARGETS
+from gemelo.schemas.topics import JOG, JOG_STATUS
 
 PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
 ANSWER = 3.0  # [s] of jogging without a word of the planner, after which it counts as lost
 BEGIN = 0.5  # [s] of a jog in which a refusal may be about the past: the planner hears a goal's end after its client
 PAUSE = 0.5  # [s] without a command, after which the next one begins a new jog
-GAP = 1.0  # [s] without a word in the middle: the planner of a jog says ten a second, the gateway of a stream fifty
+GAP = 1.0  # [s] without a word in the middle: the planner says ten a second
 REST = 5.0  # [s] that the arm may take to come to rest
 FASTEST = 1.0  # [m/s] of the tool of a desktop arm
 FASTEST_TURN = math.pi  # [rad/s] of its tool
@@ -102,42 +100,6 @@ class JogCommands:
         return self._heard if self._heard_at > began else None
 
 
-class Streaming:
-    """One connection's streamed targets. The gateway follows the newest, and brakes 0.11 s after the last."""
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
-        self._refused: Reason | None = None  # why the gateway did not take the last target
-        self._began = self._said = -math.inf  # [s] monotonic, of this stream's first and last target
-
-    def say(self, joints: Joints) -> None:
-        """Raises `BadArgument`, `Refused` where the gateway has refused the target before, or `Lost` where it is
-        silent."""
-        arm = self._session.description
-        state = joint_state(arm, joints, "stream")
-        require_within(arm, dict(zip(state.name, state.position, strict=True)))
-        self._session.latest(DEVICE_EVENTS, self._on_event)
-        node = self._session.node
-        now = self._session.clock.monotonic()
-        if now - self._said > PAUSE:
-            self._began = now
-        self._said = now
-        states = self._session.latest(JOINT_STATES)  # heard from the first target on
-        if now - self._began > GAP and states.age() > GAP:
-            raise Lost(because("lost.stream", remedy("list_nodes"), time=GAP))
-        why, self._refused = self._refused, None
-        if why is not None:
-            raise Refused(because("client.refused", why), check="stream", reason=why)
-        node.publisher(JOINT_TARGETS).put(JointTargets(stamp=node.now(), name=state.name, position=state.position))
-
-    def _on_event(self, event: DeviceEvent) -> None:
-        """Only of the stream that runs, and not of another's: events of before may come late."""
-        if event.client not in ("", self._session.node.address):
-            return
-        if event.event == "target_refused" and self._session.clock.monotonic() - self._said < PAUSE:
-            self._refused = event.why or plain(event.detail)
-
-
 def _silent() -> Reason:
     return because("lost.jog.planner", remedy("list_nodes"))
 
@@ -157,7 +119,7 @@ def jog_command(arm: ArmDescription, joints: Joints | None, twist: Vector | None
     if joints is not None:
         speeds = named_joints(arm, joints, "joints")
         for name, speed in speeds.items():
-            _require_joint_speed(arm, name, speed)
+            require_joint_speed(arm, name, speed)
         return JogCommand(name=tuple(speeds), velocity=tuple(speeds.values()))
     values = tuple(twist or ())
     if len(values) not in (3, 6):
@@ -177,7 +139,8 @@ def jog_command(arm: ArmDescription, joints: Joints | None, twist: Vector | None
     return JogCommand(linear=values[:3], angular=values[3:], frame=in_tool)
 
 
-def _require_joint_speed(arm: ArmDescription, name: str, value: float) -> None:
+def require_joint_speed(arm: ArmDescription, name: str, value: float) -> None:
+    """Raises `BadArgument` where `value` [rad/s] or [m/s] was meant in degrees or millimetres."""
     unit, most = arm.joint(name).unit, arm.joint(name).velocity
     if hint := _other_unit(value, unit, most):
         raise BadArgument(because("argument.jog.fast", hint, joint=name, value=value, unit=unit, most=most))

@@ -13,12 +13,13 @@ if TYPE_CHECKING:
     from gemelo.api.device import Device
     from gemelo.api.frames import Frames
     from gemelo.api.gripping import Gripping
-    from gemelo.api.jog import JogCommands, Streaming
+    from gemelo.api.jog import JogCommands
     from gemelo.api.ledger import Requirement
     from gemelo.api.motion import MotionRegistry
     from gemelo.api.scene import Scene
     from gemelo.api.seeing import Eyes
     from gemelo.api.session import Session
+    from gemelo.api.streaming import Streaming
 
 T = TypeVar("T")
 
@@ -93,4 +94,4 @@ class Parts:
 
     @part
     def streaming(self) -> Streaming:
-        return api.jog.Streaming(self.session)
+        return api.streaming.Streaming(self.session)

@@ -15,6 +15,7 @@ import gemelo
 from gemelo.api.arguments import Target
 from gemelo.api.jog import jog_command
 from gemelo.api.planning import refused
+from gemelo.api.streaming import targets_of
 from gemelo.api.targets import as_target, request_of
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.planning import (
@@ -151,6 +152,33 @@ JOGS: list[tuple[Callable[[ArmDescription], object], str]] = [
     (lambda arm: jog_command(arm, None, (0, 0, math.nan), ""), "twist[2] is nan"),
     (lambda arm: jog_command(arm, None, (0, 0, 0.1), "brazo_link"), "along the axes of base_link or efector_link"),
 ]
+
+
+ROW = {"brazo_joint": 0.1}
+BAD_STREAMS = [
+    ((ROW, {"brazo_joint": 30}, (), 0.0), "argument.jog.fast"),
+    ((ROW, {"efector_joint": 0.1}, (), 0.0), "argument.stream.joints"),
+    ((ROW, None, [ROW], 0.0), "argument.stream.period"),
+    ((ROW, None, [ROW] * 50, 0.2), "argument.stream.period"),
+    ((ROW, None, [ROW] * 129, 0.01), "argument.stream.many"),
+    ((ROW, None, [{"efector_joint": 0.1}], 0.1), "argument.stream.joints"),
+    ((ROW, None, [ROW, {"brazo_joint": 3.5}], 0.1), "argument.joint.beyond"),
+    ((ROW, None, [ROW, (0.1, 0.2)], 0.1), "argument.numbers"),
+]
+
+
+@table(("given", "code"), BAD_STREAMS)
+def test_a_stream_that_cannot_be_meant_is_refused(rm1: ArmDescription, given: tuple[Any, ...], code: str) -> None:
+    with pytest.raises(gemelo.BadArgument) as refusal:
+        targets_of(rm1, *given)
+    assert refusal.value.reason.code == code
+
+
+def test_a_stream_s_velocity_and_chunk_are_in_the_order_of_its_joints(rm1: ArmDescription) -> None:
+    first, later = {"brazo_joint": 0.1, "efector_joint": 0.02}, {"efector_joint": 0.03, "brazo_joint": 0.2}
+    targets = targets_of(rm1, first, {"efector_joint": 0.0, "brazo_joint": 0.3}, [later, first], 0.1)
+    assert targets.velocity == (0.3, 0.0)
+    assert [(each.time, each.position) for each in targets.ahead] == [(0.1, (0.2, 0.03)), (0.2, (0.1, 0.02))]
 
 
 @table(("ask", "said"), JOGS, ids=[said for _, said in JOGS])

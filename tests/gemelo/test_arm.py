@@ -143,6 +143,15 @@ def test_streamed_targets_are_followed_and_a_refused_one_is_raised(arm: Simulate
     motion.wait()
 
 
+def test_a_chunk_of_actions_is_played_and_its_velocity_may_be_given(arm: SimulatedArm) -> None:
+    arm.move(named="home")
+    at = arm.joints["brazo_joint"]
+    chunk = [{"brazo_joint": at + 0.01 * step} for step in range(21)]
+    arm.stream(chunk[0], {"brazo_joint": 0.2}, ahead=chunk[1:], period=0.05)
+    assert arm.wait_for(lambda: is_moving(arm), 1.0)
+    assert arm.wait_for(lambda: abs(arm.joints["brazo_joint"] - at - 0.2) < 0.001 and not is_moving(arm), 3.0)
+
+
 def test_a_plan_waits_for_an_arm_that_is_just_coming_to_rest_but_not_for_one_that_goes_on(arm: SimulatedArm) -> None:
     arm.move(named="home")
     end = arm.sim.now + 10.0

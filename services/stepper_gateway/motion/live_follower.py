@@ -7,11 +7,13 @@ stream that dies needs nobody to stop the arm.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from gemelo.libraries.arm.model.description import Joint
 from gemelo.schemas.message import Vector
 from gemelo.services.stepper_gateway.device.clock import ClockSync
 from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.chunk import Ahead
 from gemelo.services.stepper_gateway.motion.knots import Knot
 from gemelo.services.stepper_gateway.motion.live_stream import LiveStream, Splice
 from gemelo.services.stepper_gateway.motion.moving_tracker import NEAR_DT, MovingTracker, ReferenceAt, Tail
@@ -24,6 +26,7 @@ LATE = 0.045  # [s] that a target may come late beyond one that was lost; chosen
 KNOTS = 144  # of one message, of all joints together, where that is enough for its stop; standard: firmware/PROTOCOL.md
 LEAST_NEAR, MOST_NEAR = 2, 16  # [knots] chosen: less could not turn back, and an arm goes on blindly for 0.16 s at most
 APART = 0.008  # [s] between two messages; chosen: of targets that come at once the newest counts
+RENEWED = 0.04  # [s] between two messages of one chunk; chosen: four of them lie in what one plays
 SAME_PLACE, SAME_SPEED = 1e-6, 1e-4  # [rad] or [m], and per second; chosen: below the wire's resolution
 
 
@@ -36,6 +39,7 @@ class LiveFollower:
         self._clock = SenderClock()
         self._reference = Reference(joints)
         self._arrival = 0.0  # [s] monotonic, of the newest target
+        self._delay = 0.0  # [s] by which targets are played late
         self._sent = -1.0e9  # [s] monotonic, when the newest message was made
         self.is_pending = False  # the newest target is in no message that may reach the device
 
@@ -44,18 +48,25 @@ class LiveFollower:
         """[rad] or [m] the newest one."""
         return self._reference.newest
 
-    def take(self, position: Vector, velocity: Vector, sent: float | None, arrival: float) -> None:
+    def due(self, now: float) -> Vector:
+        """[rad] or [m] the newest one that is due at `now` [s] monotonic."""
+        return self._reference.due(now)
+
+    def take(
+        self, position: Vector, velocity: Vector, sent: float | None, arrival: float, ahead: Sequence[Ahead] = ()
+    ) -> None:
         """A target, which came at `arrival` [s] monotonic; `sent` by the sender's stamp, None where it has none.
 
-        `velocity` is empty where it is to be estimated.
+        `velocity` is empty where it is to be estimated; `ahead` are the targets that follow by themselves.
         """
         time = arrival if sent is None else self._clock.time_of(sent, arrival)
-        if self._reference.take(time, position, velocity):
+        if self._reference.take(time, position, velocity, ahead):
             self._arrival, self.is_pending = arrival, True
 
     def is_due(self, now: float) -> bool:
         """True if a message is to be made at `now` [s] monotonic."""
-        return self.is_pending and now - self._sent >= APART
+        is_playing = now < self._leads_until and now - self._sent >= RENEWED
+        return is_playing or (self.is_pending and now - self._sent >= APART)
 
     def message(
         self, stream: LiveStream, start: Knot | None, delay: float, catch_up: bool, moment: Moment, clock: ClockSync
@@ -64,7 +75,7 @@ class LiveFollower:
 
         `delay` [s] is by how much the targets are played late; `catch_up` also from far behind them.
         """
-        now = moment.monotonic
+        now, self._delay = moment.monotonic, delay
         splice = stream.splice(now, clock) if start is None else stream.first(start, now, clock)
         self.is_pending, self._sent = False, now
         near = self._near(splice, lambda at: self._reference.at(at, delay), catch_up)
@@ -82,7 +93,7 @@ class LiveFollower:
         """The chunk that lets the arm rest at the last target, where no more targets come and it is near that; else
         None."""
         now, target, end = moment.monotonic, self.target, stream.log.last.position
-        if now < self._arrival + self._patience or now - self._sent < APART:
+        if now < self._leads_until + self._patience or now - self._sent < APART:
             return None
         away = [abs(a - b) for a, b in zip(end, target, strict=True)]
         far = self._tracker.far(self._reference.velocity, catch_up=True)
@@ -96,13 +107,19 @@ class LiveFollower:
         return stream.replace(splice, stop.knots[:-1], stop.dt_us, stop.knots[-1:], stop.dt_us)
 
     @property
+    def _leads_until(self) -> float:
+        """[s] monotonic: the newest target's arrival, or when the last one ahead is played."""
+        is_chunk = self._reference.planned_until > self._arrival
+        return self._reference.planned_until + self._delay if is_chunk else self._arrival
+
+    @property
     def _patience(self) -> float:
-        """[s] from a target's arrival until the next one is missed."""
+        """[s] from a target's arrival, or the last one that is due, until the next one is missed."""
         return max(HOLDS, 2.0 * self._reference.period + LATE)
 
     def _near(self, splice: Splice, reference: ReferenceAt, catch_up: bool) -> list[Knot]:
         """The knots until a stop is due if no more targets come."""
-        count = math.ceil((self._arrival + self._patience - splice.begins) * 1e6 / NEAR_DT)
+        count = math.ceil((self._leads_until + self._patience - splice.begins) * 1e6 / NEAR_DT)
         count = max(LEAST_NEAR, min(count, MOST_NEAR))
         return self._tracker.near(splice.knot, splice.begins, count, reference, catch_up)
 

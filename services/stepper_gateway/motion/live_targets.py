@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.reasons import Reason, because
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.moment import Moment
+from gemelo.services.stepper_gateway.motion.chunk import ahead_of, filled
 from gemelo.services.stepper_gateway.motion.knots import Knot
 from gemelo.services.stepper_gateway.motion.live_follower import LiveFollower
 from gemelo.services.stepper_gateway.motion.live_stream import LiveStream
@@ -32,23 +34,22 @@ class LiveTargets:
         """True if targets lead the arm."""
         return self._stream is not None
 
-    def take(self, columns: Mapping[int, float], velocities: Mapping[int, float], stamp: int, moment: Moment) -> None:
-        """The newest target [rad] or [m] by column, and its velocities, empty where they are to be estimated.
-
-        Joints that it does not name keep theirs, or stand still. `stamp` [ns] UNIX is of the sender, 0: none.
-        """
+    def take(self, targets: JointTargets, columns: Mapping[int, float], moment: Moment) -> None:
+        """The newest target, whose positions [rad] or [m] are by column; joints that it does not name keep theirs, or
+        stand still."""
         follower = self._follower
         if follower is None:
             base = self._controller.motion_start(moment).start.position
             follower = self._follower = LiveFollower(self._device.joints)
-            if not stamp:
+            if not targets.stamp:
                 self._device.event("target_unstamped", because("target.unstamped"), moment)
         else:
-            base = follower.target
-        position = tuple(columns.get(index, value) for index, value in enumerate(base))
-        velocity = tuple(velocities.get(index, 0.0) for index in range(len(base))) if velocities else ()
-        sent = moment.monotonic + (stamp - moment.unix) * 1e-9 if stamp else None
-        follower.take(position, velocity, sent, moment.monotonic)
+            base = follower.due(moment.monotonic)
+        rates = dict(zip(columns, targets.velocity, strict=False))
+        velocity = filled(rates, (0.0,) * len(base)) if rates else ()
+        sent = moment.monotonic + (targets.stamp - moment.unix) * 1e-9 if targets.stamp else None
+        ahead = ahead_of(targets, tuple(columns), base)
+        follower.take(filled(columns, base), velocity, sent, moment.monotonic, ahead)
         self.send_due(moment)
 
     def step(self, is_silent: bool, moment: Moment) -> Reason | None:

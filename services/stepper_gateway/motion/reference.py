@@ -1,7 +1,8 @@
 """The reference of streamed targets: where their sender is and how fast it goes, at every moment, from stamped samples.
 
-Its place and velocity are those of the parabola through the last samples of a joint, extrapolated straight. A target
-that no motion within the arm's limits explains is a jump: a place to go to, where the reference stands.
+Targets at times ahead are samples that are not due yet, on a curve through them. Else its place and velocity
+are those of the parabola through the last samples of a joint, extrapolated straight. A target that no motion within the
+arm's limits explains is a jump: a place to go to, where the reference stands.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from gemelo.libraries.arm.model.description import Joint
+from gemelo.schemas.joints import MOST_AHEAD
 from gemelo.schemas.message import Vector
+from gemelo.services.stepper_gateway.motion.chunk import Ahead, curve_rates, on_cubic
 from gemelo.services.stepper_gateway.motion.knots import Limits
 
 FITTED = 5  # samples of a parabola; measured: fewer follow a sender's rounding, more come late
@@ -49,6 +52,7 @@ class Sample(NamedTuple):
     velocity: Vector  # [rad/s] or [m/s] given, or estimated; 0 at a jump
     slope: Vector  # [rad/s] or [m/s] from the sample before
     smooth: tuple[int, ...]  # samples since the joint's latest jump, its own included; 0: the velocity was given
+    is_curved: bool = False  # a cubic leads here, else a straight line
 
 
 class Reference:
@@ -57,7 +61,8 @@ class Reference:
     def __init__(self, joints: tuple[Joint, ...]) -> None:
         self._limits = Limits.of(joints)
         self._grains = tuple(GRAIN[joint.unit] for joint in joints)
-        self._samples: deque[Sample] = deque(maxlen=KEPT)
+        self._samples: deque[Sample] = deque(maxlen=KEPT + MOST_AHEAD)
+        self._taken = -1.0e9  # [s] monotonic, when the newest target was sent
         self._parabolas: dict[int, Parabola] = {}  # by column
 
     @property
@@ -72,19 +77,37 @@ class Reference:
 
     @property
     def period(self) -> float:
-        """[s] between the last two targets; 0 for a single one."""
-        return self._samples[-1].time - self._samples[-2].time if len(self._samples) > 1 else 0.0
+        """[s] between the last two targets; 0 for a single one, and where targets ahead are the newest."""
+        if len(self._samples) < 2 or self.planned_until > self._taken:
+            return 0.0
+        return self._samples[-1].time - self._samples[-2].time
 
-    def take(self, time: float, position: Vector, velocity: Vector = ()) -> bool:
-        """A target that was sent at `time` [s] monotonic; `velocity` where the sender says it. False: overtaken."""
+    @property
+    def planned_until(self) -> float:
+        """[s] monotonic, of the newest sample, which may lie ahead."""
+        return self._samples[-1].time
+
+    def due(self, time: float) -> Vector:
+        """[rad] or [m] the newest target that is due at `time` [s] monotonic, or the place between two."""
+        return self.newest if time >= self._samples[-1].time else self._straight(time)[0]
+
+    def take(self, time: float, position: Vector, velocity: Vector = (), ahead: Sequence[Ahead] = ()) -> bool:
+        """A target that was sent at `time` [s] monotonic; `velocity` where the sender says it. False: overtaken.
+
+        What was to be due later than that is forgotten, and `ahead` takes its place.
+        """
         samples = self._samples
-        if samples and samples[-1].time - PAUSE < time <= samples[-1].time:
+        if samples and self._taken - PAUSE < time <= self._taken:
             return False
-        if samples and not 0.0 < time - samples[-1].time <= PAUSE:
+        is_planned = bool(samples) and self._taken < time < samples[-1].time
+        while samples and samples[-1].time >= time:
+            samples.pop()
+        if samples and not is_planned and not self._taken < time <= samples[-1].time + PAUSE:
             samples.clear()
         if len(samples) > 1 and time - samples[-2].time < FINEST:
             samples.pop()
-        samples.append(self._sample(time, position, velocity))
+        sample, self._taken = self._sample(time, position, velocity), time
+        samples.extend(self._planned(sample, velocity, ahead) if ahead else [sample])
         self._parabolas = self._fitted()
         return True
 
@@ -102,7 +125,7 @@ class Reference:
         return tuple(places), tuple(rates)
 
     def _straight(self, time: float) -> tuple[Vector, Vector]:
-        """Between the samples themselves, and beyond the newest one with its velocity."""
+        """Between the samples themselves, on the curve of a chunk, and beyond the newest one with its velocity."""
         newest = self._samples[-1]
         ahead = time - newest.time
         if ahead >= 0.0:
@@ -112,6 +135,8 @@ class Reference:
         for second, first in pairwise(reversed(self._samples)):
             if time >= first.time:
                 share = (time - first.time) / (second.time - first.time)
+                if second.is_curved:
+                    return _on_curve(first, second, share)
                 return _between(first.position, second.position, share), _between(
                     first.velocity, second.velocity, share
                 )
@@ -120,8 +145,7 @@ class Reference:
     def _sample(self, time: float, position: Vector, velocity: Vector) -> Sample:
         zeros = (0.0,) * len(position)
         if velocity:
-            fastest = [FASTEST * top for top in self._limits.velocity]
-            given = tuple(max(-top, min(v, top)) for v, top in zip(velocity, fastest, strict=True))
+            given = self._bounded(velocity)
             return Sample(time, position, given, given, (0,) * len(position))
         if not self._samples:
             return Sample(time, position, zeros, zeros, (1,) * len(position))
@@ -133,6 +157,32 @@ class Reference:
             self._estimated(column, dt, slope[column]) if smooth[column] > 1 else 0.0 for column in range(len(position))
         )
         return Sample(time, position, estimated, slope, smooth)
+
+    def _planned(self, first: Sample, velocity: Vector, ahead: Sequence[Ahead]) -> list[Sample]:
+        """The samples of a chunk that begins with `first`, whose `velocity` may be given."""
+        before = self._samples[-1] if self._samples else None
+        rates = [self._rates(column, before, first, ahead) for column in range(len(first.position))]
+        times = [first.time, *(first.time + each.time for each in ahead)]
+        places = [first.position, *(each.position for each in ahead)]
+        given = [velocity, *(each.velocity for each in ahead)]
+        is_joined = before is not None and all(count != 1 for count in first.smooth)
+        found = []
+        for index, (time, place) in enumerate(zip(times, places, strict=True)):
+            rate = self._bounded(given[index] or tuple(row[index] for row in rates))
+            found.append(Sample(time, place, rate, rate, (0,) * len(place), is_curved=index > 0 or is_joined))
+        return found
+
+    def _rates(self, column: int, before: Sample | None, first: Sample, ahead: Sequence[Ahead]) -> list[float]:
+        """Of one joint at `first` and at each target `ahead`; a jump to the first has no part in them."""
+        times = [0.0, *(each.time for each in ahead)]
+        values = [first.position[column], *(each.position[column] for each in ahead)]
+        if before is None or first.smooth[column] == 1:
+            return curve_rates(times, values)
+        return curve_rates([before.time - first.time, *times], [before.position[column], *values])[1:]
+
+    def _bounded(self, rate: Vector) -> Vector:
+        fastest = [FASTEST * top for top in self._limits.velocity]
+        return tuple(max(-top, min(v, top)) for v, top in zip(rate, fastest, strict=True))
 
     def _smooth(self, column: int, dt: float, slope: float) -> int:
         """Samples since the latest jump; 1: this one is where neither velocity nor slope of before leads to."""
@@ -196,6 +246,13 @@ def parabola_weights(times: Sequence[float]) -> tuple[Vector, Vector, Vector]:
     )
     slope = tuple(p / square - (b + mean) * q / fourth for p, q in zip(first, second, strict=True))
     return place, slope, tuple(q / fourth for q in second)
+
+
+def _on_curve(first: Sample, second: Sample, share: float) -> tuple[Vector, Vector]:
+    """Place and velocity at `share` of the cubic between two samples."""
+    ends = zip(first.position, second.position, zip(first.velocity, second.velocity, strict=True), strict=True)
+    rows = [on_cubic(a, b, rates, second.time - first.time, share) for a, b, rates in ends]
+    return tuple(place for place, _ in rows), tuple(rate for _, rate in rows)
 
 
 def _between(first: Vector, second: Vector, share: float) -> Vector:

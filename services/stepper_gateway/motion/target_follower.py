@@ -32,7 +32,7 @@ class TargetFollower:
     def on_targets(self, targets: JointTargets, goal_is_active: bool, moment: Moment) -> None:
         """Take the newest target, or refuse it and keep the one before."""
         silence = self._device.parameters.stream_silence
-        self._targets.note_message(moment.monotonic, silence)
+        self._targets.note_message(targets, moment.monotonic, silence)
         try:
             if goal_is_active:
                 raise invalid(because("target.goal_active"))
@@ -43,13 +43,15 @@ class TargetFollower:
         except GoalRejected as rejected:
             return self._complain(rejected.reason, moment)
         if self._device.replaces_paths:
-            velocities = dict(zip(columns, targets.velocity, strict=False))
-            return self._live.take(columns, velocities, targets.stamp, moment)
+            return self._live.take(targets, columns, moment)
         self._targets.take(columns, self._present(moment))
+        self._targets.plan(targets, tuple(columns), moment.monotonic)
         self._begin(moment)
 
     def step(self, moment: Moment) -> None:
         """Brake on silence, begin when the arm rests, notice the end."""
+        for columns in self._targets.due(moment.monotonic):
+            self._targets.take(columns, self._present(moment))
         is_silent = self._targets.is_silent(moment.monotonic, self._device.parameters.stream_silence)
         failure = self._live.step(is_silent, moment)
         if failure is not None:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Iterator
+
 from gemelo.libraries.arm.model.description import Joint
-from gemelo.schemas.joints import JointTargets
+from gemelo.schemas.joints import LONGEST_AHEAD, JointTargets
 from gemelo.schemas.message import Vector
 from gemelo.schemas.reasons import because
 from gemelo.services.stepper_gateway.goals.limit_checks import SLACK, beyond
 from gemelo.services.stepper_gateway.goals.rejections import invalid, invalid_joints
 from gemelo.services.stepper_gateway.goals.trajectory_checks import require_known
+from gemelo.services.stepper_gateway.motion.chunk import require_ahead
 from gemelo.services.stepper_gateway.motion.knot_sources import KNOT_TIME, TargetKnots
 from gemelo.services.stepper_gateway.motion.knots import Knot, Limits
 from gemelo.services.stepper_gateway.motion.target_tracker import TargetTracker
@@ -22,7 +26,8 @@ class TargetStream:
     def __init__(self, joints: tuple[Joint, ...]) -> None:
         self._joints = joints
         self._tracker: TargetTracker | None = None
-        self._latest = NEVER  # [s] monotonic, of the last message, taken or not
+        self._latest = NEVER  # [s] monotonic, of the last message, taken or not, or of the last target ahead in it
+        self._ahead: deque[tuple[float, dict[int, float]]] = deque()  # by [s] monotonic, when they are due
         self._is_interrupted = False
         self.target: Vector | None = None  # [rad] or [m] that waits for a stream to begin
 
@@ -52,13 +57,14 @@ class TargetStream:
             joint = self._joints[column]
             if not joint.lower - SLACK <= position <= joint.upper + SLACK:
                 raise invalid(beyond(joint, position))
+        require_ahead(targets, self._joints)
         return columns
 
-    def note_message(self, now: float, silence: float) -> None:
-        """A message has come at `now` [s]; after an interruption only `silence` [s] makes the next one count again."""
+    def note_message(self, targets: JointTargets, now: float, silence: float) -> None:
+        """They have come at `now` [s]; after an interruption only `silence` [s] makes the next ones count again."""
         if now - self._latest > silence:
             self._is_interrupted = False
-        self._latest = now
+        self._latest = now + max(0.0, min(targets.ahead[-1].time if targets.ahead else 0.0, LONGEST_AHEAD))
 
     def require_uninterrupted(self, silence: float) -> None:
         """Raises `GoalRejected` until no target has come for `silence` [s] after an interruption."""
@@ -78,6 +84,16 @@ class TargetStream:
         else:
             self.target = target
 
+    def plan(self, targets: JointTargets, columns: tuple[int, ...], now: float) -> None:
+        """Those ahead of the newest target, which came at `now` [s]; none of the ones before counts any more."""
+        rows = ((now + each.time, dict(zip(columns, each.position, strict=True))) for each in targets.ahead)
+        self._ahead = deque(rows)
+
+    def due(self, now: float) -> Iterator[dict[int, float]]:
+        """The targets by column that have become due by `now` [s], once."""
+        while self._ahead and self._ahead[0][0] <= now:
+            yield self._ahead.popleft()[1]
+
     def motion(self, start: Knot) -> TargetKnots:
         """Begin to track the target that waits, from rest at `start`."""
         self._tracker = TargetTracker(Limits.of(self._joints), KNOT_TIME, start)
@@ -93,6 +109,7 @@ class TargetStream:
     def fall_silent(self) -> None:
         """Let the stream end at rest; a target that waits is too old."""
         self.target = None
+        self._ahead.clear()
         if self._tracker is not None:
             self._tracker.brake()
 
