@@ -56,7 +56,7 @@ check: setup ## ruff, mypy, import-linter, clang-format, gofmt
 checks := check-types check-walls check-lint check-format check-cpp check-go
 .PHONY: $(checks)
 check-types:
-	@$(bin)/mypy --no-error-summary gemelo docs examples
+	@$(bin)/mypy --no-error-summary gemelo docs examples integrations
 check-walls:
 	@$(bin)/lint-imports --no-logo >/dev/null || $(bin)/lint-imports --no-logo
 check-lint:

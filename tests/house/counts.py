@@ -13,7 +13,7 @@ from typing import TypeGuard
 
 ROOT = Path(__file__).parents[2]
 LINKED = ("firmware", "libraries", "schemas", "services", "tools")  # folders of the root that gemelo/ links to
-ROOMS = ("docs", "examples", "gemelo", "tests", *LINKED)
+ROOMS = ("docs", "examples", "gemelo", "integrations", "tests", *LINKED)
 TUNED = ("services/planner/", "services/stepper_gateway/")  # whose constants say where their values come from
 ORIGIN = re.compile(r"\b(?:[Cc]hosen|[Mm]easured|[Ss]tandard|[Rr]ounding|rounded)\b")
 REASON = 3  # words of a comment, besides units, that can say why

@@ -40,7 +40,7 @@ def catalogue(language: str) -> dict[str, str]:
 
 def calls() -> Iterator[tuple[str, ast.Call]]:
     """Every call of `because` and `remedy` in the product, with its file."""
-    for room in ("services", "libraries", "tools", "gemelo", "schemas"):
+    for room in ("services", "libraries", "tools", "gemelo", "schemas", "integrations"):
         for path in (ROOT / room).rglob("*.py"):
             if (text := path.read_text()).find("schemas.reasons") < 0:
                 continue
