@@ -100,6 +100,7 @@ class ViewerSection(DeploymentRecord, frozen=True, kw_only=True):
     host: str = "127.0.0.1"
     port: int = 9876  # gRPC
     web_port: int = 9090  # the page
+    language: str = ""  # of the view, as "es"; empty: that of the locale of the process
     insecure: bool = False  # may listen beyond loopback: it has no TLS
 
 

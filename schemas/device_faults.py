@@ -34,8 +34,8 @@ def fault_reason(fault: int, joint: str = "") -> Reason | None:
         return None
     meaning = _meaning(fault)
     if joint:
-        return because("fault.at_joint", meaning, fault=_name(fault), joint=joint)
-    return because("fault.present", meaning, fault=_name(fault))
+        return because("fault.at_joint", meaning, fault=fault_name(fault), joint=joint)
+    return because("fault.present", meaning, fault=fault_name(fault))
 
 
 def fault_text(fault: int, joint: str = "") -> str:
@@ -54,7 +54,7 @@ def explain(fault: int) -> FaultDescription | None:
     if fault == DeviceFault.NONE:
         return None
     meaning, mend = meaning_and_remedy(fault)
-    return FaultDescription(_name(fault), str(meaning), str(mend))
+    return FaultDescription(fault_name(fault), str(meaning), str(mend))
 
 
 def _meaning(fault: int) -> Reason:
@@ -62,5 +62,6 @@ def _meaning(fault: int) -> Reason:
     return because(code, remedy(mend))
 
 
-def _name(fault: int) -> str:
+def fault_name(fault: int) -> str:
+    """As `word.fault` has it in the catalogue."""
     return DeviceFault(fault).name if fault in DeviceFault._value2member_map_ else f"FAULT {fault}"

@@ -16,6 +16,8 @@ from gemelo.schemas.device import DeviceState, DeviceStatus, SensorReadings, Sha
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.ledger import StepLedger, StoppingDistance
 from gemelo.schemas.planning import PlannedPath
+from gemelo.schemas.reasons import because, say
+from gemelo.schemas.reasons.catalogue import ENGLISH
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.content.arm_poses import arm_poses
 from gemelo.services.visualizer.content.cameras import CameraView
@@ -38,9 +40,11 @@ BAND = 0.5  # [steps] rounding to whole steps alone gives as much
 class Visualizer:
     """The newest state of one arm, and the samples that have not been shown yet."""
 
-    def __init__(self, model: VisualModel, robot: str, tool: str, load: MeshLoader = load_no_mesh) -> None:
-        """`load` reads the mesh files of the scene."""
-        self.model = model
+    def __init__(
+        self, model: VisualModel, robot: str, tool: str, load: MeshLoader = load_no_mesh, language: str = ENGLISH
+    ) -> None:
+        """`load` reads the mesh files of the scene; `language` is that of the texts."""
+        self.model, self.language = model, language
         self.scene = SceneView(model, load)
         self.cameras = CameraView(model)
         self._preview = PlanPreview(model, self.scene.attached)
@@ -49,7 +53,7 @@ class Visualizer:
         width = len(self._names)
         self._executed, self._commanded, self._errors = ThinnedSeries(width), ThinnedSeries(width), ThinnedSeries(width)
         self._shaft = ThinnedSeries(width)
-        self.event_log = EventLog()
+        self.event_log = EventLog(language)
         self._path: PlannedPath | None = None
         self._path_is_new = False
         self._trail_end: Array | None = None  # where the trail ends
@@ -58,7 +62,7 @@ class Visualizer:
         self._panel_at = 0
         self._latest = 0  # [ns] what is stamped later was never measured
         prismatic = frozenset(joint.name for joint in model.moving if joint.is_prismatic)
-        self._panel_inputs = PanelInputs(robot=robot, prismatic=prismatic)
+        self._panel_inputs = PanelInputs(robot=robot, prismatic=prismatic, language=language)
 
     def on_joint_state(self, message: JointState) -> None:
         """The measured joint state."""
@@ -98,7 +102,7 @@ class Visualizer:
         self._shaft.add(message.stamp, self._row(message.name, lost, self._shaft))
         for name, error in after.items():
             if is_lost(error) is not is_lost(before.get(name, 0)):
-                text = f"{name}: its shaft is {error:+d} steps from its counter"
+                text = say(because("view.shaft", joint=name, steps=error), self.language)
                 self.event_log.add(message.stamp, text, "ERROR" if is_lost(error) else "INFO")
 
     def on_step_ledger(self, message: StepLedger) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import logging
+import os
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from gemelo.libraries.runtime.process.priority import lower_priority
 from gemelo.libraries.runtime.scene_meshes import SceneMeshes
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.frames import RobotDescription
+from gemelo.schemas.locale_language import ENGLISH, known, of_environment
 from gemelo.schemas.scene import MeshShape
 from gemelo.schemas.text_file import read_text
 from gemelo.schemas.topics import ANY, DESCRIPTION, LOG, SCENE
@@ -38,7 +41,8 @@ def run(node: Node, deployment: Deployment) -> None:
     root = project_root()
     cameras = deployed_cell(deployment).camera_names
     parameters = node.parameters(VisualizerParameters).value
-    shared = _shared_view(node, deployment, parameters)
+    language = view_language(deployment.viewer.language, os.environ, node.log)
+    shared = _shared_view(node, deployment, parameters, language)
     outputs = Outputs(deployment.viewer, root / deployment.robot, root, parameters, cameras, shared)
     visualizer: Visualizer | None = None
 
@@ -46,7 +50,7 @@ def run(node: Node, deployment: Deployment) -> None:
         nonlocal visualizer
         if visualizer is None:
             try:
-                visualizer = _visualizer(node, message, (root, root / deployment.robot), cameras)
+                visualizer = _visualizer(node, message, (root, root / deployment.robot), cameras, language)
             except ValueError as error:
                 node.log.error(f"the description of {message.robot} cannot be drawn: {error}")
                 return
@@ -65,7 +69,9 @@ def run(node: Node, deployment: Deployment) -> None:
     outputs.close()
 
 
-def _shared_view(node: Node, deployment: Deployment, parameters: VisualizerParameters) -> SharedView | None:
+def _shared_view(
+    node: Node, deployment: Deployment, parameters: VisualizerParameters, language: str
+) -> SharedView | None:
     """The view of several arms on this machine; None where this one has a viewer of its own."""
     layouts = []
     for each in deployments_beside(deployment):
@@ -76,12 +82,12 @@ def _shared_view(node: Node, deployment: Deployment, parameters: VisualizerParam
             node.log.error(f"{arm.name} is left out of the view of all arms, as it cannot be drawn: {error}")
             continue
         cameras = deployed_cell(each).camera_names
-        layouts.append(ArmLayout(model, parameters.window, parameters.trail, cameras, arm.name))
+        layouts.append(ArmLayout(model, parameters.window, parameters.trail, cameras, arm.name, language))
     return SharedView(robot_name(deployment), tuple(layouts)) if layouts else None
 
 
 def _visualizer(
-    node: Node, message: RobotDescription, folders: tuple[Path, ...], cameras: tuple[str, ...]
+    node: Node, message: RobotDescription, folders: tuple[Path, ...], cameras: tuple[str, ...], language: str
 ) -> Visualizer:
     """The core for the arm that was described, fed from the bus; the scene's mesh files are in `folders`."""
     model = parse_urdf(message.urdf)
@@ -89,7 +95,7 @@ def _visualizer(
     def load(shape: MeshShape) -> ShadedMesh | None:
         return scene_mesh(shape, folders, node.log.warning)
 
-    core = Visualizer(model, message.robot, tool_link(model, message.robot_toml), load)
+    core = Visualizer(model, message.robot, tool_link(model, message.robot_toml), load, language)
     clocks: dict[str, NodeClock] = {}
     for topic, take, is_series in feeds(core, load_arm(folders[-1]), cameras):
         if topic.writer != ANY and "stamp" in topic.message.__struct_fields__:
@@ -99,6 +105,16 @@ def _visualizer(
             take = SceneMeshes(node, take).on_scene
         node.subscribe(topic, take, own=topic is LOG, batch=1 / BATCH_RATE if is_series else None)
     return core
+
+
+def view_language(wanted: str, environ: Mapping[str, str], log: logging.Logger) -> str:
+    """The language of the view: that of `[viewer] language`, else of the locale; English where there is no such one."""
+    if not wanted:
+        return of_environment(environ)
+    if wanted in known():
+        return wanted
+    log.warning(f"[viewer] language is {wanted!r}: the view is in English; there are {', '.join(known())}")
+    return ENGLISH
 
 
 def by_own_clock(clock: NodeClock, take: Callable[[Any], object]) -> Callable[[Any], None]:

@@ -68,7 +68,7 @@ def write_view(file: Path, rrd: Path, shadow: Path, language: str = ENGLISH) -> 
     cameras = tuple(sorted({*chosen.cameras, *_cameras_in(reader)}))
     folders = (shadow, project_root())
     try:
-        core = _core(description, folders)
+        core = _core(description, folders, language)
         taken = _takers(core, shadow, cameras, _meshes_in(reader))
     except (DescriptionError, ValueError) as error:
         raise BadRecording(because("recording.robot.not_drawn", _why(error), file=str(file))) from error
@@ -77,8 +77,8 @@ def write_view(file: Path, rrd: Path, shadow: Path, language: str = ENGLISH) -> 
     make_own(rrd)
     stream.save(rrd)
     moment = None if incident is None else OpeningMoment(incident.stamp, story_text(in_language(incident, language)))
-    layout = blueprint(ArmLayout(core.model, chosen.window, chosen.trail, cameras), moment)
-    sink = Sink(stream, core.model, shadow, layout, story="" if moment is None else moment.story)
+    layout = blueprint(ArmLayout(core.model, chosen.window, chosen.trail, cameras, language=language), moment)
+    sink = Sink(stream, core.model, shadow, layout, story="" if moment is None else moment.story, language=language)
     drawn = 0
     for row in reader.rows(taken.__contains__):
         if row.message.log_time - drawn > BATCH:
@@ -122,13 +122,13 @@ def _meshes_in(reader: RecordingReader) -> dict[str, bytes]:
     return {mesh.digest: mesh.data for mesh in meshes}
 
 
-def _core(description: RobotDescription, folders: tuple[Path, ...]) -> Visualizer:
+def _core(description: RobotDescription, folders: tuple[Path, ...], language: str) -> Visualizer:
     model = parse_urdf(description.urdf)
 
     def load(shape: MeshShape) -> ShadedMesh | None:
         return scene_mesh(shape, folders, lambda text: print(text, file=sys.stderr))
 
-    return Visualizer(model, description.robot, tool_link(model, description.robot_toml), load)
+    return Visualizer(model, description.robot, tool_link(model, description.robot_toml), load, language)
 
 
 def _takers(
@@ -193,7 +193,7 @@ def main() -> None:
     parser.add_argument("file", type=Path)
     parser.add_argument("--save", type=Path, metavar="FILE", help="write the view as an .rrd there, and open none")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="save a PNG of the view, and open none")
-    parser.add_argument("--lang", choices=languages(), default=ENGLISH, help="the language of the story")
+    parser.add_argument("--lang", choices=languages(), default=ENGLISH, help="the language of the view and its story")
     options = parser.parse_args()
     stopping = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):

@@ -24,6 +24,7 @@ from gemelo.schemas.device import (
     DeviceStopRequest,
 )
 from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.schemas.locale_language import ENGLISH
 from gemelo.schemas.motion import (
     FollowErrorCode,
     FollowJointTrajectoryFeedback,
@@ -115,7 +116,7 @@ class PretendGateway:
 def english_again() -> Iterator[None]:
     """The language that a command line of this process has chosen ends with its test."""
     yield
-    language.choose(language.ENGLISH)
+    language.choose(ENGLISH)
 
 
 @pytest.fixture(scope="session")

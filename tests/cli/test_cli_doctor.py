@@ -17,6 +17,7 @@ from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus
 from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.schemas.device import DeviceState, DeviceStatus
+from gemelo.schemas.locale_language import ENGLISH
 from gemelo.schemas.system import NodeInfo
 from gemelo.tools.chaos.descriptors import give_descriptors, take_descriptors
 from gemelo.tools.cli.common import language
@@ -80,7 +81,7 @@ def test_the_doctor_speaks_the_language_of_the_command_line_and_its_json_is_the_
     found = {each["subject"]: each for each in json.loads(capsys.readouterr().out)}
     assert found["router"]["found"].startswith("nobody listens at 127.0.0.1:1 (")
     assert found["router"]["why"]["code"] == "doctor.listens.not"
-    language.choose(language.ENGLISH)
+    language.choose(ENGLISH)
 
 
 def test_the_doctor_says_what_versions_are_installed(monkeypatch, capsys):

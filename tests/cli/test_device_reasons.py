@@ -10,6 +10,7 @@ import pytest
 
 from gemelo.libraries.runtime.firmware_update import HEADER, ImageHeader, NoImage, build_header, read_header
 from gemelo.schemas.device import DeviceConfiguration, DeviceMode, DeviceState, DeviceStatus
+from gemelo.schemas.locale_language import ENGLISH
 from gemelo.schemas.reasons import Reason, Value, because, say
 from gemelo.tools.cli.common import language
 from gemelo.tools.cli.common.errors import CommandError
@@ -164,7 +165,7 @@ def test_who_the_device_is_and_why_it_cannot_be_used() -> None:
 @pytest.fixture
 def english_afterwards() -> Iterator[None]:
     yield
-    language.choose(language.ENGLISH)
+    language.choose(ENGLISH)
 
 
 @pytest.mark.usefixtures("english_afterwards")

@@ -7,8 +7,8 @@ import json
 import pytest
 
 import gemelo
+from gemelo.schemas import locale_language
 from gemelo.schemas.reasons import FrontEnd, say
-from gemelo.tools.cli.common import language
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
 from tests.table import table
@@ -36,7 +36,7 @@ def plan_from_elsewhere(tmp_path_factory) -> str:
     ],
 )
 def test_the_first_variable_that_is_set_decides(environ, wanted):
-    assert language.of_environment(environ) == wanted
+    assert locale_language.of_environment(environ) == wanted
 
 
 def test_a_refusal_is_printed_in_the_language_of_the_option(plan_from_elsewhere, capsys):
@@ -59,7 +59,7 @@ def test_a_refusal_is_printed_in_the_language_of_the_locale(plan_from_elsewhere,
 
 def test_json_is_the_same_in_every_language(capsys):
     printed = []
-    for code in language.known():
+    for code in locale_language.known():
         assert run(["--lang", code, "topic", "list", "--json"]) is ExitCode.OK
         printed.append(json.loads(capsys.readouterr().out))
     assert len(printed) >= 2

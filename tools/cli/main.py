@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from gemelo.libraries.runtime.process.leaving import end_process
+from gemelo.schemas import locale_language
 from gemelo.tools.cli.commands import COMMANDS, GROUPS
 from gemelo.tools.cli.common import language
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown, usage
@@ -113,7 +114,7 @@ def robot_folder(name: str) -> str:
 
 def choose_language(name: str) -> None:
     """Raises `CommandError` for a language that there is no folder of."""
-    if name not in (known := language.known()):
+    if name not in (known := locale_language.known()):
         raise unknown("language", name, known)
     language.choose(name)
 
@@ -133,7 +134,7 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
 
 def _run(given: list[str]) -> ExitCode:
     try:
-        language.choose(language.of_environment(os.environ))
+        language.choose(locale_language.of_environment(os.environ))
         options = parse(with_leading_options(given))
         code: ExitCode = options.command.load("run")(options)
         sys.stdout.flush()

@@ -17,7 +17,6 @@ PANEL = "device/panel"
 LOG = "log"
 STORY = "story"
 JOINTS = "joints"
-BAND = ("+0.5 step", "-0.5 step")  # names of the series around a step error
 
 
 def under(robot: str, entity: str) -> str:

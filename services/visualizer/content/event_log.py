@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gemelo.schemas.device import DeviceEvent
+from gemelo.schemas.reasons import because, say
+from gemelo.schemas.reasons.catalogue import ENGLISH
 from gemelo.schemas.system import LogRecord
 from gemelo.services.visualizer.content import entities
 from gemelo.services.visualizer.content.thinning import LAST_STAMP
@@ -17,7 +19,9 @@ EVENT_LEVELS = {"fault": "ERROR", "estop": "ERROR", "homing_stopped": "WARNING",
 class EventLog:
     """Lines with their time and level, until they are taken."""
 
-    def __init__(self) -> None:
+    def __init__(self, language: str = ENGLISH) -> None:
+        """`language` is that of its own words; what a node or device reports stays as it is."""
+        self._language = language
         self._lines: list[tuple[int, str, str]] = []  # [ns], text, level
         self._newest: tuple[int, str, str] | None = None
         self._sent = 0  # [ns] when a line was sent last
@@ -47,7 +51,8 @@ class EventLog:
             self._newest = lines[-1]
         elif self._newest is not None and now - self._sent >= AGAIN:
             at, text, level = self._newest
-            lines = [(now, f"nothing new since {time_of_day(at)}: {text}", level)]
+            again = because("view.nothing_new", time=time_of_day(at), text=text)
+            lines = [(now, say(again, self._language), level)]
         if not lines:
             return []
         self._sent = now

@@ -6,11 +6,20 @@ import math
 from dataclasses import dataclass
 
 from gemelo.schemas.control import ControlState
-from gemelo.schemas.device import DeviceMode, DeviceState, DeviceStatus, SensorReadings, ShaftPositions
-from gemelo.schemas.device_faults import explain
-from gemelo.schemas.device_link import offline_word, reason_text, state_round_trip_text
+from gemelo.schemas.device import (
+    DeviceFault,
+    DeviceMode,
+    DeviceState,
+    DeviceStatus,
+    SensorReadings,
+    ShaftPositions,
+)
+from gemelo.schemas.device_faults import fault_name, meaning_and_remedy
+from gemelo.schemas.device_link import state_round_trip, warning_of, why_not_usable
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.ledger import StepLedger, StoppingDistance
+from gemelo.schemas.reasons import Reason, because, plain, say
+from gemelo.schemas.reasons.catalogue import ENGLISH
 
 STALE = 1_000_000_000  # [ns] after which a state is no longer called present
 LOST = 1  # [steps] between counter and shaft that a motor under load may be off
@@ -31,6 +40,11 @@ class PanelInputs:
     stopping: StoppingDistance | None = None
     control: ControlState | None = None
     prismatic: frozenset[str] = frozenset()
+    language: str = ENGLISH
+
+    def say(self, reason: Reason) -> str:
+        """Its sentence in the language of the view."""
+        return say(reason, self.language)
 
 
 def panel(inputs: PanelInputs, now: int) -> str:
@@ -64,33 +78,40 @@ def is_lost(error: int) -> bool:
 def _heading(inputs: PanelInputs, now: int) -> str:
     state, status = inputs.state, inputs.status
     if status is not None and not status.online:
-        why = reason_text(status, now) if status.reason else "the device is not connected"
-        return f"## {inputs.robot} · {offline_word(status.speaks).upper()}\n\n{why}"
+        what = because("view.not_usable") if status.speaks else because("view.offline")
+        return f"## {inputs.robot} · {inputs.say(what)}\n\n{inputs.say(why_not_usable(status, now))}"
     if state is None:
-        return f"## {inputs.robot} · waiting for the device"
-    age = now - state.stamp
-    if age > STALE:
-        return f"## {inputs.robot} · SILENT for {age / 1e9:.0f} s\n\nlast mode {state.mode.name}"
-    warning = f"\n\n**{status.warning}**" if status is not None and status.warning else ""
-    return (_fault(inputs.robot, state) or f"## {inputs.robot} · {state.mode.name}") + warning
+        return f"## {inputs.robot} · {inputs.say(because('view.waiting'))}"
+    if (age := now - state.stamp) > STALE:
+        silent, last = because("view.silent", time=age / 1e9), because("view.last_mode", mode=state.mode.name)
+        return f"## {inputs.robot} · {inputs.say(silent)}\n\n{inputs.say(last)}"
+    warning = warning_of(status) if status is not None else None
+    bold = f"\n\n**{inputs.say(warning)}**" if warning is not None else ""
+    return (_fault(inputs, state) or f"## {inputs.robot} · {_mode(inputs, state)}") + bold
 
 
-def _fault(robot: str, state: DeviceState) -> str:
+def _mode(inputs: PanelInputs, state: DeviceState) -> str:
+    return inputs.say(because("status.mode", mode=state.mode.name)).upper()
+
+
+def _fault(inputs: PanelInputs, state: DeviceState) -> str:
     """In capitals, with joint and remedy; empty while all is well."""
-    about = explain(state.fault)
-    if about is None and state.mode not in (DeviceMode.FAULT, DeviceMode.ESTOP):
-        return ""
-    if about is None:
-        return f"# {robot} · {state.mode.name}"
-    where = f" AT {state.fault_joint.upper()}" if state.fault_joint else ""
-    return f"# {robot} · {about.name}{where}\n\n**{about.meaning}**\n\n{about.remedy}"
+    if state.fault == DeviceFault.NONE:
+        is_stopped = state.mode in (DeviceMode.FAULT, DeviceMode.ESTOP)
+        return f"# {inputs.robot} · {_mode(inputs, state)}" if is_stopped else ""
+    name = fault_name(state.fault)
+    what = because("view.fault", fault=name)
+    if state.fault_joint:
+        what = because("view.fault.at_joint", fault=name, joint=state.fault_joint)
+    meaning, mend = map(inputs.say, meaning_and_remedy(state.fault))
+    return f"# {inputs.robot} · {inputs.say(what).upper()}\n\n**{meaning}**\n\n{mend}"
 
 
 def _open_loop(inputs: PanelInputs) -> str:
     """That the arm drawn is what was sent; empty where it is measured."""
     if inputs.status is None or not inputs.status.open_loop:
         return ""
-    return "**SENT, NOT VERIFIED: this board does not say what it has executed**"
+    return f"**{inputs.say(because('view.open_loop'))}**"
 
 
 def _lost(inputs: PanelInputs) -> str:
@@ -98,8 +119,8 @@ def _lost(inputs: PanelInputs) -> str:
     off = {name: error for name, error in shaft_errors(inputs.shaft).items() if is_lost(error)}
     if not off:
         return ""
-    said = ", ".join(f"{name} {error:+d}" for name, error in off.items())
-    return f"**STEPS LOST: true shaft minus counter {said}** · `gemelo home {' '.join(off)}`"
+    errors = ", ".join(f"{name} {error:+d}" for name, error in off.items())
+    return f"**{inputs.say(because('view.lost', joints=errors))}** · `gemelo home {' '.join(off)}`"
 
 
 def _device(inputs: PanelInputs, now: int) -> str:
@@ -108,19 +129,22 @@ def _device(inputs: PanelInputs, now: int) -> str:
     if state is None or (inputs.status is not None and not inputs.status.online):
         return ""
     known = dict(zip(state.name, state.referenced, strict=False))
-    parts = ["armed" if state.armed else "**DISARMED**"]
+    parts = [(because("view.armed"), "") if state.armed else (because("view.disarmed"), "**")]
     parts += [_references(known)] if known else []
-    parts += [f"**speed {state.speed:.0%}**"] if state.speed != 1.0 else []
-    parts += [f"**pressed: {', '.join(state.inputs)}**"] if state.inputs else []
-    parts += [f"on: {', '.join(state.outputs)}"] if state.outputs else []
-    return " · ".join([*parts, *_sensors(inputs.sensors, now)])
+    parts += [(because("view.speed", speed=state.speed), "**")] if state.speed != 1.0 else []
+    parts += [(because("view.pressed", names=", ".join(state.inputs)), "**")] if state.inputs else []
+    parts += [(because("view.on", names=", ".join(state.outputs)), "")] if state.outputs else []
+    return " · ".join([*(f"{mark}{inputs.say(part)}{mark}" for part, mark in parts), *_sensors(inputs.sensors, now)])
 
 
-def _references(known: dict[str, bool]) -> str:
+def _references(known: dict[str, bool]) -> tuple[Reason, str]:
+    """With the Markdown around it."""
     missing = [name for name, is_known in known.items() if not is_known]
     if not missing:
-        return "all joints referenced"
-    return f"**UNREFERENCED{'' if len(missing) == len(known) else ' ' + ', '.join(missing)}**"
+        return because("view.referenced"), ""
+    if len(missing) == len(known):
+        return because("view.unreferenced"), "**"
+    return because("view.unreferenced.some", joints=", ".join(missing)), "**"
 
 
 def _sensors(sensors: SensorReadings | None, now: int) -> list[str]:
@@ -142,7 +166,7 @@ def _table(inputs: PanelInputs) -> str:
             errors.name, errors.commanded, errors.executed, errors.error, errors.max_error, strict=False
         )
     ]
-    head = "| joint | position | steps commanded | executed | error | worst |\n|---|---|---|---|---|---|"
+    head = f"{inputs.say(because('view.table'))}\n|---|---|---|---|---|---|"
     return "\n".join([head, *rows])
 
 
@@ -152,12 +176,11 @@ def _ledger(inputs: PanelInputs) -> str:
     if ledger is None or ledger.open_loop:
         return ""
     if not any(ledger.confidence):
-        return f"**tool error not known**: {ledger.reason}"
-    sure = ", ".join(f"{name} {_percent(c)}" for name, c in zip(ledger.name, ledger.confidence, strict=False))
-    return (
-        f"tool error {1e3 * ledger.tool_error:.2f} mm, at most {1e3 * ledger.tool_bound:.2f} mm ({ledger.level:.0%}) · "
-        f"**{_percent(ledger.arm_confidence)} sure** that no step is lost: {sure}"
-    )
+        return f"**{inputs.say(because('view.tool.unknown'))}**: {inputs.say(ledger.why or plain(ledger.reason))}"
+    joints = ", ".join(f"{name} {_percent(c)}" for name, c in zip(ledger.name, ledger.confidence, strict=False))
+    error, bound = 1e3 * ledger.tool_error, 1e3 * ledger.tool_bound
+    sure = _percent(ledger.arm_confidence)
+    return inputs.say(because("view.tool", error=error, bound=bound, level=ledger.level, sure=sure, joints=joints))
 
 
 def _control(inputs: PanelInputs) -> str:
@@ -166,7 +189,7 @@ def _control(inputs: PanelInputs) -> str:
     if control is None or not control.held:
         return ""
     name = control.name.replace("`", "'")
-    return f"control: `{name}` (node `{control.node}` on `{control.host}`): nobody else moves the arm"
+    return inputs.say(because("view.control", name=name, node=control.node, host=control.host))
 
 
 def _stopping(inputs: PanelInputs) -> str:
@@ -174,7 +197,7 @@ def _stopping(inputs: PanelInputs) -> str:
     stopping = inputs.stopping
     if stopping is None or not stopping.is_known:
         return ""
-    return f"stops within {1e3 * stopping.distance:.0f} mm and {stopping.duration:.2f} s if all is lost now"
+    return inputs.say(because("view.stops", distance=1e3 * stopping.distance, duration=stopping.duration))
 
 
 def _percent(share: float) -> str:
@@ -192,9 +215,9 @@ def _numbers(inputs: PanelInputs) -> str:
     state = inputs.state
     if state is None:
         return ""
-    boot = f"firmware {inputs.status.firmware} · " if inputs.status is not None and inputs.status.firmware else ""
-    return (
-        f"path {state.time_scale:.0%} of its speed · {state.buffered * 1e3:.0f} ms queued · "
-        f"{state_round_trip_text(state)}\n\n"
-        f"{boot}under-runs {state.underruns} · refused {state.refused} · bad frames {state.bad_frames}"
-    )
+    status, trip = inputs.status, state_round_trip(state)
+    firmware = because("view.firmware", version=status.firmware) if status is not None and status.firmware else None
+    path = because("view.path", trip, scale=state.time_scale, queued=state.buffered * 1e3)
+    counts = because("view.counts", underruns=state.underruns, refused=state.refused, bad_frames=state.bad_frames)
+    boot = f"{inputs.say(firmware)} · " if firmware is not None else ""
+    return f"{inputs.say(path)}\n\n{boot}{inputs.say(counts)}"

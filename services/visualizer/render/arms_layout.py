@@ -12,8 +12,10 @@ from dataclasses import dataclass
 import rerun as rr
 import rerun.blueprint as rrb
 
+from gemelo.schemas.reasons import because
 from gemelo.services.visualizer.content import entities, palette
-from gemelo.services.visualizer.render.layout import SCENE, ArmLayout, last, on_one_screen, past, time_panel
+from gemelo.services.visualizer.content.view_words import band_labels
+from gemelo.services.visualizer.render.layout import ArmLayout, last, on_one_screen, past, time_panel
 
 IN_A_ROW = 3  # arms, beside one another, whose plots stay readable
 
@@ -34,14 +36,16 @@ def arms_blueprint(arms: Sequence[ArmLayout]) -> rrb.Blueprint:
 def _all(arms: Sequence[ArmLayout]) -> rrb.Container:
     rows = math.ceil(len(arms) / IN_A_ROW)
     columns = [_column(arm) for arm in arms]
-    return rrb.Grid(*columns, grid_columns=math.ceil(len(arms) / rows), name="All arms")
+    return rrb.Grid(*columns, grid_columns=math.ceil(len(arms) / rows), name=arms[0].say(because("view.title.arms")))
 
 
 def _column(arm: ArmLayout) -> rrb.Container:
     """Of one arm: where it is, what it lost, what its device does and what is said of it."""
     return rrb.Vertical(
-        arm.scene(f"{arm.robot}: {SCENE}"), _errors(arm), arm.modes(f"{arm.robot} · mode of the device"),
-        arm.log(f"{arm.robot} · log"),
+        arm.scene(arm.say(because("view.title.scene_of", robot=arm.robot))),
+        _errors(arm),
+        arm.modes(arm.say(because("view.title.modes_of", robot=arm.robot))),
+        arm.log(arm.say(because("view.title.log_of", robot=arm.robot))),
         row_shares=[9, 5, 2, 3], name=arm.robot,
     )  # fmt: skip
 
@@ -52,14 +56,14 @@ def _errors(arm: ArmLayout) -> rrb.TimeSeriesView:
     drawn = {
         arm.at(entities.error(name)): rr.SeriesLines.from_fields(
             colors=[palette.JOINTS[index % len(palette.JOINTS)], palette.BAND, palette.BAND],
-            names=[name, *entities.BAND],
+            names=[name, *band_labels(arm.language)],
         )
         for index, name in enumerate(joints)
     }
     return rrb.TimeSeriesView(
         origin=arm.at(entities.JOINTS),
         contents=[f"+ /{entity}" for entity in drawn],
-        name=f"{arm.robot} · step errors of all joints [steps]",
+        name=arm.say(because("view.title.errors_of", robot=arm.robot)),
         axis_x=rrb.TimeAxis(view_range=past(arm.window)),
         plot_legend=rrb.PlotLegend("LeftTop", visible=True),
         time_ranges=[last(arm.window)],

@@ -8,14 +8,14 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TimelineColumn
 
+from gemelo.schemas.reasons import Reason, because, say
+from gemelo.schemas.reasons.catalogue import ENGLISH
 from gemelo.services.visualizer.content import entities, palette
 from gemelo.services.visualizer.core import unit
 from gemelo.services.visualizer.model.visual_model import VisualJoint, VisualModel
 
 TIMELINE = entities.TIMELINE
 JOINTS_PER_PAGE = 3  # rows of plots that stay readable
-SCENE = "measured (solid), commanded (blue), planned arm and way (cyan), what touches (red) [m]"
-
 
 LEAD, FOLLOW = 5.0, 2.0  # [s] before and after a moment that are played again and again
 
@@ -40,6 +40,11 @@ class ArmLayout:
     trail: float
     cameras: tuple[str, ...] = ()
     robot: str = ""
+    language: str = ENGLISH
+
+    def say(self, reason: Reason) -> str:
+        """The sentence in the language of the view."""
+        return say(reason, self.language)
 
     def whole(self, moment: OpeningMoment | None = None) -> rrb.Container:
         """Everything of the arm, live or around a moment."""
@@ -48,7 +53,7 @@ class ArmLayout:
             rrb.Horizontal(self._panel(), rrb.Vertical(self.modes(), self.log(), row_shares=[5, 9]),
                            column_shares=[11, 8]),
             row_shares=[17, 10],
-            name="Twin",
+            name=self.say(because("view.title.twin")),
         )  # fmt: skip
         return rrb.Horizontal(scene, self._beside(moment), column_shares=[11, 9], name=self.robot or None)
 
@@ -58,7 +63,7 @@ class ArmLayout:
         size, waist = max(model.reach, 2.1 * model.height), 0.6 * model.height  # an arm that stands needs a step back
         return rrb.Spatial3DView(
             origin=self.at(entities.WORLD),
-            name=name or f"Twin: {SCENE}",
+            name=name or self.say(because("view.title.scene")),
             line_grid=rrb.LineGrid3D(visible=True, spacing=0.1, color=palette.GRID),
             background=rrb.Background(kind="SolidColor", color=palette.BACKGROUND),
             eye_controls=rrb.EyeControls3D(
@@ -70,18 +75,21 @@ class ArmLayout:
             overrides={self.at(entities.TRAIL): rrb.VisibleTimeRanges([last(self.trail)])},
         )
 
-    def modes(self, name: str = "Mode of the device") -> rrb.StateTimelineView:
+    def modes(self, name: str = "") -> rrb.StateTimelineView:
         """The device's modes over time."""
+        name = name or self.say(because("view.title.modes"))
         return rrb.StateTimelineView(
             origin=self.at(entities.MODE), name=name, time_view=rrb.TimeAxis(view_range=past(self.window))
         )
 
-    def log(self, name: str = "Log") -> rrb.TextLogView:
+    def log(self, name: str = "") -> rrb.TextLogView:
         """What the nodes and the device say."""
         # The lines begin with their time of day; the column would show only the century.
         hidden = TimelineColumn(TIMELINE, visible=False)
         columns = rrb.TextLogColumns(timeline_columns=[hidden], text_log_columns=["LogLevel", "Body"])
-        return rrb.TextLogView(origin=self.at(entities.LOG), name=name, columns=columns)
+        return rrb.TextLogView(
+            origin=self.at(entities.LOG), name=name or self.say(because("view.title.log")), columns=columns
+        )
 
     def at(self, entity: str) -> str:
         """The entity where this arm has it."""
@@ -91,14 +99,14 @@ class ArmLayout:
         """The joints; above them what happened, where that is told."""
         if moment is None:
             return self._joints()
-        story = rrb.TextDocumentView(origin=self.at(entities.STORY), name="What happened")
+        story = rrb.TextDocumentView(origin=self.at(entities.STORY), name=self.say(because("view.title.story")))
         return rrb.Vertical(story, self._joints(), row_shares=[3, 4])
 
     def _scene_and_cameras(self) -> rrb.Spatial3DView | rrb.Container:
         """The scene; beside it the images where there are cameras."""
         views = [
             rrb.Spatial2DView(
-                origin=self.at(entities.camera_picture(name)), name=f"Camera {name}: found things (green)"
+                origin=self.at(entities.camera_picture(name)), name=self.say(because("view.title.camera", name=name))
             )
             for name in self.cameras
         ]
@@ -110,7 +118,7 @@ class ArmLayout:
         moving = self.model.moving
         pages = [moving[first : first + JOINTS_PER_PAGE] for first in range(0, len(moving), JOINTS_PER_PAGE)]
         grids = [self._page(page) for page in pages]
-        return grids[0] if len(grids) == 1 else rrb.Tabs(*grids, name="Joints")
+        return grids[0] if len(grids) == 1 else rrb.Tabs(*grids, name=self.say(because("view.title.joints")))
 
     def _page(self, joints: tuple[VisualJoint, ...]) -> rrb.Container:
         name = " · ".join(joint.name for joint in joints)
@@ -118,10 +126,14 @@ class ArmLayout:
         return rrb.Vertical(*rows, name=name)
 
     def _position(self, joint: VisualJoint, has_legend: bool) -> rrb.TimeSeriesView:
-        return self._plot(entities.position(joint.name), f"{joint.name} · position [{unit(joint)}]", has_legend)
+        return self._plot(
+            entities.position(joint.name),
+            self.say(because("view.title.position", joint=joint.name, unit=unit(joint))),
+            has_legend,
+        )
 
     def _error(self, joint: VisualJoint) -> rrb.TimeSeriesView:
-        return self._plot(entities.error(joint.name), f"{joint.name} · step error [steps]", False)
+        return self._plot(entities.error(joint.name), self.say(because("view.title.error", joint=joint.name)), False)
 
     def _plot(self, entity: str, name: str, has_legend: bool) -> rrb.TimeSeriesView:
         return rrb.TimeSeriesView(
@@ -133,7 +145,7 @@ class ArmLayout:
         )
 
     def _panel(self) -> rrb.TextDocumentView:
-        return rrb.TextDocumentView(origin=self.at(entities.PANEL), name="Device")
+        return rrb.TextDocumentView(origin=self.at(entities.PANEL), name=self.say(because("view.title.device")))
 
 
 def blueprint(arm: ArmLayout, moment: OpeningMoment | None = None) -> rrb.Blueprint:

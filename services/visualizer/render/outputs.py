@@ -102,11 +102,13 @@ class Outputs:
         stream.connect_grpc(url)
         if self._shared is None:
             return self._own_sink(stream, core)
-        return Sink(stream, core.model, self._folder, arms_blueprint(self._shared.arms), self._shared.robot)
+        layout, robot = arms_blueprint(self._shared.arms), self._shared.robot
+        return Sink(stream, core.model, self._folder, layout, robot, language=core.language)
 
     def _own_sink(self, stream: rr.RecordingStream, core: Visualizer) -> Sink:
-        layout = ArmLayout(core.model, self._parameters.window, self._parameters.trail, self._cameras)
-        return Sink(stream, core.model, self._folder, blueprint(layout))
+        shown = self._parameters
+        layout = ArmLayout(core.model, shown.window, shown.trail, self._cameras, language=core.language)
+        return Sink(stream, core.model, self._folder, blueprint(layout), language=core.language)
 
 
 def _own_recording(core: Visualizer) -> str:

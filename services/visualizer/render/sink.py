@@ -9,6 +9,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from gemelo.schemas.reasons import say
+from gemelo.schemas.reasons.catalogue import ENGLISH
 from gemelo.services.visualizer.content import entities, palette
 from gemelo.services.visualizer.content.updates import (
     ClearEntity,
@@ -28,6 +30,7 @@ from gemelo.services.visualizer.content.updates import (
     TranslucentArm,
     Update,
 )
+from gemelo.services.visualizer.content.view_words import COMMANDED, ERROR, EXECUTED, LOST, band_labels, mode_labels
 from gemelo.services.visualizer.model.mesh_files import mesh_path
 from gemelo.services.visualizer.model.triangle_meshes import ShadedMesh, primitive_mesh
 from gemelo.services.visualizer.model.visual_model import Visual, VisualJoint, VisualModel
@@ -49,12 +52,13 @@ class Sink:
         layout: rrb.Blueprint,
         robot: str = "",
         story: str = "",
+        language: str = ENGLISH,
     ) -> None:
         """`folder` holds the robot's meshes; `robot` is its name where several arms are in the stream.
 
         A `story` in Markdown is what is told of a recording.
         """
-        self._stream = stream
+        self._stream, self._language = stream, language
         self._model = model
         self._folder = folder  # of the robot: meshes stand relative to it
         self._robot = robot
@@ -169,7 +173,9 @@ class Sink:
         for joint in self._model.moving:
             self._send_styles(joint)
         names = list(palette.MODES)
-        modes = rr.StateConfiguration(values=names, labels=names, colors=list(palette.MODES.values()))
+        modes = rr.StateConfiguration(
+            values=names, labels=mode_labels(self._language), colors=list(palette.MODES.values())
+        )
         self._static(entities.MODE, modes)
 
     def _send_arm(self, root: str, is_ghost: bool) -> None:
@@ -199,11 +205,13 @@ class Sink:
         return _solid(primitive_mesh(visual.shape, GHOST_MARGIN if color else 0.0), color)
 
     def _send_styles(self, joint: VisualJoint) -> None:
-        self._style(entities.commanded(joint.name), [("commanded", palette.COMMANDED, 4.0)])
-        self._style(entities.executed(joint.name), [("executed", palette.EXECUTED, 1.5)])
-        band = [(name, palette.BAND, 1.5) for name in entities.BAND]
-        self._style(entities.error(joint.name), [("commanded - executed", palette.ERROR, 1.5), *band])
-        self._style(entities.shaft(joint.name), [("lost steps: true shaft - counter", palette.SHAFT, 1.5)])
+        labels = (COMMANDED, EXECUTED, ERROR, LOST)
+        commanded, executed, error, lost = (say(label, self._language) for label in labels)
+        self._style(entities.commanded(joint.name), [(commanded, palette.COMMANDED, 4.0)])
+        self._style(entities.executed(joint.name), [(executed, palette.EXECUTED, 1.5)])
+        band = [(name, palette.BAND, 1.5) for name in band_labels(self._language)]
+        self._style(entities.error(joint.name), [(error, palette.ERROR, 1.5), *band])
+        self._style(entities.shaft(joint.name), [(lost, palette.SHAFT, 1.5)])
 
     def _style(self, entity: str, series: list[tuple[str, palette.Color, float]]) -> None:
         names, colors, widths = zip(*series, strict=True)

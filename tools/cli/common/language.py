@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
+
+from gemelo.schemas.locale_language import ENGLISH
 
 if TYPE_CHECKING:
     from gemelo.schemas.reasons import Reason
-
-ENGLISH = "en"
-VARIABLES = ("LC_ALL", "LC_MESSAGES", "LANG")  # the first that is set decides, as POSIX has it
 
 
 class _Chosen:
@@ -24,20 +22,6 @@ def language() -> str:
 def choose(name: str) -> None:
     """The sentences of this command line are in the language `name` from now on."""
     _Chosen.language = name
-
-
-def known() -> tuple[str, ...]:
-    """The languages that there are."""
-    from gemelo.schemas.reasons.catalogue import languages  # 30 ms, for another language than English alone
-
-    return languages()
-
-
-def of_environment(environ: Mapping[str, str]) -> str:
-    """The language of the locale, as `es_MX.UTF-8`; English where there is no folder of it."""
-    locale = next(filter(None, map(environ.get, VARIABLES)), "")
-    name = locale.partition(".")[0].partition("_")[0].lower()
-    return name if name not in ("", "c", "posix", ENGLISH) and name in known() else ENGLISH
 
 
 def translated(text: str) -> str:

@@ -9,9 +9,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NoReturn
 
+from gemelo.schemas.locale_language import ENGLISH, known
 from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
-from gemelo.tools.cli.common.language import ENGLISH, known, language
+from gemelo.tools.cli.common.language import language
 from gemelo.tools.cli.parser import Options
 
 BROKERS = ("embedded", "mosquitto")
