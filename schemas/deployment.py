@@ -111,6 +111,26 @@ class PanelSection(DeploymentRecord, frozen=True, kw_only=True):
     insecure: bool = False  # may listen beyond loopback: it has no TLS
 
 
+class RosMeshes(StrEnum):
+    """Where RViz finds the meshes of the robot's description."""
+
+    NONE = "none"  # the description is as the arm's own file has it
+    FILE = "file"  # on this host
+
+
+class RosSection(DeploymentRecord, frozen=True, kw_only=True):
+    """The arm as a node of ROS 2; the process `ros_bridge` is started by hand (docs/from_ros2.md)."""
+
+    router: str = ""  # of ROS, rmw_zenohd, as "tcp/127.0.0.1:7448"; it has no default, as 7447 is our own router's
+    domain: int = 0  # ROS_DOMAIN_ID
+    namespace: str = ""  # of all names, and before every frame; each of several arms on one domain needs its own
+    node: str = "gemelo"
+    controller: str = "arm_controller"  # the action is <controller>/follow_joint_trajectory
+    motion: bool = False  # whoever reaches the ROS router may move the arm
+    meshes: RosMeshes = RosMeshes.FILE
+    rate: float = 0.0  # [Hz] of joint states and frames at most; 0: each of them
+
+
 class PathsSection(DeploymentRecord, frozen=True, kw_only=True):
     run: str = ".gemelo/run"  # readiness files, the virtual device's memory
     out: str = "out"  # recordings and logs
@@ -130,5 +150,6 @@ class Deployment(DeploymentRecord, frozen=True, kw_only=True):
     serial: SerialSection = SerialSection()
     viewer: ViewerSection = ViewerSection()
     panel: PanelSection = PanelSection()
+    ros: RosSection = RosSection()
     paths: PathsSection = PathsSection()
     parameters: dict[str, dict[str, ParameterValue]] = {}  # by node, then by name

@@ -14,19 +14,27 @@ from gemelo.schemas.topics import (
     ANY,
     CAMERA,
     CAMERA_TOPICS,
+    CONTROL,
     CONTROL_GIVE,
     CONTROL_JOIN,
     CONTROL_TAKE,
+    DESCRIPTION,
     DETECTOR,
     DEVICE_COMMAND,
     DEVICE_CONFIGURE,
     DEVICE_ECHO,
+    DEVICE_EVENTS,
     DEVICE_INJECT,
+    DEVICE_STATE,
+    DEVICE_STATUS,
     DEVICE_STOP,
     FK,
+    FRAMES,
     GATEWAY,
+    GRIPPER_STATE,
     IK,
     JOG,
+    JOINT_STATES,
     JOINT_TARGETS,
     LOG,
     PARAMETER_CHANGES,
@@ -34,10 +42,14 @@ from gemelo.schemas.topics import (
     PLAN_CANCEL,
     PLANNER,
     REQUESTS,
+    ROS_BRIDGE,
+    ROS_OPERATOR,
     SCENE_EDIT,
     STATE_PUBLISHER,
     STATE_VALIDITY,
+    STATIC_FRAMES,
     STATISTICS,
+    STEP_ERRORS,
     TOPICS,
     VISUALIZER,
     Action,
@@ -84,6 +96,10 @@ def read_by(node: str) -> tuple[AnyTopic, ...]:
 STOPS: tuple[AnyRequest, ...] = (DEVICE_STOP,)  # whoever may connect may stop the arm
 LOOKS: tuple[AnyRequest, ...] = (IK, FK, STATE_VALIDITY)  # answers that change nothing
 CONTROLS: tuple[AnyRequest, ...] = (CONTROL_TAKE, CONTROL_JOIN, CONTROL_GIVE)
+SEEN_FROM_ROS: tuple[AnyTopic, ...] = (
+    DESCRIPTION, JOINT_STATES, FRAMES, STATIC_FRAMES, DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, STEP_ERRORS,
+    GRIPPER_STATE, CONTROL, LOG,
+)  # fmt: skip
 MOVES: tuple[AnyRequest, ...] = (PLAN, PLAN_CANCEL, SCENE_EDIT, DEVICE_COMMAND, *CONTROLS)
 
 ROLES: tuple[Role, ...] = (
@@ -101,6 +117,11 @@ ROLES: tuple[Role, ...] = (
     ),
     Role("camera", "the images of all cameras", CAMERA, reads=read_by(CAMERA), asks=STOPS),
     Role("detector", "what is in the images", DETECTOR, reads=read_by(DETECTOR), asks=STOPS),
+    Role("ros_bridge", "the arm as a node of ROS 2", ROS_BRIDGE, reads=SEEN_FROM_ROS, asks=STOPS),
+    Role(
+        "ros_operator", "the same, where ROS 2 may move the arm", ROS_OPERATOR,
+        reads=SEEN_FROM_ROS, asks=(*STOPS, DEVICE_COMMAND, *CONTROLS), acts=ACTIONS,
+    ),
     Role(
         "panel", "the operator's page", "panel",
         writes=BY_HAND, reads=EVERYTHING, asks=(*STOPS, *LOOKS, *MOVES, DEVICE_CONFIGURE, DEVICE_INJECT), acts=ACTIONS,

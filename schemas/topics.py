@@ -87,6 +87,7 @@ class Action(Generic[G_co, F_co, R_co]):
 LATEST, EVERY, LATCHED = Delivery.LATEST, Delivery.EVERY, Delivery.LATCHED
 GATEWAY, STATE_PUBLISHER, PLANNER = "stepper_gateway", "state_publisher", "planner"
 VISUALIZER, CAMERA, DETECTOR = "visualizer", "camera", "detector"
+ROS_BRIDGE, ROS_OPERATOR = "ros_bridge", "ros_operator"  # the same process: it looks, or it moves the arm too
 ANY = "any"
 REST_RATE = 10.0  # [Hz] of what an arm at rest does; chosen: a fifth of the messages, and a person sees no difference
 

@@ -25,13 +25,20 @@ from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.reasons.catalogue import read_early
 
 Run = Callable[[Node, Deployment], None]
+NodeNameOf = Callable[[Deployment], str]
 EXPECTED = (ConfigurationError, BusError, RequestRefused)  # a sentence says all; anything else shows where it happened
 
 
-def service(name: str, run: Run, arguments: Sequence[str] | None = None, grace: float = GRACE) -> NoReturn:
+def service(
+    name: str,
+    run: Run,
+    arguments: Sequence[str] | None = None,
+    grace: float = GRACE,
+    node_name: NodeNameOf | None = None,
+) -> NoReturn:
     """Opens the node `name`, runs `run(node, deployment)`, and ends the process: 0 when stopped, 1 for an error.
 
-    It has `grace` [s] to stop; those who supervise it wait 5 s.
+    It has `grace` [s] to stop; those who supervise it wait 5 s. `node_name` chooses the node's name by the deployment.
     """
     options = _parse(name, arguments)
     read_early()
@@ -39,16 +46,17 @@ def service(name: str, run: Run, arguments: Sequence[str] | None = None, grace: 
     end_with_any_thread(line_logger(name, options.log_level), lambda: stop.is_set)
     return_freed_memory()
     with stop_on_signals(stop, grace):
-        code = _run(name, run, options, stop)
+        code = _run(name, run, options, stop, node_name or (lambda deployment: name))
     end_soon(code)  # whatever an exit handler does
     end_process(code)
 
 
-def _run(name: str, run: Run, options: argparse.Namespace, stop: ShutdownRequest) -> int:
+def _run(name: str, run: Run, options: argparse.Namespace, stop: ShutdownRequest, node_name: NodeNameOf) -> int:
     log = line_logger(name, options.log_level)
     try:
         deployment = load_deployment(options.config)
         overrides = dict(options.set)
+        name = node_name(deployment)
         with Node(name, deployment, overrides=overrides, log_level=options.log_level, stop=stop) as node:
             log = node.log
             return _guarded(run, node, deployment, stop)

@@ -35,6 +35,7 @@ NEVER_ON_A_GATEWAY = {
     "trimesh",
     "scipy",
     "mcap",
+    "rosbags",
 }
 IN_A_PREFIX = {
     "pinocchio": ["pin"],
@@ -133,6 +134,7 @@ def test_every_extra_that_a_service_names_is_there_and_every_extra_for_use_is_na
         "dev",
         "bench",
         "build",
+        "ros",  # of a process that is started by hand
         "stack",  # of every host that runs a service
     }  # the embedded broker is for one machine: a site has mosquitto
     assert not SERVICES[BROKER].extras

@@ -392,7 +392,10 @@ def test_what_the_issue_says_of_the_roles_is_what_the_tables_give():
     assert not of_a_viewer & moving
     assert "plan" not in MAY["viewer"].serves
     control = {"control/take", "control/join", "control/give"}
-    assert [name for name in NAMES if MAY[name].asks & control] == ["panel", "operator", "script"]
+    assert [name for name in NAMES if MAY[name].asks & control] == ["ros_operator", "panel", "operator", "script"]
+    assert MAY["ros_bridge"].asks - {key for key in MAY["ros_bridge"].asks if key.startswith("@node/")} == {
+        "device/stop"
+    }
     assert [name for name in NAMES if MAY[name].serves & control] == ["gateway"]
     assert [name for name in NAMES if "control" in MAY[name].publishes] == ["gateway"]
     assert not any(f"@request/{key}" in may.subscribes | may.publishes for key in control for may in MAY.values())

@@ -25,7 +25,7 @@ OF_NOBODY = {DEVICE_CONFIGURE.key, DEVICE_INJECT.key}  # what `gemelo` can ask a
 FOLDERS = (
     ("services/stepper_gateway", "gateway", 5), ("services/planner", "planner", 12),
     ("services/state_publisher", "state_publisher", 4), ("services/visualizer", "visualizer", 13),
-    ("services/camera", "camera", 3), ("services/detector", "detector", 1),
+    ("services/ros_bridge", "ros_operator", 8), ("services/camera", "camera", 3), ("services/detector", "detector", 1),
     ("gemelo", "operator", 20), ("gemelo", "panel", 20), ("gemelo", "script", 20), ("tools/cli", "operator", 15),
 )  # fmt: skip
 

@@ -1,0 +1,143 @@
+"""Goals of ROS 2 and ours: trajectories in, feedback and results out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.message import Vector
+from gemelo.schemas.motion import (
+    FollowErrorCode,
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
+    JointTolerance,
+    JointTrajectory,
+    TrajectoryPoint,
+)
+from gemelo.schemas.reasons import because, remedy
+from gemelo.services.ros_bridge.core import SECOND, duration_of, header_of, nanoseconds
+from gemelo.services.ros_bridge.types import FOLLOW, ControlMsgs, make
+
+POINT = "trajectory_msgs/msg/JointTrajectoryPoint"
+
+
+class GoalNotTaken(ReasonedError):
+    """A goal of ROS that none of ours can be made of; the reason says what of it."""
+
+
+def follow_goal(goal: Any, to_gateway: Callable[[int], int | None]) -> FollowJointTrajectoryGoal:
+    """Ours, of a control_msgs/FollowJointTrajectory goal; the joints may stand in any order.
+
+    `to_gateway(stamp)` is the same moment [ns] by the gateway's clock, None while that is not known. Raises
+    `GoalNotTaken`: for joints with several degrees of freedom, for efforts and for numbers that are not finite.
+    """
+    if goal.multi_dof_trajectory.points or goal.component_path_tolerance or goal.component_goal_tolerance:
+        raise GoalNotTaken(because("ros.goal.multi_dof", remedy("ros_joint_trajectory")))
+    stamp = nanoseconds(goal.trajectory.header.stamp)
+    start = to_gateway(stamp) if stamp else 0
+    if start is None:
+        raise GoalNotTaken(because("ros.goal.clock", remedy("ros_stamp")))
+    try:
+        return FollowJointTrajectoryGoal(
+            trajectory=JointTrajectory(
+                stamp=start,
+                joint_names=tuple(goal.trajectory.joint_names),
+                points=tuple(_point(each) for each in goal.trajectory.points),
+            ),
+            path_tolerance=tuple(map(_tolerance, goal.path_tolerance)),
+            goal_tolerance=tuple(map(_tolerance, goal.goal_tolerance)),
+            goal_time_tolerance=nanoseconds(goal.goal_time_tolerance) / SECOND,
+        )
+    except ValueError as error:
+        raise GoalNotTaken(because("ros.goal.not_finite", error=str(error))) from error
+
+
+def _point(point: Any) -> TrajectoryPoint:
+    if len(point.effort):
+        raise GoalNotTaken(because("ros.goal.effort", remedy("ros_joint_trajectory")))
+    return TrajectoryPoint(
+        positions=tuple(point.positions.tolist()),
+        velocities=tuple(point.velocities.tolist()),
+        accelerations=tuple(point.accelerations.tolist()),
+        time_from_start=nanoseconds(point.time_from_start) / SECOND,
+    )
+
+
+def _tolerance(tolerance: Any) -> JointTolerance:
+    return JointTolerance(
+        name=tolerance.name,
+        position=tolerance.position,
+        velocity=tolerance.velocity,
+        acceleration=tolerance.acceleration,
+    )
+
+
+def follow_feedback(goal_id: bytes, feedback: FollowJointTrajectoryFeedback, generation: ControlMsgs) -> Any:
+    """The message of feedback of one goal, in the form of one generation of control_msgs."""
+    index = {"index": feedback.index, "multi_dof_index": 0} if generation is ControlMsgs.NEWER else {}
+    none = make(
+        "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", generation,
+        transforms=[], velocities=[], accelerations=[], time_from_start=duration_of(0.0),
+    )  # fmt: skip
+    progress = make(
+        f"{FOLLOW}_Feedback",
+        generation,
+        header=header_of(feedback.stamp),
+        joint_names=list(feedback.joint_names),
+        desired=point_of(feedback.desired),
+        actual=point_of(feedback.actual),
+        error=point_of(feedback.error),
+        multi_dof_joint_names=[],
+        multi_dof_desired=none,
+        multi_dof_actual=none,
+        multi_dof_error=none,
+        **index,
+    )
+    return make(f"{FOLLOW}_FeedbackMessage", generation, goal_id=uuid_of(goal_id), feedback=progress)
+
+
+def point_of(point: TrajectoryPoint) -> Any:
+    """trajectory_msgs/JointTrajectoryPoint."""
+    return make(
+        POINT,
+        positions=_floats(point.positions),
+        velocities=_floats(point.velocities),
+        accelerations=_floats(point.accelerations),
+        effort=_floats(()),
+        time_from_start=duration_of(point.time_from_start),
+    )
+
+
+def uuid_of(goal_id: bytes) -> Any:
+    """unique_identifier_msgs/UUID of 16 bytes."""
+    return make("unique_identifier_msgs/msg/UUID", uuid=np.frombuffer(goal_id, dtype=np.uint8))
+
+
+def follow_result(result: FollowJointTrajectoryResult) -> Any:
+    """The result; our codes below -10 pass, with the sentence that says what they mean."""
+    text = str(result.why) if result.why is not None else result.error_string
+    return make(f"{FOLLOW}_Result", error_code=int(result.error_code), error_string=text)
+
+
+def lost_result(text: str) -> Any:
+    """Of a goal whose server fell silent; `text` says so."""
+    return make(f"{FOLLOW}_Result", error_code=int(FollowErrorCode.DEVICE_FAILED), error_string=text)
+
+
+def no_result() -> Any:
+    """Of a goal that is not known."""
+    return make(f"{FOLLOW}_Result", error_code=0, error_string="")
+
+
+def status_in_ros(status: GoalStatusCode) -> int:
+    """The number of action_msgs/GoalStatus, which has none for a goal that another one replaced: aborted."""
+    return int(GoalStatusCode.ABORTED if status is GoalStatusCode.PREEMPTED else status)
+
+
+def _floats(values: Vector) -> Any:
+    return np.array(values, dtype=np.float64)
