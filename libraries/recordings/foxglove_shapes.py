@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from gemelo.libraries.arm.errors import DescriptionError
 from gemelo.libraries.arm.frames.transforms import from_rpy
 from gemelo.libraries.arm.model.urdf import SIZES, Geometry, UrdfLink, urdf_of
-from gemelo.libraries.arm.stl import BadStl, read_stl
 from gemelo.libraries.recordings import foxglove_schemas as fox
 from gemelo.schemas.reasons import because
 from gemelo.schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, Shape, SphereShape
@@ -53,7 +52,7 @@ def drawn_object(item: SceneObject, base: str) -> Drawn | None:
     try:
         pose = pose_of(item.pose.translation, item.pose.rotation)
         return _drawn_shape(item.frame or base, item.shape, pose, color)
-    except (ValueError, BadStl):
+    except ValueError:
         return None
 
 
@@ -106,6 +105,8 @@ def _cylinder(pose: fox.Pose, radius: float, length: float, color: fox.Color) ->
 
 
 def _triangles(pose: fox.Pose, data: bytes, scale: Sequence[float], color: fox.Color) -> fox.TriangleListPrimitive:
+    from gemelo.libraries.arm.stl import BadStl, read_stl  # slow to load: numpy, for a scene with meshes alone
+
     mesh = read_stl(data)
     if len(mesh.faces) > MAX_TRIANGLES:
         raise BadStl(because("stl.too_many_to_draw", count=len(mesh.faces)))

@@ -20,7 +20,7 @@ DRAWING = ("trimesh", "yourdfpy", "scipy", "networkx", "lxml")  # the arm, once 
         ("router.main", ("numpy",)),
         ("camera.main", ("numpy", "cv2")),
         ("detector.main", ("numpy", "cv2")),
-        ("logger.main", ("scipy", "rerun", "trimesh")),
+        ("logger.main", ("numpy", "scipy", "rerun", "trimesh")),
         ("planner.main", ("scipy", "trimesh", "rerun", "ompl", "toppra")),
     ],
 )
