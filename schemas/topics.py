@@ -90,6 +90,7 @@ VISUALIZER, CAMERA, DETECTOR = "visualizer", "camera", "detector"
 ROS_BRIDGE, ROS_OPERATOR = "ros_bridge", "ros_operator"  # the same process: it looks, or it moves the arm too
 ANY = "any"
 REST_RATE = 10.0  # [Hz] of what an arm at rest does; chosen: a fifth of the messages, and a person sees no difference
+READINGS_REST_RATE = 2.0  # [Hz] of the readings beside it, while they are the same; chosen: no plan waits for them
 
 # fmt: off
 DESCRIPTION = Topic(
@@ -102,19 +103,19 @@ JOINT_STATES = Topic(
 )
 JOINT_COMMANDS = Topic(
     "joint_commands", joints.JointState, LATEST, 50.0, True, GATEWAY, "what the path asks for at the same instant",
-    (VISUALIZER,), REST_RATE,
+    (VISUALIZER,), READINGS_REST_RATE,
 )
 STEP_ERRORS = Topic(
     "step_errors", joints.StepErrors, LATEST, 50.0, True, GATEWAY, "commanded minus executed, in steps", (VISUALIZER,),
-    REST_RATE,
+    READINGS_REST_RATE,
 )
 STEP_LEDGER = Topic(
     "step_ledger", ledger.StepLedger, LATEST, 5.0, True, GATEWAY,
-    "verified steps, and the confidence that none is lost", (VISUALIZER,),
+    "verified steps, and the confidence that none is lost", (VISUALIZER,), READINGS_REST_RATE,
 )
 STOPPING_DISTANCE = Topic(
     "stopping_distance", ledger.StoppingDistance, LATEST, 10.0, True, GATEWAY,
-    "how far the tool goes if all is lost now", (VISUALIZER,),
+    "how far the tool goes if all is lost now", (VISUALIZER,), READINGS_REST_RATE,
 )
 JOINT_TARGETS = Topic(
     "joint_targets", joints.JointTargets, LATEST, None, True, ANY, "streamed targets from a slider or script",
@@ -172,15 +173,15 @@ DEVICE_CONFIGURATION = Topic(
 )
 SENSORS = Topic(
     "sensors", device.SensorReadings, LATEST, 10.0, True, GATEWAY, "readings of the device, while they are fresh",
-    (VISUALIZER,),
+    (VISUALIZER,), READINGS_REST_RATE,
 )
 DEVICE_SHAFT = Topic(
     "device/shaft", device.ShaftPositions, LATEST, 10.0, True, GATEWAY,
-    "a virtual device's true shafts beside its counters", (VISUALIZER,),
+    "a virtual device's true shafts beside its counters", (VISUALIZER,), READINGS_REST_RATE,
 )
 GRIPPER_STATE = Topic(
     "gripper_state", gripper.GripperState, LATEST, 10.0, True, GATEWAY, "the gripper's opening, and whether it presses",
-    (PLANNER, VISUALIZER, CAMERA),
+    (PLANNER, VISUALIZER, CAMERA), READINGS_REST_RATE,
 )
 CONTROL = Topic(
     "control", control.ControlState, LATCHED, None, True, GATEWAY, "who alone may move the arm, if anybody",

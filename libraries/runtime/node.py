@@ -295,6 +295,15 @@ class Node:
 
         self._bus.watch_tokens(identity.bearers_of(principal_of(name, ""), name), on_token)
 
+    def watch_newcomers(self, on_newcomer: Callable[[], None]) -> None:
+        """`on_newcomer()` runs in the thread of logic whenever a node has come, and for those that are there."""
+
+        def on_token(key: str, is_there: bool) -> None:
+            if is_there and identity.is_token(key):
+                self.post(on_newcomer)
+
+        self._bus.watch_tokens(identity.EACH, on_token)
+
     @property
     def address(self) -> str:
         """By which others know this node (bus/branches.py): its name, behind a person's certificate's."""

@@ -13,14 +13,14 @@ from typing import Any, Protocol
 
 from gemelo.libraries.runtime.actions import keys
 from gemelo.libraries.runtime.bus.branches import asked_under, read_under, served_under, written_under
-from gemelo.libraries.runtime.bus.identity import ALIVE, IDENTITY
+from gemelo.libraries.runtime.bus.identity import ALIVE, EACH, IDENTITY
 from gemelo.schemas.roles import ROLES, Role, carried_out_by, served_by, written_by
 from gemelo.schemas.topics import ACTIONS, REQUESTS, Request, exchange_topic
 
 ADVANCED = "@adv/**"  # below an EVERY or LATCHED key: Zenoh's heartbeat, cache and token of its writer
 ABOUT = ("info", "interfaces", "parameters/list")  # what every node answers about itself
 SET = "parameters/set"
-TOKENS = (f"{ALIVE}/*/*", f"{IDENTITY}/*/*/*")
+TOKENS = (f"{ALIVE}/*/*", EACH)
 IN, OUT = ("ingress",), ("egress",)
 
 Rule = dict[str, object]

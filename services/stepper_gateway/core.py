@@ -36,6 +36,7 @@ from gemelo.services.stepper_gateway.inputs import (
     Input,
     JoinControlInput,
     LinkInput,
+    NewcomerInput,
     ParametersInput,
     PlannerInput,
     Reply,
@@ -112,6 +113,9 @@ class GatewayCore:
                 reply = CancelVerdict(parts.gripper.cancel(goal_id, moment))
             case PlannerInput(instance, is_there):
                 parts.goals.scenes.on_planner(instance, is_there)
+            case NewcomerInput():
+                self.device.resting.on_newcomer(moment)
+                return None, []
             case CommandInput():
                 self._command(given, moment)
             case StopInput():

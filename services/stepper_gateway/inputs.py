@@ -38,6 +38,7 @@ class BeganInput(_Input, frozen=True):
     parameters: GatewayParameters
     kept: LedgerRecord | None = None
     has_rest_rate: bool = False  # of recordings before that parameter, whose core published every state
+    has_readings_rest_rate: bool = False  # the same of the parameter `readings_rest_rate`
 
 
 class ParametersInput(_Input, frozen=True):
@@ -109,6 +110,10 @@ class PlannerInput(_Input, frozen=True):
     is_there: bool
 
 
+class NewcomerInput(_Input, frozen=True):
+    """A node has come, which may read what rests."""
+
+
 class TargetsInput(_Input, frozen=True):
     targets: JointTargets
     node: str = ""  # that they come from
@@ -161,7 +166,7 @@ class GiveControlInput(_Input, frozen=True):
 Input = (
     BeganInput | ParametersInput | StepInput | LinkInput | FrameInput | GoalInput | CancelInput | GripInput
     | GripCancelInput | SceneInput | PlannerInput | TargetsInput | CommandInput | StopInput | ConfigureInput
-    | InjectInput | EchoInput | TakeControlInput | JoinControlInput | GiveControlInput
+    | InjectInput | EchoInput | NewcomerInput | TakeControlInput | JoinControlInput | GiveControlInput
 )  # fmt: skip
 Reply = GoalVerdict | CancelVerdict | None  # what is answered at once
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from gemelo.schemas.topics import REST_RATE
+from gemelo.schemas.topics import READINGS_REST_RATE, REST_RATE
 
 ALL_STATES = 50.0  # [Hz] standard: of a core that publishes each state, as all did before there was a `rest_rate`
 
@@ -66,5 +66,11 @@ class GatewayParameters(msgspec.Struct, frozen=True, kw_only=True):
     ] = 3.0
     feedback_rate: Annotated[float, Meta(ge=1.0, le=50.0, description="[Hz] of goal feedback")] = 20.0
     rest_rate: Annotated[
-        float, Meta(ge=1.0, le=50.0, description="[Hz] of states and step errors on the bus while nothing changes")
+        float, Meta(ge=1.0, le=50.0, description="[Hz] of states on the bus while nothing changes")
     ] = REST_RATE
+    readings_rest_rate: Annotated[
+        float,
+        Meta(
+            ge=0.5, le=50.0, description="[Hz] of sensors, gripper, step errors, ... on the bus while nothing changes"
+        ),
+    ] = READINGS_REST_RATE

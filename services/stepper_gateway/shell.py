@@ -68,6 +68,7 @@ from gemelo.services.stepper_gateway.inputs import (
     InjectInput,
     Input,
     JoinControlInput,
+    NewcomerInput,
     ParametersInput,
     PlannerInput,
     Reply,
@@ -134,6 +135,7 @@ class Shell:
         self._absences = node.absences()
         node.subscribe_signed(JOINT_TARGETS, self._on_targets)
         node.watch_service(PLANNER, self._on_planner)
+        node.watch_newcomers(self._on_newcomer)
         node.subscribe_signed(SCENE, lambda scene, by: self._handle(SceneInput(scene.version, scene.epoch, by)))
         self._commands = node.serve_later(DEVICE_COMMAND, self._on_command)
         node.serve_later(DEVICE_STOP, self._on_stop)
@@ -235,6 +237,9 @@ class Shell:
         if self._is_silent():
             return
         self._handle(TargetsInput(targets, targets.client or writer if writer == PLANNER else writer))
+
+    def _on_newcomer(self) -> None:
+        self._handle(NewcomerInput())
 
     def _on_planner(self, instance: str, is_there: bool) -> None:
         self._handle(PlannerInput(instance, is_there))

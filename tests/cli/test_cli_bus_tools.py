@@ -491,9 +491,7 @@ def test_a_steady_stream_is_not_called_slow_for_one_message_on_the_other_side_of
     """10 messages a second, of which the second between two reports has 9, 10 or 11."""
 
     def heard(stamp: int, count: int) -> NodeStatistics:
-        return NodeStatistics(
-            stamp=stamp, node="logger", topics=(TopicStatistics(key="stopping_distance", received=count),)
-        )
+        return NodeStatistics(stamp=stamp, node="logger", topics=(TopicStatistics(key="joint_states", received=count),))
 
     at_rate = {count: top.Figures(heard(0, 0), heard(1_000_000_000, count)) for count in (7, 9, 10, 11)}
     slow = {count: list(top.slow_topics({"logger": each})) for count, each in at_rate.items()}

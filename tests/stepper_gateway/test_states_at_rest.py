@@ -5,17 +5,33 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
+from msgspec.structs import replace
 
 from gemelo.schemas.joints import JointState
-from gemelo.schemas.topics import JOINT_STATES
-from gemelo.services.stepper_gateway.device.state_thinner import StateThinner
+from gemelo.schemas.ledger import StoppingDistance
+from gemelo.schemas.message import Message
+from gemelo.schemas.topics import (
+    GRIPPER_STATE,
+    JOINT_COMMANDS,
+    JOINT_STATES,
+    SENSORS,
+    STEP_ERRORS,
+    STEP_LEDGER,
+    STOPPING_DISTANCE,
+    Topic,
+)
+from gemelo.services.stepper_gateway.device.frame_handler import SHORTEST
+from gemelo.services.stepper_gateway.device.rest_thinner import NEWCOMER, RestingTopics, RestThinner
 from gemelo.services.stepper_gateway.links.frames import StateFrame
+from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.motion.path_version import PathPoint
 from gemelo.services.stepper_gateway.parameters import GatewayParameters
+from gemelo.tools.virtual_arm.gateway_driver import NewcomerInput
 from gemelo.tools.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import move
 
 THERE = PathPoint((7.0,), (0.0,))
+READINGS = (SENSORS, GRIPPER_STATE, STEP_LEDGER, STOPPING_DISTANCE, JOINT_COMMANDS, STEP_ERRORS)
 
 
 def frame(number: int, **other: object) -> StateFrame:
@@ -24,11 +40,11 @@ def frame(number: int, **other: object) -> StateFrame:
 
 
 def passed(frames: list[StateFrame], points: dict[int, PathPoint] | None = None, longest: float = 0.1) -> list[int]:
-    thinner = StateThinner()
+    thinner = RestThinner(SHORTEST)
     return [
         state.t_us // 20_000
         for number, state in enumerate(frames)
-        if thinner.passes(state, (points or {}).get(number, THERE), longest)
+        if thinner.passes((replace(state, t_us=0), (points or {}).get(number, THERE)), state.t_us * 1e-6, longest)
     ]
 
 
@@ -78,3 +94,57 @@ def test_one_who_wants_all_states_at_rest_gets_them() -> None:
     arm.run(2.0)
     states: list[JointState] = arm.messages(JOINT_STATES)
     assert max((after.stamp - before.stamp) * 1e-9 for before, after in pairwise(states[-50:])) < 0.025
+
+
+def resting(**parameters: float) -> VirtualArm:
+    """An arm that has stood still for 3 s."""
+    arm = VirtualArm(parameters=GatewayParameters(**parameters))
+    arm.ready()
+    arm.run(3.0)
+    return arm
+
+
+def sent(arm: VirtualArm, topic: Topic[Message], seconds: float) -> int:
+    """How many messages of `topic` come in the next `seconds` [s]."""
+    before = len(arm.messages(topic))
+    arm.run(seconds)
+    return len(arm.messages(topic)) - before
+
+
+@pytest.mark.parametrize("topic", READINGS, ids=lambda topic: topic.key)
+def test_readings_that_are_the_same_come_twice_a_second(topic: Topic[Message]) -> None:
+    assert topic.rest_rate == 2.0
+    period = 1.0 / (topic.rate or 50.0)
+    assert 5.0 / (0.5 + period) - 1 <= sent(resting(), topic, 5.0) <= 5.0 / (0.5 - 0.5 * period) + 1
+    assert sent(resting(readings_rest_rate=50.0, rest_rate=50.0), topic, 5.0) >= 4.4 * (topic.rate or 0.0)
+
+
+def test_a_stamp_and_a_round_trip_that_are_measured_anew_are_no_change() -> None:
+    topics, now = RestingTopics(), Moment(1, 100.0)
+    one = StoppingDistance(stamp=1, is_known=True, round_trip=0.001)
+    assert topics.passes(STOPPING_DISTANCE, one, 2.0, now)
+    again = replace(one, stamp=2, round_trip=0.002)
+    assert not topics.passes(STOPPING_DISTANCE, again, 2.0, Moment(2, 100.02))
+    assert topics.passes(STOPPING_DISTANCE, replace(again, distance=0.1), 2.0, Moment(3, 100.04))
+
+
+def test_in_motion_the_stopping_distance_comes_at_its_full_rate() -> None:
+    arm = resting()
+    arm.goal(move(arm.position, tuple(each + 0.2 for each in arm.position)), "there")
+    before = len(arm.messages(STOPPING_DISTANCE))
+    arm.run(0.5)
+    gaps = [(after.stamp - one.stamp) * 1e-9 for one, after in pairwise(arm.messages(STOPPING_DISTANCE)[before:])]
+    assert gaps
+    assert max(gaps) < 0.125
+
+
+def test_a_node_that_comes_receives_everything_at_its_full_rate_and_then_the_arm_rests_again() -> None:
+    arm = resting()
+    arm.handle(NewcomerInput())
+    counts = {topic.key: len(arm.messages(topic)) for topic in (JOINT_STATES, *READINGS)}
+    arm.run(NEWCOMER)
+    for topic in (JOINT_STATES, *READINGS):
+        came = len(arm.messages(topic)) - counts[topic.key]
+        assert came >= int(0.8 * NEWCOMER * (topic.rate or 0.0)) >= 2, topic.key
+    arm.run(1.0)
+    assert 9 <= sent(arm, STOPPING_DISTANCE, 5.0) <= 10

@@ -38,7 +38,7 @@ LATEST = 0.1  # [s] that one state in a hundred may be late: a fifth of the sile
 SETTLE, WINDOW = 3.0, 8.0  # [s]
 READY = 60.0  # [s] for what is started at once
 CORES, USABLE = 16, 0.8  # of the host that is calculated, and the share of it that may be used: chosen
-AS_IN_MOTION = ("--set", f"rest_rate={RATE:g}")
+AS_IN_MOTION = ("--set", f"rest_rate={RATE:g}", "--set", f"readings_rest_rate={RATE:g}")
 GATEWAY, DEVICE = "gemelo.services.stepper_gateway.main", "gemelo.services.virtual_esp32.main"
 
 

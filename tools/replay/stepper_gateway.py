@@ -152,14 +152,16 @@ class GatewayAgain:
             said.end(self._last)
 
     def _begin(self, unix: int, began: BeganInput) -> None:
-        self._has_rest_rate = began.has_rest_rate
+        self._began = began
         self._core = GatewayCore(self._arm, began.session, self._as_they_were(began.parameters), began.kept)
         for said in self._said.values():
             said.begin(unix)
 
     def _as_they_were(self, parameters: GatewayParameters) -> GatewayParameters:
-        """A core of before `rest_rate` published every state."""
-        return parameters if self._has_rest_rate else replace(parameters, rest_rate=ALL_STATES)
+        """A core of before `rest_rate` published every state, one of before `readings_rest_rate` every reading."""
+        if not self._began.has_rest_rate:
+            parameters = replace(parameters, rest_rate=ALL_STATES)
+        return parameters if self._began.has_readings_rest_rate else replace(parameters, readings_rest_rate=ALL_STATES)
 
     def _differ(self, at: float, given: Input, digest: int, now: str) -> None:
         was = f"others (BLAKE2 {digest:016x})" if digest else ABSENT

@@ -53,6 +53,7 @@ from gemelo.services.stepper_gateway.inputs import (
     Input,
     JoinControlInput,
     LinkInput,
+    NewcomerInput,
     PlannerInput,
     Reply,
     SceneInput,
@@ -82,8 +83,8 @@ from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
 __all__ = [
     "CancelInput", "ConfigureInput", "EchoInput", "FrameInput", "GatewayDriver", "GatewayParameters", "GripCancelInput",
-    "InjectInput", "Kind", "LinkInput", "Moment", "PlannerInput", "SceneInput", "StepInput", "TargetsInput", "asked",
-    "link_input",
+    "InjectInput", "Kind", "LinkInput", "Moment", "NewcomerInput", "PlannerInput", "SceneInput", "StepInput",
+    "TargetsInput", "asked", "link_input",
 ]  # fmt: skip
 
 Ended = tuple[GoalStatusCode, FollowJointTrajectoryResult]

@@ -18,6 +18,7 @@ from gemelo.schemas.reasons import Reason, because
 
 STALE_AFTER = 1.5  # [s] within which the token of a frozen process vanishes (the lease is 1 s)
 ALIVE, IDENTITY = "@alive", "@id"
+EACH = f"{IDENTITY}/*/*/*"  # the pattern of the tokens of all nodes
 INSTANCE = r"[0-9]{20}\.[0-9]{1,10}\.[A-Za-z0-9_-]{1,64}"  # <start [ns]>.<pid>.<host>
 TOKEN = re.compile(rf"{IDENTITY}/({PRINCIPAL.pattern})/({NAME.pattern})/({INSTANCE})")
 LIFE = re.compile(rf"{ALIVE}/({PRINCIPAL.pattern})/({NAME.pattern})")
@@ -92,7 +93,7 @@ def addresses(keys: Iterable[str], warn: Warn = lambda text: None) -> Iterator[s
 def twins(bus: Bus) -> dict[str, tuple[str, ...]]:
     """The processes of each address that several living nodes bear, as `process 12 on host`, the oldest first."""
     borne: dict[str, list[str]] = {}
-    for key in sorted(bus.alive(f"{IDENTITY}/*/*/*")):
+    for key in sorted(bus.alive(EACH)):
         found = TOKEN.fullmatch(key)
         address = address_of(found[1], found[2]) if found else None
         if address is not None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from msgspec.structs import replace
+
 from gemelo.schemas.device import DeviceMode
 from gemelo.schemas.reasons import Reason, because, plain
 from gemelo.schemas.system import LogLevel
 from gemelo.schemas.topics import DEVICE_SHAFT, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS
 from gemelo.services.stepper_gateway.components import Components
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
-from gemelo.services.stepper_gateway.device.state_thinner import StateThinner
+from gemelo.services.stepper_gateway.device.rest_thinner import RestThinner
 from gemelo.services.stepper_gateway.inputs import FrameInput
 from gemelo.services.stepper_gateway.links.frames import Ack, BadFrame, CommandReply, StateFrame, SyncReply, decode
 from gemelo.services.stepper_gateway.links.link import Kind
@@ -31,6 +33,7 @@ TROUBLE = (
 )  # fmt: skip
 MOTION = {"started": "from", "finished": "at"}  # how the place of a motion's event is introduced
 POSITION_LOST = "position_lost"  # the event of a board of another dialect, which begins anew by it
+SHORTEST = 1.0 / (JOINT_STATES.rate or 50.0)  # [s] between two states in motion
 BY_A_PERSON = "command"  # the detail of what somebody has asked for
 
 
@@ -40,7 +43,7 @@ class FrameHandler:
     def __init__(self, parts: Components) -> None:
         self._components = parts
         self._device, self._controller = parts.device, parts.controller
-        self._thinner = StateThinner()
+        self._thinner = RestThinner(SHORTEST)
         self._position_lost: Reason | None = None  # of a board of another dialect, until its next boot is met
 
     def take(self, received: FrameInput, moment: Moment) -> None:
@@ -121,7 +124,7 @@ class FrameHandler:
 
     def _on_shaft(self, report: ShaftReport, arrival: float, moment: Moment) -> None:
         measured = self._device.session.clock.measured(report.t_us, arrival)
-        self._device.out.publish(DEVICE_SHAFT, self._device.reporter.shaft(report, moment.unix_at(measured)))
+        self._device.publish(DEVICE_SHAFT, self._device.reporter.shaft(report, moment.unix_at(measured)), moment)
 
     def _on_state(self, state: StateFrame, arrival: float, moment: Moment) -> None:
         device, controller = self._device, self._controller
@@ -141,7 +144,8 @@ class FrameHandler:
             return
         controller.on_state(state, arrival)
         point = controller.commanded(state)
-        if self._thinner.passes(state, point, 1.0 / device.parameters.rest_rate):
+        longest = device.resting.longest_gap(device.parameters.rest_rate, moment)
+        if self._thinner.passes((replace(state, t_us=0), point), state.t_us * 1e-6, longest):
             self._publish(state, point, moment)
         self._components.ledger.on_state(state, point, moment)
         self._components.gripper.on_state(state, moment)
@@ -165,9 +169,9 @@ class FrameHandler:
         stamp = self._publish_device(state, moment)
         is_open_loop = self._device.session.is_open_loop
         self._device.out.publish(JOINT_STATES, reporter.joint_state(state, stamp, is_open_loop))
-        self._device.out.publish(JOINT_COMMANDS, reporter.joint_command(point, state, stamp))
+        self._device.publish(JOINT_COMMANDS, reporter.joint_command(point, state, stamp), moment)
         if not is_open_loop:  # else nobody knows them
-            self._device.out.publish(STEP_ERRORS, reporter.step_errors(point, state, stamp))
+            self._device.publish(STEP_ERRORS, reporter.step_errors(point, state, stamp), moment)
 
     def _publish_device(self, state: StateFrame, moment: Moment) -> int:
         """The state's stamp [ns]."""

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from msgspec.structs import replace
 
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceEvent, DeviceStatus
+from gemelo.schemas.message import Message
 from gemelo.schemas.reasons import Reason
 from gemelo.schemas.system import LogLevel
-from gemelo.schemas.topics import DEVICE_EVENTS
+from gemelo.schemas.topics import DEVICE_EVENTS, Topic
 from gemelo.services.stepper_gateway.device.configurator import Configuration
 from gemelo.services.stepper_gateway.device.pending_commands import PendingCommands
 from gemelo.services.stepper_gateway.device.readiness import not_ready_reason, outdated_reason
 from gemelo.services.stepper_gateway.device.reporting import Reporter
+from gemelo.services.stepper_gateway.device.rest_thinner import RestingTopics
 from gemelo.services.stepper_gateway.device.session import DeviceSession
 from gemelo.services.stepper_gateway.links.frames import REPLACE_SINCE, StateFrame
 from gemelo.services.stepper_gateway.links.reports import StatusReport
@@ -39,6 +41,7 @@ class GatewayDevice:
         self.configuration = Configuration(arm, self.session, out)
         self.commands = PendingCommands(session_id)
         self.reporter = Reporter(arm)
+        self.resting = RestingTopics()
 
     @property
     def state(self) -> StateFrame | None:
@@ -61,6 +64,11 @@ class GatewayDevice:
     def settling_time(self) -> float:
         """[s] that a board may need after the path's end, where it is sent its steps in messages of that length."""
         return SETTLING * self.arm.device.message_time if self.session.is_open_loop else 0.0
+
+    def publish(self, topic: Topic[Any], message: Message, moment: Moment) -> None:
+        """Publishes what has changed, and now and then what has not."""
+        if self.resting.passes(topic, message, self.parameters.readings_rest_rate, moment):
+            self.out.publish(topic, message)
 
     def unreachable_reason(self, moment: Moment) -> Reason | None:
         """Why the device cannot be reached, None if it can."""

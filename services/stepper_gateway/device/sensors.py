@@ -56,7 +56,7 @@ class SensorRelay:
             return self._fall_silent(moment)
         if self._readings is not None and self._readings.values and moment.monotonic >= self._due:
             self._due = next_beat(self._due, moment.monotonic, PERIOD)
-            self._publish(self._readings)
+            self._publish(self._readings, moment)
 
     def _age(self, moment: Moment) -> float:
         """[s] since the last readings, or since the device is there without any."""
@@ -69,9 +69,9 @@ class SensorRelay:
             silent = because("sensors.silent", names=tuple(self._units), time=SILENCE)
             self._device.event("sensors_silent", silent, moment)
 
-    def _publish(self, readings: LatestReadings) -> None:
+    def _publish(self, readings: LatestReadings, moment: Moment) -> None:
         names = tuple(name for name in self._units if name in readings.values)
-        self._device.out.publish(
+        self._device.publish(
             SENSORS,
             SensorReadings(
                 stamp=readings.stamp,
@@ -79,4 +79,5 @@ class SensorRelay:
                 value=tuple(readings.values[name] for name in names),
                 unit=tuple(self._units[name] for name in names),
             ),
+            moment,
         )

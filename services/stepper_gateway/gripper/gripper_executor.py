@@ -121,7 +121,7 @@ class GripperExecutor:
             self._follow(self._grip, self._jaws, moment)
         if moment.monotonic >= self._due and not self._device.unreachable_reason(moment):
             self._due = next_beat(self._due, moment.monotonic, PERIOD)
-            self._device.out.publish(GRIPPER_STATE, self._state(self._jaws, moment))
+            self._device.publish(GRIPPER_STATE, self._state(self._jaws, moment), moment)
 
     def _keep_jaws(self, moment: Moment) -> None:
         sending = self._jaws.stopping() if self._jaws is not None else None

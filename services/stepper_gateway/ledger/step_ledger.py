@@ -99,7 +99,7 @@ class LedgerKeeper:
             return
         if moment.monotonic - self._told >= PERIOD:
             self._told = moment.monotonic
-            self._device.out.publish(STEP_LEDGER, self.message(moment))
+            self._device.publish(STEP_LEDGER, self.message(moment), moment)
         self._keep(moment)
 
     def record(self) -> LedgerRecord | None:

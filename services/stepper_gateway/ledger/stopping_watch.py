@@ -46,7 +46,7 @@ class StoppingWatch:
         """Tell what is due."""
         if self._device.session.latest is not None and moment.monotonic - self._told >= PERIOD:
             self._told = moment.monotonic
-            self._device.out.publish(STOPPING_DISTANCE, self.message(moment))
+            self._device.publish(STOPPING_DISTANCE, self.message(moment), moment)
 
     def message(self, moment: Moment) -> StoppingDistance:
         """The distance from this moment on."""
