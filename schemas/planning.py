@@ -330,6 +330,14 @@ class FkResponse(Message, frozen=True, kw_only=True):
     refusal: Refusal | None = None
 
 
+class PoseTarget(Message, frozen=True, kw_only=True):
+    """A streamed pose of the tool in the base; the newest one wins. The arm stops when no more come."""
+
+    stamp: int = 0  # [ns] UNIX time of the sender
+    position: Vector = ()  # (3,) [m]
+    orientation: Vector = ()  # unit quaternion (x, y, z, w); empty: the tool stays turned as it was at the first target
+
+
 class JogCommand(Message, frozen=True, kw_only=True):
     """How to move now; to be said again within 0.1 s, or the arm stops. Joint speeds, or a twist of the tool."""
 
@@ -344,7 +352,7 @@ class JogCommand(Message, frozen=True, kw_only=True):
 class JogLimit(Message, frozen=True, kw_only=True):
     """What slows a jog: the check, the thing, how it stands now and the limit."""
 
-    check: str = ""  # "joint limit", "collision", "contact", "singularity", "speed limit", "command"
+    check: str = ""  # "joint limit", "collision", "contact", "singularity", "speed limit", "reach", "command"
     subject: str = ""  # joint or pair of links and objects
     value: float | None = None  # [rad] or [m] of the joint, [m] between the pair, share of the manipulability
     limit: float | None = None

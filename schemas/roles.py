@@ -41,6 +41,7 @@ from gemelo.schemas.topics import (
     PLAN,
     PLAN_CANCEL,
     PLANNER,
+    POSE_TARGETS,
     REQUESTS,
     ROS_BRIDGE,
     ROS_OPERATOR,
@@ -80,7 +81,7 @@ class Role:
 
 
 BY_EVERY_NODE: tuple[AnyTopic, ...] = (LOG, STATISTICS, PARAMETER_CHANGES)
-BY_HAND: tuple[AnyTopic, ...] = (JOG, JOINT_TARGETS)
+BY_HAND: tuple[AnyTopic, ...] = (JOG, POSE_TARGETS, JOINT_TARGETS)
 EACH_CAMERA = "*"  # in a key: the name of any camera
 OF_CAMERAS: tuple[AnyTopic, ...] = tuple(make(EACH_CAMERA) for make in CAMERA_TOPICS)
 MESHES: tuple[AnyTopic, ...] = (scene_mesh("*"),)  # of the scene, whatever their digests are

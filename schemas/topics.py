@@ -151,6 +151,9 @@ CONTACTS = Topic(
     "contacts", scene.Contacts, LATCHED, None, True, PLANNER, "what touches where a plan was refused", (VISUALIZER,),
 )
 JOG = Topic("jog", planning.JogCommand, LATEST, 50.0, True, ANY, "how to move now, by hand", (PLANNER,))
+POSE_TARGETS = Topic(
+    "pose_targets", planning.PoseTarget, LATEST, None, True, ANY, "streamed poses of the tool", (PLANNER,),
+)
 JOG_STATUS = Topic("jog_status", planning.JogStatus, LATEST, None, True, PLANNER, "what slows the jogging")
 JOG_INPUTS = Topic(
     "jog/inputs", planning.JogInputs, EVERY, None, True, PLANNER,

@@ -621,8 +621,14 @@ class Arm:
         return self._parts.jogging.end()
 
     def stream(
-        self, joints: Joints, velocity: Joints | None = None, *, ahead: Iterable[Joints] = (), period: float = 0.0
-    ) -> None:
+        self,
+        joints: Joints | None = None,
+        velocity: Joints | None = None,
+        *,
+        ahead: Iterable[Joints] = (),
+        period: float = 0.0,
+        pose: Pose | Vector | None = None,
+    ) -> JogStatus | None:
         """A target [rad] or [m] that the arm follows within its limits, now; the newest wins. No path is planned.
 
         Call it 20 to 100 times a second: the arm brakes 0.11 s after the last one, and rests there where it is near.
@@ -631,6 +637,11 @@ class Arm:
         one. A new call replaces what of it is not due yet. A target that the gateway has refused raises `Refused` at
         the next call, a gateway that says nothing for 1 s `Lost`.
 
+        With `pose` the tool follows a pose, or a position (3,) [m] with the tool turned as it is, in the base: from the
+        configuration where the arm is, slowed near singularities and joint limits. What limits it is in the status that
+        is returned; a pose out of reach raises `Refused`, the arm stands as near as it gets, and follows the next one
+        within reach.
+
         >>> for step in range(20):
         ...     arm.stream({"brazo_joint": arm.joints["brazo_joint"] + 0.002})
         >>> at = arm.joints["brazo_joint"]
@@ -638,7 +649,14 @@ class Arm:
         >>> arm.stream(chunk[0], ahead=chunk[1:], period=0.02)
         """
         self._parts.require_motion()
-        self._parts.streaming.say(joints, velocity, ahead, period)
+        if pose is None:
+            if joints is None:
+                raise BadArgument(because("argument.stream.which", joints="joints", pose="pose"))
+            self._parts.streaming.say(joints, velocity, ahead, period)
+            return None
+        if joints is not None or velocity is not None or ahead or period:
+            raise BadArgument(because("argument.stream.pose", argument="pose"))
+        return self._parts.streaming.lead(pose)
 
     def grip(
         self,

@@ -7,18 +7,21 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
-from gemelo.api.arguments import Joints
+from gemelo.api.arguments import Joints, Vector
 from gemelo.api.errors import BadArgument, Lost, Refused
 from gemelo.api.jog import require_joint_speed
 from gemelo.api.session import Session
-from gemelo.api.targets import joint_state, named_joints, number, require_within
+from gemelo.api.targets import joint_state, named_joints, number, point, quaternion, require_within
+from gemelo.api.units import Pose
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceEvent
 from gemelo.schemas.joints import LEAST_APART, LONGEST_AHEAD, MOST_AHEAD, JointState, JointTargets, TargetAhead
+from gemelo.schemas.planning import JogStatus, PoseTarget
 from gemelo.schemas.reasons import Reason, because, plain, remedy
-from gemelo.schemas.topics import DEVICE_EVENTS, JOINT_STATES, JOINT_TARGETS
+from gemelo.schemas.topics import DEVICE_EVENTS, JOG_STATUS, JOINT_STATES, JOINT_TARGETS, POSE_TARGETS
 
 PAUSE = 0.5  # [s] without a target, after which the next one begins a new stream
+ANSWER = 3.0  # [s] of poses without a status of the planner, after which it counts as lost
 GAP = 1.0  # [s] without a state in the middle: the gateway publishes fifty a second
 
 
@@ -28,25 +31,54 @@ class Streaming:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._refused: Reason | None = None  # why the gateway did not take the last target
+        self._status: JogStatus | None = None  # of the planner, on this stream of poses
+        self._heard = -math.inf  # [s] monotonic, when that came
         self._began = self._said = -math.inf  # [s] monotonic, of this stream's first and last target
+
+    def lead(self, pose: Pose | Vector) -> JogStatus | None:
+        """The planner's newest status; raises `BadArgument`, `Refused` where the pose is out of reach or the gateway
+        has refused it, or `Lost` where the planner is silent."""
+        node = self._session.node
+        self._session.latest(JOG_STATUS, self._on_status)
+        self._prepare(0.0)
+        node.publisher(POSE_TARGETS).put(replace(pose_target(pose), stamp=node.now()))
+        status, now = self._status, self._session.clock.monotonic()
+        if now - max(self._began, self._heard) > ANSWER:
+            raise Lost(because("lost.jog.planner", remedy("list_nodes")))
+        if status is None or (status.active and all(limit.check != "reach" for limit in status.limits)):
+            return status
+        self._status = None
+        reach = next((limit.why for limit in status.limits if limit.check == "reach"), None)
+        why = reach or status.why
+        if why is not None:
+            raise Refused(because("client.refused", why), check="stream", reason=why)
+        return status
 
     def say(self, joints: Joints, velocity: Joints | None, ahead: Iterable[Joints], period: float) -> None:
         """As `targets_of`, with a `period` [s]; raises `Refused` where the gateway has refused the target before, or
         `Lost` where it is silent."""
         targets = targets_of(self._session.description, joints, velocity, ahead, period)
-        self._session.latest(DEVICE_EVENTS, self._on_event)
+        self._prepare(targets.ahead[-1].time if targets.ahead else 0.0)
         node = self._session.node
+        node.publisher(JOINT_TARGETS).put(replace(targets, stamp=node.now()))
+
+    def _prepare(self, lasts: float) -> None:
+        """Before a target is sent that leads the arm for `lasts` [s]."""
+        self._session.latest(DEVICE_EVENTS, self._on_event)
         now = self._session.clock.monotonic()
         if now - self._said > PAUSE:
-            self._began = now
-        self._said = now + (targets.ahead[-1].time if targets.ahead else 0.0)
+            self._began, self._status = now, None
+        self._said = now + lasts
         states = self._session.latest(JOINT_STATES)  # heard from the first target on
         if now - self._began > GAP and states.age() > GAP:
             raise Lost(because("lost.stream", remedy("list_nodes"), time=GAP))
         why, self._refused = self._refused, None
         if why is not None:
             raise Refused(because("client.refused", why), check="stream", reason=why)
-        node.publisher(JOINT_TARGETS).put(replace(targets, stamp=node.now()))
+
+    def _on_status(self, status: JogStatus) -> None:
+        if status.client in ("", self._session.node.address):
+            self._status, self._heard = status, self._session.clock.monotonic()
 
     def _on_event(self, event: DeviceEvent) -> None:
         """Only of the stream that runs, and not of another's: events of before may come late."""
@@ -84,6 +116,13 @@ def targets_of(
         places = dict(zip(row.name, row.position, strict=True))
         points.append(TargetAhead(time=period * (index + 1), position=tuple(places[name] for name in first.name)))
     return JointTargets(name=first.name, position=first.position, velocity=rates, ahead=tuple(points))
+
+
+def pose_target(pose: Pose | Vector) -> PoseTarget:
+    """The message, without a stamp, for a pose or a position (3,) [m] in the base; raises `BadArgument`."""
+    if isinstance(pose, Pose):
+        return PoseTarget(position=point("pose", pose.position), orientation=quaternion("pose", pose.orientation))
+    return PoseTarget(position=point("pose", pose))
 
 
 def _state(arm: ArmDescription, joints: Joints, owner: str) -> JointState:

@@ -11,7 +11,7 @@ from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.topics import Latest
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JogCommand, JogStatus
-from gemelo.schemas.reasons import Reason, because, plain, remedy
+from gemelo.schemas.reasons import Reason, plain
 from gemelo.schemas.topics import (
     CONTROL,
     DEVICE_STATUS,
@@ -23,6 +23,7 @@ from gemelo.schemas.topics import (
 )
 from gemelo.services.planner.collision.world import World
 from gemelo.services.planner.jog.jog import NEVER, PERIOD, SILENCE, STATUS_PERIOD, Jog, signed
+from gemelo.services.planner.jog.jog_command import objection
 from gemelo.services.planner.jog.jog_log import JogLog, digest_of
 from gemelo.services.planner.scene.standing import version_of
 
@@ -57,7 +58,7 @@ class JogService:
 
     def _on_command(self, command: JogCommand, writer: str) -> None:
         """The gateway decides whose targets move the arm; here others are kept from disturbing the holder's jog."""
-        if (reason := self._objection(writer)) is not None:
+        if (reason := objection(self._control.message, writer)) is not None:
             return self._refuse(reason, writer)
         now = self._node.monotonic()
         begins = not self._is_ticking and now - self._active > SILENCE
@@ -87,14 +88,6 @@ class JogService:
             self._is_ticking = False
             self._log.finish()
             node.forget(self._tick)
-
-    def _objection(self, writer: str) -> Reason | None:
-        """Why `writer` may not jog; None if it may."""
-        control = self._control.message
-        if control is None or not control.held or writer in control.members:
-            return None
-        holder = {"name": control.name, "node": control.node, "host": control.host}
-        return because("jog.control", remedy("who_holds"), **holder)
 
     @property
     def _told_to(self) -> str:

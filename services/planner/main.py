@@ -13,6 +13,7 @@ from gemelo.services.planner.core import Planner
 from gemelo.services.planner.jog_service import JogService
 from gemelo.services.planner.kinematic_service import KinematicService
 from gemelo.services.planner.parameters import PlannerParameters
+from gemelo.services.planner.pose_service import PoseService
 from gemelo.services.planner.request.start_state import STALE_AFTER
 from gemelo.services.planner.scene.answer_log import AnswerLog
 from gemelo.services.planner.scene.scene_keeper import SceneKeeper
@@ -33,6 +34,7 @@ def run(node: Node, deployment: Deployment) -> None:
     states, log = node.latest(JOINT_STATES), AnswerLog(node, lambda: parameters.value.record_inputs)
     keeper = SceneKeeper(node, arm, states, project_root() / deployment.paths.run, planner.set_world, log)
     JogService(node, arm, states, lambda: keeper.world, lambda: parameters.value.record_inputs)
+    PoseService(node, arm, states)
     KinematicService(node, arm, states, lambda: planner.checker.newest, log)
     present: Present = lambda: (states.message, states.age())  # noqa: E731
     workers: PlanMaker

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.schemas.control import ControlState
 from gemelo.schemas.errors import ReasonedError
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import JogCommand, JogLimit
-from gemelo.schemas.reasons import because, remedy
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.services.planner.jog.jog_limits import no_command, singularity, speed_limit
 from gemelo.services.planner.jog.twist import TwistSolver
 from gemelo.services.planner.request.refusals import PlanRefused
@@ -119,3 +120,11 @@ def standing_position(arm: ArmDescription, present: JointState | None, age: floa
         return resolve_start(arm, None, present, age)
     except PlanRefused as refused:
         raise JogRefused(refused.refusal.why or refused.refusal.message) from refused
+
+
+def objection(control: ControlState | None, writer: str) -> Reason | None:
+    """Why `writer` may not move the arm by hand; None if it may."""
+    if control is None or not control.held or writer in control.members:
+        return None
+    holder = {"name": control.name, "node": control.node, "host": control.host}
+    return because("jog.control", remedy("who_holds"), **holder)
