@@ -8,7 +8,6 @@ from collections.abc import Callable
 import msgspec
 
 from gemelo.schemas.joints import JointState, JointTargets
-from gemelo.schemas.message import encode
 from gemelo.schemas.planning import JogCommand, JogInputs, JogStatus, JogTaken, JogTick, SceneVersion
 from gemelo.schemas.reasons import Reason
 
@@ -76,8 +75,18 @@ def digest_of(targets: JointTargets | None, status: JogStatus | None) -> str:
     """A checksum of what was published in one period; empty where that was nothing."""
     if targets is None and status is None:
         return ""
-    published = (b"-" if targets is None else encode(targets), b"-" if status is None else _without_reasons(status))
+    published = (
+        b"-" if targets is None else _without_chunk(targets),
+        b"-" if status is None else _without_reasons(status),
+    )
     return hashlib.blake2b(b"".join(published), digest_size=DIGEST).hexdigest()
+
+
+def _without_chunk(targets: JointTargets) -> bytes:
+    """In msgpack; a jog has no targets ahead, and older recordings do not have the field."""
+    fields = msgspec.to_builtins(targets)
+    del fields["ahead"]
+    return msgspec.msgpack.encode(fields)
 
 
 def _without_reasons(status: JogStatus) -> bytes:
