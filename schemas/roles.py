@@ -45,6 +45,7 @@ from gemelo.schemas.topics import (
     REQUESTS,
     ROS_BRIDGE,
     ROS_OPERATOR,
+    SCENE,
     SCENE_EDIT,
     STATE_PUBLISHER,
     STATE_VALIDITY,
@@ -99,7 +100,7 @@ LOOKS: tuple[AnyRequest, ...] = (IK, FK, STATE_VALIDITY)  # answers that change 
 CONTROLS: tuple[AnyRequest, ...] = (CONTROL_TAKE, CONTROL_JOIN, CONTROL_GIVE)
 SEEN_FROM_ROS: tuple[AnyTopic, ...] = (
     DESCRIPTION, JOINT_STATES, FRAMES, STATIC_FRAMES, DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, STEP_ERRORS,
-    GRIPPER_STATE, CONTROL, LOG,
+    GRIPPER_STATE, CONTROL, SCENE, LOG,
 )  # fmt: skip
 MOVES: tuple[AnyRequest, ...] = (PLAN, PLAN_CANCEL, SCENE_EDIT, DEVICE_COMMAND, *CONTROLS)
 
@@ -121,7 +122,7 @@ ROLES: tuple[Role, ...] = (
     Role("ros_bridge", "the arm as a node of ROS 2", ROS_BRIDGE, reads=SEEN_FROM_ROS, asks=STOPS),
     Role(
         "ros_operator", "the same, where ROS 2 may move the arm", ROS_OPERATOR,
-        reads=SEEN_FROM_ROS, asks=(*STOPS, DEVICE_COMMAND, *CONTROLS), acts=ACTIONS,
+        reads=SEEN_FROM_ROS, asks=(*STOPS, *LOOKS, DEVICE_COMMAND, *CONTROLS), acts=ACTIONS,
     ),
     Role(
         "panel", "the operator's page", "panel",

@@ -6,9 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
+from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import (
     FollowErrorCode,
@@ -21,7 +24,7 @@ from gemelo.schemas.motion import (
 )
 from gemelo.schemas.reasons import because, remedy
 from gemelo.services.ros_bridge.core import SECOND, duration_of, header_of, nanoseconds
-from gemelo.services.ros_bridge.types import FOLLOW, ControlMsgs, make
+from gemelo.services.ros_bridge.types import FOLLOW, GRIPPER, ControlMsgs, make
 
 POINT = "trajectory_msgs/msg/JointTrajectoryPoint"
 
@@ -75,6 +78,28 @@ def _tolerance(tolerance: Any) -> JointTolerance:
         velocity=tolerance.velocity,
         acceleration=tolerance.acceleration,
     )
+
+
+def completed(goal: FollowJointTrajectoryGoal, state: JointState | None) -> FollowJointTrajectoryGoal:
+    """The goal for all joints of `state`: those that it does not name stay where they are."""
+    trajectory = goal.trajectory
+    named = set(trajectory.joint_names)
+    rows = zip(state.name, state.position, strict=True) if state is not None else ()
+    others = [(name, position) for name, position in rows if name not in named]
+    if not others:
+        return goal
+    names, positions = zip(*others, strict=True)
+    rest = (0.0,) * len(names)
+    points = tuple(
+        TrajectoryPoint(
+            positions=each.positions + positions,
+            velocities=each.velocities + rest if each.velocities else (),
+            accelerations=each.accelerations + rest if each.accelerations else (),
+            time_from_start=each.time_from_start,
+        )
+        for each in trajectory.points
+    )
+    return replace(goal, trajectory=replace(trajectory, joint_names=trajectory.joint_names + names, points=points))
 
 
 def follow_feedback(goal_id: bytes, feedback: FollowJointTrajectoryFeedback, generation: ControlMsgs) -> Any:
@@ -132,6 +157,30 @@ def lost_result(text: str) -> Any:
 def no_result() -> Any:
     """Of a goal that is not known."""
     return make(f"{FOLLOW}_Result", error_code=0, error_string="")
+
+
+def gripper_goal(goal: Any) -> GripperCommandGoal:
+    """Ours, of a control_msgs/GripperCommand goal [m, N]; raises `GoalNotTaken`."""
+    try:
+        return GripperCommandGoal(position=goal.command.position, max_effort=goal.command.max_effort)
+    except ValueError as error:
+        raise GoalNotTaken(because("ros.goal.not_finite", error=str(error))) from error
+
+
+def gripper_feedback(goal_id: bytes, feedback: GripperCommandFeedback) -> Any:
+    """The message of feedback of one goal."""
+    return make(
+        f"{GRIPPER}_FeedbackMessage", goal_id=uuid_of(goal_id), feedback=_gripped(f"{GRIPPER}_Feedback", feedback)
+    )
+
+
+def gripper_result(result: GripperCommandResult | None) -> Any:
+    """The result; of a goal that is not known or was lost, nothing reached."""
+    return _gripped(f"{GRIPPER}_Result", result or GripperCommandResult())
+
+
+def _gripped(kind: str, at: GripperCommandFeedback | GripperCommandResult) -> Any:
+    return make(kind, position=at.position, effort=at.effort, stalled=at.stalled, reached_goal=at.reached_goal)
 
 
 def status_in_ros(status: GoalStatusCode) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from gemelo.libraries.arm.model.description import load_arm
@@ -12,8 +13,9 @@ from gemelo.libraries.runtime.ros_wire.names import NodeName
 from gemelo.libraries.runtime.ros_wire.ros_node import RosNode
 from gemelo.schemas.deployment import Deployment, RosSection
 from gemelo.schemas.errors import ConfigurationError
-from gemelo.schemas.reasons import because, remedy
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.schemas.topics import ROS_BRIDGE, ROS_OPERATOR
+from gemelo.services.ros_bridge.motion import serve_motion
 from gemelo.services.ros_bridge.parameters import RosParameters, Value
 from gemelo.services.ros_bridge.topics import Topics
 from gemelo.services.ros_bridge.triggers import serve_triggers
@@ -31,6 +33,9 @@ def run(node: Node, deployment: Deployment) -> None:
     node.at_end(ros.close)
     topics = Topics(node, ros, section, Path(arm.folder))
     serve_triggers(node, ros, section.motion)
+    if section.motion:
+        decided = partial(on_decision, node, topics)
+        serve_motion(node, ros, section, lambda: topics.joints, arm.gripper is not None, decided)
     RosParameters(node, ros, own_parameters(section, arm.name, arm.joint_names))
     node.log.info("on the ROS 2 router %s as /%s", section.router, "/".join(filter(None, (name.namespace, name.name))))
 
@@ -40,6 +45,13 @@ def run(node: Node, deployment: Deployment) -> None:
         node.set_ready(ros.is_connected, "" if ros.is_connected else why)
 
     node.spin(step, rate=RATE)
+
+
+def on_decision(node: Node, topics: Topics, refusal: Reason | None) -> None:
+    """Has a refusal shown in /rosout and /diagnostics: the answer to a goal has no room for a sentence."""
+    topics.refusal = refusal
+    if refusal is not None:
+        node.log.warning("%s", because("ros.goal.refused", refusal))
 
 
 def require_usable(section: RosSection, deployment: Deployment) -> None:

@@ -12,11 +12,13 @@ from typing import Any, NamedTuple
 
 import zenoh
 import zenoh.ext as zx
+from zenoh.handlers import Callback
 
 from gemelo.libraries.runtime.ros_wire.names import Attachment, RosType, read_attachment
 from gemelo.services.ros_bridge.types import decode, encode, make, ros_type
 from tests.runtime.support import free_port, until
 
+EMPTY = {"structure_needs_at_least_one_member": 0}
 SETTINGS = {
     "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
     "timestamping": {"enabled": True},
@@ -37,6 +39,28 @@ class Heard(NamedTuple):
 
     message: Any
     attachment: Attachment
+
+
+class Asked:
+    """A question that was sent."""
+
+    def __init__(self, kind: str, attachment: Attachment) -> None:
+        self._kind, self.attachment = kind, attachment
+        self.replies: list[zenoh.Reply] = []
+        self.is_over = False
+
+    def end(self) -> None:
+        self.is_over = True
+
+    def response(self) -> Any:
+        """The one reply, decoded; its attachment repeats the request's number and GID."""
+        assert len(self.replies) == 1, [str(each.err) for each in self.replies]
+        sample = self.replies[0].ok
+        assert sample is not None
+        answered = read_attachment(bytes(sample.attachment or b""))
+        assert answered is not None
+        assert (answered.sequence, answered.gid) == (self.attachment.sequence, self.attachment.gid)
+        return decode(f"{self._kind}_Response", bytes(sample.payload))
 
 
 class RosClient:
@@ -86,27 +110,29 @@ class RosClient:
             self._kept.append(self.session.declare_subscriber(key, on_sample))
         return heard
 
-    def call(self, name: str, kind: str, timeout: float = 60.0, gid: bytes = b"", **fields: Any) -> Any:
-        """The decoded response; `kind` of the service. Its attachment repeats the request's number and GID."""
-        request = encode(make(f"{kind}_Request", **(fields or {"structure_needs_at_least_one_member": 0})))
-        return self.ask(name, kind, request, timeout, gid)
+    def call(self, name: str, kind: str, **fields: Any) -> Any:
+        """The decoded response; `kind` of the service, whose request has these fields."""
+        return self.ask(name, kind, encode(make(f"{kind}_Request", **(fields or EMPTY))))
 
-    def ask(self, name: str, kind: str, request: bytes, timeout: float = 60.0, gid: bytes = b"") -> Any:
+    def ask(self, name: str, kind: str, request: bytes) -> Any:
         """As `call`, of a request in bytes."""
-        asked = Attachment(next(self._numbers), time.time_ns(), gid or secrets.token_bytes(16))
-        replies = list(
-            self.session.get(
-                self.key(name, ros_type(kind)), payload=request, attachment=asked.packed(), timeout=timeout,
-                target=zenoh.QueryTarget.ALL_COMPLETE, consolidation=zenoh.ConsolidationMode.NONE,
-            )
+        asked = self.send(name, kind, request)
+        assert until(lambda: asked.is_over)
+        return asked.response()
+
+    def begin(self, name: str, kind: str, gid: bytes = b"", **fields: Any) -> Asked:
+        """As `call`, and waits for nothing."""
+        return self.send(name, kind, encode(make(f"{kind}_Request", **(fields or EMPTY))), gid)
+
+    def send(self, name: str, kind: str, request: bytes, gid: bytes = b"", timeout: float = 120.0) -> Asked:
+        """As `begin`, of a request in bytes; `timeout` in [s]."""
+        asked = Asked(kind, Attachment(next(self._numbers), time.time_ns(), gid or secrets.token_bytes(16)))
+        self.session.get(
+            self.key(name, ros_type(kind)), Callback(asked.replies.append, asked.end, indirect=False),
+            payload=request, attachment=asked.attachment.packed(), timeout=timeout,
+            target=zenoh.QueryTarget.ALL_COMPLETE, consolidation=zenoh.ConsolidationMode.NONE,
         )  # fmt: skip
-        assert len(replies) == 1, [str(each.err) for each in replies]
-        sample = replies[0].ok
-        assert sample is not None
-        answered = read_attachment(bytes(sample.attachment or b""))
-        assert answered is not None
-        assert (answered.sequence, answered.gid) == (asked.sequence, asked.gid)
-        return decode(f"{kind}_Response", bytes(sample.payload))
+        return asked
 
     def declare_client(self, token: str) -> Any:
         """The token of a service client, to be undeclared."""

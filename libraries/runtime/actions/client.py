@@ -55,14 +55,16 @@ class ActionClient(Generic[G, F, R]):
         on_feedback: Callable[[F], object] | None = None,
         timeout: float = 2.0,
         attached: bool = False,
+        goal_id: str = "",
     ) -> GoalHandle[F, R]:
         """Sends a goal, blocks up to `timeout` [s] for the decision, and longer for a large one.
 
         Raises `GoalRefused`, `Refused`, `NoAnswer`.
 
-        An `attached` goal is cancelled by the server when this node disappears, by its end or by the network's.
+        An `attached` goal is cancelled by the server when this node disappears, by its end or by the network's. Without
+        `goal_id` one is drawn.
         """
-        goal_id, raw = token(self._bus.clock), _raw(goal)
+        goal_id, raw = goal_id or token(self._bus.clock), _raw(goal)
         more = len(bytes(raw)) / PACE
         handle: GoalHandle[F, R] = GoalHandle(self.action, goal_id, self._bus, self._loop, on_feedback)
         self._handles[goal_id] = handle
