@@ -11,6 +11,7 @@ EXTRA_OF = {  # by the module's name at its top; tests/deploy/test_extras.py hol
     "pinocchio": "planner", "coal": "planner", "eaik": "planner", "ompl": "planner", "toppra": "planner",
     "rerun": "view", "yourdfpy": "view", "trimesh": "view", "scipy": "view", "xacro": "view",
     "viser": "panel", "cv2": "eyes", "rosbags": "ros", "xxhash": "ros",
+    "pyarrow": "lerobot", "PIL": "lerobot",
 }  # fmt: skip
 
 

@@ -136,6 +136,7 @@ def test_every_extra_that_a_service_names_is_there_and_every_extra_for_use_is_na
         "build",
         "ros",  # of a process that is started by hand
         "stack",  # of every host that runs a service
+        "lerobot",  # of a person who exports recordings
     }  # the embedded broker is for one machine: a site has mosquitto
     assert not SERVICES[BROKER].extras
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import gemelo
+from gemelo.libraries.lerobot.values import WrongValue
 from tests.lerobot_plugin.conftest import CELL
 from tests.simulated import found_by_connect
 
@@ -92,11 +93,11 @@ def test_a_camera_of_which_no_image_comes_is_named_with_a_remedy(make, plugin, w
 def test_names_that_cannot_be_are_refused_at_once(make):
     from lerobot.cameras import GreyConfig
 
-    with pytest.raises(gemelo.BadArgument) as caught:
+    with pytest.raises(WrongValue) as caught:
         make(cell_cameras=["front"])
     assert caught.value.reason.code == "lerobot.camera.unknown"
     assert caught.value.reason.values["names"] == ("overhead",)
-    with pytest.raises(gemelo.BadArgument) as caught:
+    with pytest.raises(WrongValue) as caught:
         make(cameras={"overhead": GreyConfig(**SIZE)})
     assert caught.value.reason.code == "lerobot.camera.twice"
 

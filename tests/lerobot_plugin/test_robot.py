@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import gemelo
+from gemelo.libraries.lerobot.values import WrongValue
 
 PERIOD = 1.0 / 30.0  # [s] of LeRobot's loop
 DEGREE = math.radians(1.0)
@@ -173,10 +174,10 @@ def test_a_target_beyond_a_limit_is_clipped_and_the_dictionary_says_so(robot, ar
 def test_numbers_of_other_kinds_are_taken_and_what_is_none_is_refused(robot, arm):
     action = {name: np.float32(value) for name, value in at(arm).items()}
     assert all(type(value) is float for value in robot.send_action(action).values())
-    with pytest.raises(gemelo.BadArgument) as caught:
+    with pytest.raises(WrongValue) as caught:
         robot.send_action(at(arm, brazo_joint=math.nan))
     assert caught.value.reason.code == "lerobot.action.not_finite"
-    with pytest.raises(gemelo.BadArgument) as caught:
+    with pytest.raises(WrongValue) as caught:
         robot.send_action({"codo.pos": 1.0})
     assert caught.value.reason.values["name"] == "codo.pos"
 
@@ -207,7 +208,7 @@ def test_bounds_by_joint_and_none(make, arm):
     sent = robot.send_action(at(arm, brazo_joint=start + 8.0))
     assert sent["brazo_joint.pos"] == pytest.approx(start + 2.0, abs=0.01)
     for wrong, code in (({"codo": 1.0}, "lerobot.option.joint"), (0.0, "lerobot.option.above_zero")):
-        with pytest.raises(gemelo.BadArgument) as caught:
+        with pytest.raises(WrongValue) as caught:
             make(max_relative_target=wrong)
         assert caught.value.reason.code == code
 

@@ -209,7 +209,7 @@ COMMANDS = (
     Command(("bag", "play"), "play a recording as a shadow robot, for the viewer and every tool",
             "recording.bag_play:run", "recording.bag_play:add_options",
             "gemelo bag play test.mcap --rate 0.5 --start 12 --loop"),
-    Command(("bag", "export"), "write a recording as CSV, Parquet or a file of Rerun",
+    Command(("bag", "export"), "write a recording as CSV, Parquet, a file of Rerun or a LeRobotDataset",
             "recording.bag:run_export", "recording.bag:export_options",
             "gemelo bag export test.mcap joint_states --to parquet"),
     Command(("bag", "repair"), "write what is readable of a recording that was cut off, and say what is lost",

@@ -11,13 +11,13 @@ from lerobot.cameras import make_cameras_from_configs
 from lerobot.robots import Robot
 
 import gemelo
+from gemelo.libraries.lerobot.values import ArmValues, WrongValue
 from gemelo.schemas.reasons import Reason, because, remedy
 
 from .cell_cameras import CellCamera, described
 from .config_gemelo import GemeloConfig
 from .following import PAUSE, Follower, log
 from .gripper import GripperThread
-from .values import ArmValues
 
 AT_REST = 1e-3  # [rad/s] or [m/s]
 TO_REST = 3.0  # [s] that the arm may take after a stop
@@ -44,9 +44,9 @@ class Gemelo(Robot):  # type: ignore[misc]  # LeRobot has no types for who does 
         if unknown := sorted(set(wanted) - set(known)):
             code = "lerobot.camera.unknown" if known else "lerobot.camera.none"
             names = {"names": tuple(known)} if known else {}
-            raise gemelo.BadArgument(because(code, camera=unknown[0], **names))
+            raise WrongValue(because(code, camera=unknown[0], **names))
         if twice := sorted(set(wanted) & set(config.cameras)):
-            raise gemelo.BadArgument(because("lerobot.camera.twice", camera=twice[0]))
+            raise WrongValue(because("lerobot.camera.twice", camera=twice[0]))
         self._cell_cameras = [CellCamera(record) for record in records if record.name in wanted]
         self._own_cameras = make_cameras_from_configs(config.cameras)
         self.cameras = {**{each.name: each for each in self._cell_cameras}, **self._own_cameras}

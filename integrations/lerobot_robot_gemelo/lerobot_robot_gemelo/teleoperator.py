@@ -8,12 +8,12 @@ from typing import Any
 from lerobot.teleoperators import Teleoperator
 
 import gemelo
+from gemelo.libraries.lerobot.values import ArmValues
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.reasons import because
 
 from .cell_cameras import described
 from .config_gemelo import GemeloTeleopConfig
-from .values import ArmValues
 
 NEW = 0.2  # [s] for which a streamed target is what is wanted; after it, what the path asks for
 

@@ -20,6 +20,9 @@ from gemelo.tools.cli.common.language import columns, sentence, word
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.cli.parser import Options, Parser, json_option
 
+MOST = 1000.0  # [Hz] or [s] chosen: of a rate or of a pause that can be meant
+SLOW = 0.9  # of a dataset's rate: images that come less often are repeated
+
 
 def file_option(parser: Parser) -> None:
     """Adds the recording."""
@@ -63,15 +66,42 @@ def export_options(parser: Parser) -> None:
     parser.add_argument("topics", metavar="TOPIC", nargs="*", help="topics or patterns, as 'device/*' [all]")
     parser.add_argument("--to", default="csv", metavar="FORM", help=f"{', '.join(FORMS)} [csv]")
     parser.add_argument("-o", "--output", type=Path, metavar="PATH", help="folder, or the .rrd file [beside it]")
+    parser.add_argument("--lerobot", type=Path, metavar="DIR", help="a new folder: demonstrations as a LeRobotDataset")
+    parser.add_argument("--task", metavar="TEXT", help="what the demonstrations show, as a LeRobotDataset says it")
+    parser.add_argument("--fps", type=float, default=30.0, metavar="HZ", help="frames of a LeRobotDataset [30]")
+    parser.add_argument("--gap", type=float, default=1.0, metavar="S", help="a pause that ends an episode [1 s]")
+    parser.add_argument("--each-goal", action="store_true", help="an episode is one goal, not all up to a pause")
 
 
 def run_export(options: Options) -> ExitCode:
-    """Writes a recording's topics as tables, or as a file of Rerun."""
+    """Writes a recording's topics as tables or as a file of Rerun, or its demonstrations as a LeRobotDataset."""
+    if options.lerobot is not None:
+        return _export_dataset(options)
     if options.to not in FORMS:
         raise unknown("form", options.to, list(FORMS))
     with one_sentence():
         for path, count in export(options.file, options.to, options.topics, options.output):
             print(sentence(because("recording.exported", file=str(path), count=count)) if count else str(path))
+    return ExitCode.OK
+
+
+def _export_dataset(options: Options) -> ExitCode:
+    from gemelo.libraries.lerobot.export import export_dataset  # slow to load: pyarrow
+
+    if not options.task:
+        raise usage(because("recording.lerobot.task"))
+    for name, value in (("--fps", options.fps), ("--gap", options.gap)):
+        if not 0.0 < value <= MOST:
+            raise usage(because("recording.lerobot.range", option=name, value=value, most=MOST))
+    with one_sentence():
+        done = export_dataset(options.file, options.lerobot, options.task, options.fps, options.gap, options.each_goal)
+    folder = str(options.lerobot)
+    print(sentence(because("recording.lerobot.written", folder=folder, count=done.episodes, frames=done.frames)))
+    if done.left_out:
+        print(sentence(because("recording.lerobot.short", count=done.left_out)))
+    for name, rate in done.cameras.items():
+        if rate < SLOW * options.fps:
+            print(sentence(because("recording.lerobot.slow", camera=name, rate=rate, fps=options.fps)))
     return ExitCode.OK
 
 
