@@ -42,6 +42,12 @@ class Components:
         self.echoes = Echoes(self.device)
         self.control = ControlHandler(self, arm.name, session_id)
 
+    def is_idle(self, moment: Moment) -> bool:
+        """True while nothing is under way, and the device can be reached."""
+        is_wanted = self.goals.is_active or self.streaming.is_active or self.gripper.is_active
+        is_answered = self.device.commands.is_empty and self.device.unreachable_reason(moment) is None
+        return is_answered and not is_wanted and not self.controller.is_followable
+
     def abort_all(self, reason: Reason, moment: Moment) -> None:
         """Nothing of what was under way is continued."""
         if self.goals.is_active:

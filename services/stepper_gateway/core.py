@@ -146,6 +146,10 @@ class GatewayCore:
         device = self.device
         return device.unreachable_reason(moment) or (None if device.state is not None else device.not_ready_reason())
 
+    def is_state_due(self, t_us: int, moment: Moment) -> bool:
+        """True if something may come of a state of `t_us` [us] that repeats the one before."""
+        return not self._components.is_idle(moment) or self._frame_handler.is_state_due(t_us, moment)
+
     def prepare_goal(self, goal: FollowJointTrajectoryGoal, moment: Moment) -> Iterator[None]:
         """Checks a long goal ahead, in pieces; no input: what `handle` then decides is the same without it."""
         return self._components.goals.prepare(goal, moment)

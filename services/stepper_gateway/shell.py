@@ -81,6 +81,7 @@ from gemelo.services.stepper_gateway.inputs import (
 )
 from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile
 from gemelo.services.stepper_gateway.links import link as links
+from gemelo.services.stepper_gateway.links.repeated_states import StateSieve
 from gemelo.services.stepper_gateway.moment import Moment
 from gemelo.services.stepper_gateway.outputs import (
     Answer,
@@ -123,6 +124,7 @@ class Shell:
         self._inputs = InputLog(core, began, self._moment(), node.publisher(GATEWAY_INPUTS).put)
         self._told = began.parameters
         self._link: links.Link | None = None
+        self._sieve = StateSieve()
         self._link_told: tuple[bool, Reason | None] | None = None  # what the core was given of it last
         self._silent = False
         self._is_woken = threading.Event()
@@ -165,7 +167,10 @@ class Shell:
             self._handle(ParametersInput(self._told))
         moment = self._moment()
         self._handle(StepInput(self._absences.seconds(self._core.watched_clients, moment.monotonic)))
+        self._on_link()  # which is not woken for each state
         moment = self._moment()
+        for held in self._sieve.release(round(moment.monotonic * 1e9)):
+            self._handle(FrameInput(*held))
         reason = self._core.not_ready(moment)
         self._node.set_ready(reason is None, reason or "")
         self._inputs.step(moment, self._told.record_inputs)
@@ -188,7 +193,8 @@ class Shell:
             self._handle(link_input(*present))
         received = link.take(AT_ONCE)
         for payload in received:
-            self._handle(FrameInput(*payload))
+            for given in self._sieve.sift(payload, lambda t_us: self._core.is_state_due(t_us, self._moment())):
+                self._handle(FrameInput(*given))
         if len(received) == AT_ONCE:
             self.wake()
 

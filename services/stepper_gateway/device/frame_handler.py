@@ -70,6 +70,14 @@ class FrameHandler:
             case _:
                 self._on_frame(received, arrival, moment)
 
+    def is_state_due(self, t_us: int, moment: Moment) -> bool:
+        """True if a state of `t_us` [us] that repeats the one before would be published."""
+        return self._thinner.is_due(t_us * 1e-6, self._longest_gap(moment))
+
+    def _longest_gap(self, moment: Moment) -> float:
+        """[s] between two published states at rest."""
+        return self._device.resting.longest_gap(self._device.parameters.rest_rate, moment)
+
     def _on_frame(self, received: FrameInput, arrival: float, moment: Moment) -> None:
         frame = decode(received.payload)
         match received.kind, frame:
@@ -144,8 +152,7 @@ class FrameHandler:
             return
         controller.on_state(state, arrival)
         point = controller.commanded(state)
-        longest = device.resting.longest_gap(device.parameters.rest_rate, moment)
-        if self._thinner.passes((replace(state, t_us=0), point), state.t_us * 1e-6, longest):
+        if self._thinner.passes((replace(state, t_us=0), point), state.t_us * 1e-6, self._longest_gap(moment)):
             self._publish(state, point, moment)
         self._components.ledger.on_state(state, point, moment)
         self._components.gripper.on_state(state, moment)

@@ -29,13 +29,17 @@ class RestThinner:
         """True if what says `content` at `at` [s] is to be published; `longest` [s] between two at rest: nothing is
         left out where that is not longer than the shortest."""
         last, self._last = self._last, content
-        since = at - self._passed
-        is_alike = content == last and since >= 0.0  # else its clock begins anew
-        if is_alike and longest > self._shortest and since < self._gap - 0.5 * self._shortest:
+        is_alike = content == last and at >= self._passed  # else its clock begins anew
+        if is_alike and not self.is_due(at, longest):
             return False
         self._gap = max(self._shortest, min(2.0 * self._gap, longest)) if is_alike else self._shortest
         self._passed = at
         return True
+
+    def is_due(self, at: float, longest: float) -> bool:
+        """True if what repeats the one before would pass at `at` [s]."""
+        since = at - self._passed
+        return longest <= self._shortest or not 0.0 <= since < self._gap - 0.5 * self._shortest
 
 
 class RestingTopics:

@@ -36,6 +36,7 @@ _SYNC = struct.Struct("<Q")
 _SYNC_R = struct.Struct("<QQQ")
 _STATE = struct.Struct("<QBBHHHIIQIIIBBHHH")
 _SERVO = struct.Struct("<HH")
+_TIME = struct.Struct("<Q")  # of the device: what a STATE begins with
 
 
 class BadFrame(ValueError):
@@ -279,12 +280,18 @@ def decode(payload: bytes) -> AnyFrame:
     reader = _READERS.get(kind)
     if reader is None:
         raise BadFrame(f"type {kind} is unknown")
-    if zlib.crc32(payload[:-4]) != _CRC.unpack_from(payload, len(payload) - 4)[0]:
+    if not _is_whole(payload):
         raise BadFrame("the CRC does not match")
     try:
         return reader(boot_id, joints, payload[_HEADER.size : -4])
     except struct.error as error:
         raise BadFrame(f"a {FrameType(kind).name} frame of {len(payload)} bytes: {error}") from error
+
+
+def _is_whole(payload: bytes) -> bool:
+    """True if it ends with the checksum of what is before."""
+    (crc,) = _CRC.unpack_from(payload, len(payload) - _CRC.size)
+    return bool(zlib.crc32(payload[: -_CRC.size]) == crc)
 
 
 def _chunk(frame: Chunk) -> bytes:
@@ -326,6 +333,19 @@ def _read_ack(boot_id: int, _joints: int, body: bytes) -> Ack:
         boot_id=boot_id, stream=stream, seq=seq, next_seq=next_seq, code=code, joint=joint, knot=knot,
         value=value, limit=limit, credits=credits, buffered_ms=buffered_ms, t_us=t_us,
     )  # fmt: skip
+
+
+def state_content(payload: bytes) -> bytes | None:
+    """All of a STATE frame but its time and checksum; None for what is too short for one or fails its checksum."""
+    if len(payload) < _HEADER.size + _STATE.size + _CRC.size or not _is_whole(payload):
+        return None
+    return payload[: _HEADER.size] + payload[_HEADER.size + _TIME.size : -_CRC.size]
+
+
+def state_time(payload: bytes) -> int:
+    """[us] of the device's clock in a STATE frame, of which `state_content` has been read."""
+    (t_us,) = _TIME.unpack_from(payload, _HEADER.size)
+    return int(t_us)
 
 
 def _read_command(boot_id: int, joints: int, body: bytes) -> CommandFrame:
