@@ -40,7 +40,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ["GEMELO_STARTED"] = "/dev/null/started.toml"  # no file can be there
 
 # Nor is the language of their terminal: sentences are compared in English, those of processes that tests start too.
-for variable in ("LC_ALL", "LC_MESSAGES", "LANG"):
+for variable in ("GEMELO_LANG", "LC_ALL", "LC_MESSAGES", "LANG"):
     os.environ.pop(variable, None)
 os.environ["LANG"] = "C.UTF-8"
 

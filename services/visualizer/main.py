@@ -20,7 +20,7 @@ from gemelo.libraries.runtime.process.priority import lower_priority
 from gemelo.libraries.runtime.scene_meshes import SceneMeshes
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.frames import RobotDescription
-from gemelo.schemas.locale_language import ENGLISH, known, of_environment
+from gemelo.schemas.plain_text import ENGLISH, known, of_environment
 from gemelo.schemas.scene import MeshShape
 from gemelo.schemas.text_file import read_text
 from gemelo.schemas.topics import ANY, DESCRIPTION, LOG, SCENE

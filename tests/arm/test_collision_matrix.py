@@ -16,6 +16,7 @@ from gemelo.libraries.arm.kinematics.link_distances import LinkDistances
 from gemelo.libraries.arm.kinematics.self_collisions import SelfCollisionChecker
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.arm.model.srdf_edit import entries, with_pairs
+from gemelo.schemas.reasons import Reason
 from tests.arm.editing import edit
 from tests.arm.plates import add_rigid_plates, add_turning_disc
 
@@ -77,10 +78,11 @@ def test_the_bounds_of_the_matrix_hold_and_its_distances_are_the_checkers(rm1_fo
 
 def test_progress_of_the_matrix_is_told(rm1_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gemelo.libraries.arm.kinematics.collision_matrix.SAYING", 0.0)
-    said: list[str] = []
-    collision_matrix(load_arm(rm1_folder), samples=20, tell=said.append)
-    assert re.fullmatch(r"\d+ configurations sampled after \d+\.\d s", said[0])
-    assert re.fullmatch(r"6 of 6 pairs of links after \d+\.\d s", said[-1])
+    progress: list[Reason] = []
+    collision_matrix(load_arm(rm1_folder), samples=20, tell=progress.append)
+    assert progress[0].code == "fit.pairs.sampled"
+    assert re.fullmatch(r"\d+ configurations sampled after \d+\.\d s", str(progress[0]))
+    assert re.fullmatch(r"6 of 6 pairs of links after \d+\.\d s", str(progress[-1]))
 
 
 def test_links_without_a_shape_do_not_keep_neighbours_apart(tmp_path: Path, rm1_folder: Path) -> None:

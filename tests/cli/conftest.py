@@ -24,13 +24,13 @@ from gemelo.schemas.device import (
     DeviceStopRequest,
 )
 from gemelo.schemas.joints import JointState, StepErrors
-from gemelo.schemas.locale_language import ENGLISH
 from gemelo.schemas.motion import (
     FollowErrorCode,
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
 )
+from gemelo.schemas.plain_text import ENGLISH
 from gemelo.schemas.planning import PlanRequest, PlanResponse
 from gemelo.schemas.reasons import plain
 from gemelo.schemas.topics import (

@@ -17,7 +17,7 @@ from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.runtime.bus.memory_bus import MemoryBus
 from gemelo.libraries.runtime.clock_offset import ClockOffset
 from gemelo.schemas.device import DeviceState, DeviceStatus
-from gemelo.schemas.locale_language import ENGLISH
+from gemelo.schemas.plain_text import ENGLISH
 from gemelo.schemas.system import NodeInfo
 from gemelo.tools.chaos.descriptors import give_descriptors, take_descriptors
 from gemelo.tools.cli.common import language

@@ -10,7 +10,7 @@ import pytest
 
 from gemelo.libraries.runtime.firmware_update import HEADER, ImageHeader, NoImage, build_header, read_header
 from gemelo.schemas.device import DeviceConfiguration, DeviceMode, DeviceState, DeviceStatus
-from gemelo.schemas.locale_language import ENGLISH
+from gemelo.schemas.plain_text import ENGLISH
 from gemelo.schemas.reasons import Reason, Value, because, say
 from gemelo.tools.cli.common import language
 from gemelo.tools.cli.common.errors import CommandError

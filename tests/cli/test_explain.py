@@ -7,7 +7,7 @@ import runpy
 
 import pytest
 
-from gemelo.schemas import locale_language
+from gemelo.schemas import plain_text
 from gemelo.schemas.reasons import catalogue
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
@@ -71,7 +71,7 @@ def test_a_wrong_code_is_refused_with_the_nearest(capsys):
 
 def test_json_has_every_language_whatever_the_reader_speaks(capsys):
     printed = []
-    for code in locale_language.known():
+    for code in plain_text.known():
         assert run(["--lang", code, "explain", "goal.points.none", "--json"]) is ExitCode.OK
         printed.append(capsys.readouterr().out)
     assert printed[0] == printed[1]
@@ -83,7 +83,7 @@ def test_json_has_every_language_whatever_the_reader_speaks(capsys):
 def test_the_languages_that_there_are_lack_nothing(capsys):
     assert run(["languages"]) is ExitCode.OK
     lines = capsys.readouterr().out.splitlines()
-    assert [line.partition(":")[0] for line in lines] == list(locale_language.known())
+    assert [line.partition(":")[0] for line in lines] == list(plain_text.known())
     assert all("all " in line for line in lines)
 
 

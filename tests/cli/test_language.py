@@ -7,7 +7,7 @@ import json
 import pytest
 
 import gemelo
-from gemelo.schemas import locale_language
+from gemelo.schemas import plain_text
 from gemelo.schemas.reasons import FrontEnd, say
 from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.main import run
@@ -33,10 +33,11 @@ def plan_from_elsewhere(tmp_path_factory) -> str:
         ({"LANG": "es_ES", "LC_ALL": "en_US.UTF-8"}, "en"),
         ({"LANG": "en_US", "LC_MESSAGES": "es_AR.UTF-8"}, "es"),
         ({"LANG": "es_ES", "LC_ALL": ""}, "es"),
+        ({"LANG": "en_US", "GEMELO_LANG": "es"}, "es"),
     ],
 )
 def test_the_first_variable_that_is_set_decides(environ, wanted):
-    assert locale_language.of_environment(environ) == wanted
+    assert plain_text.of_environment(environ) == wanted
 
 
 def test_a_refusal_is_printed_in_the_language_of_the_option(plan_from_elsewhere, capsys):
@@ -57,9 +58,18 @@ def test_a_refusal_is_printed_in_the_language_of_the_locale(plan_from_elsewhere,
     assert "el plan empieza en" in capsys.readouterr().err
 
 
+def test_what_a_command_starts_speaks_its_language_and_the_next_command_its_own(capfd):
+    """The shapes are fitted in a process of its own."""
+    command = ["collision", "fit", "urdf/rm1"]
+    assert run(["--lang", "es", *command]) is ExitCode.OK
+    assert capfd.readouterr().out.startswith("eslabón ")
+    assert run(command) is ExitCode.OK
+    assert capfd.readouterr().out.startswith("link ")
+
+
 def test_json_is_the_same_in_every_language(capsys):
     printed = []
-    for code in locale_language.known():
+    for code in plain_text.known():
         assert run(["--lang", code, "topic", "list", "--json"]) is ExitCode.OK
         printed.append(json.loads(capsys.readouterr().out))
     assert len(printed) >= 2

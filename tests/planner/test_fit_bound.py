@@ -267,7 +267,7 @@ def test_what_cannot_be_met_is_said_with_the_figure_the_place_and_what_would_do(
     excess = excess_of(shapes, surface, WITHIN)
     fit = LinkFit("forearm", mesh, shapes, WITHIN, excess)
     assert not fit.is_within
-    said = beyond_bound(fit, 1)
+    said = str(beyond_bound(fit, 1))
     said_of = r'link "forearm": (89|9[01]) % of the surface of its 1 shapes is within 5 mm of its mesh, not 95 %: '
     assert re.match(said_of, said)
     assert re.search(

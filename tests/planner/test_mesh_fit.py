@@ -234,7 +234,7 @@ def test_a_named_state_in_which_the_shapes_touch_is_said(copied: Path):
     block = '<collision><geometry><box size="3 3 3"/></geometry></collision>'
     arm.urdf_path.write_text(with_collisions(arm.urdf_path.read_text(), {first: [block]}))
     said = touching_states(load_arm(copied))
-    assert f'in the state "home" {first} and {last} touch' in said
+    assert f'in the state "home" {first} and {last} touch' in map(str, said)
 
 
 def test_a_capsule_is_written_as_what_a_urdf_knows(copied: Path):

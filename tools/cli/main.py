@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
 from gemelo.libraries.runtime.process.leaving import end_process
-from gemelo.schemas import locale_language
+from gemelo.schemas import plain_text
 from gemelo.tools.cli.commands import COMMANDS, GROUPS
 from gemelo.tools.cli.common import language
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown, usage
@@ -114,9 +115,10 @@ def robot_folder(name: str) -> str:
 
 def choose_language(name: str) -> None:
     """Raises `CommandError` for a language that there is no folder of."""
-    if name not in (known := locale_language.known()):
+    if name not in (known := plain_text.known()):
         raise unknown("language", name, known)
     language.choose(name)
+    os.environ[plain_text.CHOSEN] = name  # of what this command starts
 
 
 LEADING = {  # options before the command, each with a value: the code of its refusal without it, and what it does
@@ -125,16 +127,28 @@ LEADING = {  # options before the command, each with a value: the code of its re
 }
 
 
+@contextmanager
+def same_language_after() -> Iterator[None]:
+    """The language that `--lang` chose is that of this command line alone, where a process runs several."""
+    before = os.environ.get(plain_text.CHOSEN)
+    try:
+        yield
+    finally:
+        os.environ.pop(plain_text.CHOSEN, None)
+        if before is not None:
+            os.environ[plain_text.CHOSEN] = before
+
+
 def run(arguments: Sequence[str] | None = None) -> ExitCode:
     """Runs one command line, by default that of the process; prints every failure as one sentence on stderr, and
     nothing with control characters of others."""
-    with escaped_output():
+    with escaped_output(), same_language_after():
         return _run(list(sys.argv[1:] if arguments is None else arguments))
 
 
 def _run(given: list[str]) -> ExitCode:
     try:
-        language.choose(locale_language.of_environment(os.environ))
+        language.choose(plain_text.of_environment(os.environ))
         options = parse(with_leading_options(given))
         code: ExitCode = options.command.load("run")(options)
         sys.stdout.flush()

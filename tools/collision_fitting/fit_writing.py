@@ -14,7 +14,7 @@ from gemelo.libraries.arm.kinematics.kinematics import Kinematics
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.arm.model.urdf import Triple
 from gemelo.libraries.arm.model.urdf_edit import with_collisions
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import Reason, because
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 from gemelo.tools.collision_fitting.excess import depth_in
@@ -117,12 +117,12 @@ def _restored(folder: Path) -> Iterator[None]:
         raise
 
 
-def touching_states(arm: ArmDescription) -> list[str]:
-    """The named states in which two links touch that are no neighbours, in words: shapes hold more than meshes do."""
+def touching_states(arm: ArmDescription) -> list[Reason]:
+    """The named states in which two links touch that are no neighbours: shapes hold more than meshes do."""
     own = Kinematics(arm).collisions
     neighbours = {frozenset((joint.parent, joint.child)) for joint in arm.model.joints}
     return [
-        f'in the state "{state}" {" and ".join(pair)} touch'
+        because("fit.touch", state=state, first=pair[0], second=pair[1])
         for state, configuration in arm.named_states.items()
         for pair in own.pairs_within(configuration)
         if frozenset(pair) not in neighbours

@@ -3,6 +3,7 @@ planner."""
 
 from __future__ import annotations
 
+import os
 import sys
 from argparse import ArgumentParser, Namespace
 from collections import Counter
@@ -11,9 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gemelo.libraries.arm.model.description import load_arm
-from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.errors import ConfigurationError, ReasonedError
+from gemelo.schemas.plain_text import of_environment
+from gemelo.schemas.reasons import because
 from gemelo.services.planner.collision_geometry.link_shapes import link_shapes
 from gemelo.services.planner.native.sphere_cover import BULGE, link_cover
+from gemelo.tools.cli.common.language import choose, columns, sentence, word
 
 if TYPE_CHECKING:
     from gemelo.tools.collision_fitting.mesh_fit import LinkFit
@@ -21,13 +25,13 @@ if TYPE_CHECKING:
 
 def report(folder: Path, bulge: float = BULGE) -> str:
     """A line for every link with collision shapes, and their sum; `bulge` [m] is allowed, more for large links."""
-    rows = [("link", "shapes", "spheres", "bulge [mm]")]
+    rows = [columns("link", "shapes", "spheres", "bulge [mm]")]
     total = 0
     for link, shapes in link_shapes(load_arm(folder)).items():
         cover = link_cover(shapes, bulge)
         total += len(cover.spheres)
         rows.append((link, str(len(shapes)), str(len(cover.spheres)), f"{1000.0 * cover.bulge:.2f}"))
-    return _table([*rows, ("all", "", str(total), "")])
+    return _table([*rows, (word("row", "all"), "", str(total), "")])
 
 
 def fit_meshes(folder: Path, within: float | None, most: int, only: Sequence[str], write: bool) -> str:
@@ -38,8 +42,8 @@ def fit_meshes(folder: Path, within: float | None, most: int, only: Sequence[str
     from gemelo.tools.collision_fitting.mesh_fit import beyond_bound, fit_links
 
     arm = load_arm(folder)
-    fits = fit_links(arm, within, most, only, lambda said: print(said, file=sys.stderr, flush=True))
-    rows = [("link", "shapes", "95 % within [mm]", "worst [mm]", "at [mm]", "")]
+    fits = fit_links(arm, within, most, only, lambda reason: print(sentence(reason), file=sys.stderr, flush=True))
+    rows = [(*columns("link", "shapes", "95 % within [mm]", "worst [mm]", "at [mm]"), "")]
     for fit in fits:
         figures = str(len(fit.shapes)), f"{1000.0 * fit.excess.p95:.1f}", f"{1000.0 * fit.excess.worst:.1f}"
         place = " ".join(f"{1000.0 * value:.0f}" for value in fit.excess.place)
@@ -47,27 +51,21 @@ def fit_meshes(folder: Path, within: float | None, most: int, only: Sequence[str
     lines = [_table(rows)]
     for fit in fits:
         if not fit.is_within:
-            print(f"warning: {beyond_bound(fit, most)}", file=sys.stderr)
+            print(sentence(because("fit.warning", beyond_bound(fit, most))), file=sys.stderr)
     if write:
         changed = write_fits(arm, fits)
-        return "\n".join(
-            [
-                *lines,
-                *(
-                    f"{said}: fit them closer with --within, write finer shapes by hand, or do without with --link"
-                    for said in touching_states(changed)
-                ),
-                f"{arm.urdf_path} is changed, loaded again, and every corner of the meshes is in its shapes",
-                f"see next which pairs touch: `gemelo collision matrix {folder} --write`",
-            ]
-        )
+        lines += [sentence(because("fit.touch.remedy", touching)) for touching in touching_states(changed)]
+        lines.append(sentence(because("fit.written", file=str(arm.urdf_path))))
+        return "\n".join([*lines, sentence(because("fit.see_pairs", folder=str(folder)))])
     for fit in fits:
         lines += [f"{fit.link}:", *elements_of(fit)]
-    return "\n".join([*lines, "nothing is written: give --write for that"])
+    return "\n".join([*lines, sentence(because("fit.not_written"))])
 
 
 def _kinds(fit: LinkFit) -> str:
-    return ", ".join(f"{count} {kind}" for kind, count in Counter(shape.kind for shape in fit.shapes).items())
+    return ", ".join(
+        f"{count} {word('fit', kind)}" for kind, count in Counter(shape.kind for shape in fit.shapes).items()
+    )
 
 
 def _table(rows: Sequence[tuple[str, ...]]) -> str:
@@ -99,6 +97,7 @@ def _options(arguments: list[str] | None) -> Namespace:
 
 def main(arguments: list[str] | None = None) -> int:
     """0, or 1 with what is wrong on stderr."""
+    choose(of_environment(os.environ))
     options = _options(arguments)
     try:
         if options.meshes:
@@ -107,7 +106,7 @@ def main(arguments: list[str] | None = None) -> int:
         else:
             print(report(options.folder, options.bulge / 1000.0))
     except (ConfigurationError, ValueError, ImportError, OSError) as error:
-        print(f"gemelo: {error}", file=sys.stderr)
+        print(f"gemelo: {sentence(error.reason) if isinstance(error, ReasonedError) else error}", file=sys.stderr)
         return 1
     return 0
 

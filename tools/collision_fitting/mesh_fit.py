@@ -16,7 +16,7 @@ import numpy as np
 
 from gemelo.libraries.arm.errors import DescriptionError, nearest
 from gemelo.libraries.arm.model.description import ArmDescription
-from gemelo.schemas.reasons import because
+from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.services.planner.collision_geometry.shapes import TriangleMesh
 from gemelo.tools.collision_fitting.excess import SHARE, Excess, excess_of
 from gemelo.tools.collision_fitting.fitted_shape import Fitted
@@ -51,7 +51,7 @@ class LinkFit:
         return self.excess.share >= SHARE
 
 
-def _tell_nobody(_: str) -> None:
+def _tell_nobody(_: Reason) -> None:
     pass
 
 
@@ -60,10 +60,10 @@ def fit_links(
     within: float | None = None,
     most: int = MOST,
     only: Sequence[str] = (),
-    tell: Callable[[str], None] = _tell_nobody,
+    tell: Callable[[Reason], None] = _tell_nobody,
 ) -> list[LinkFit]:
     """Of every link with a visual mesh, or of those named, to within so many [m], or to what is usual for its size;
-    `tell` hears of each link. Raises `DescriptionError` with what is wrong and where."""
+    `tell` gets what was fitted to each link. Raises `DescriptionError` with what is wrong and where."""
     for name in only:
         if name not in arm.model.link_names:
             hint = nearest(name, arm.model.link_names)
@@ -80,12 +80,19 @@ def fit_links(
     wanted_fits = [(name, mesh, usual_bound(mesh) if within is None else within, most) for name, mesh in drawn.items()]
     for fit, seconds in fit_on_all_cores(wanted_fits):
         fits.append(fit)
-        place = f'link "{fit.link}" ({len(fits)} of {len(drawn)}), {len(fit.mesh.faces)} triangles'
-        p95, worst = 1000.0 * fit.excess.p95, 1000.0 * fit.excess.worst
-        reach = f"95 % of their surface within {p95:.1f} mm, the worst place {worst:.1f} mm beyond"
-        shapes = "1 shape" if len(fit.shapes) == 1 else f"{len(fit.shapes)} shapes"
-        tell(f"{place}: {shapes} after {seconds:.1f} s, {reach}")
+        tell(_progress(fit, (len(fits), len(drawn)), seconds))
     return fits
+
+
+def _progress(fit: LinkFit, place: tuple[int, int], seconds: float) -> Reason:
+    """What was fitted to the link at that `place`, its number and how many there are, in so many seconds."""
+    number, count = place
+    shapes = because("fit.shape.one") if len(fit.shapes) == 1 else because("fit.shape.several", count=len(fit.shapes))
+    reach = {"p95": 1000.0 * fit.excess.p95, "worst": 1000.0 * fit.excess.worst}
+    triangles = len(fit.mesh.faces)
+    return because(
+        "fit.progress", shapes, link=fit.link, number=number, of=count, triangles=triangles, time=seconds, **reach
+    )
 
 
 def fit_on_all_cores(wanted: Sequence[WantedFit]) -> Iterator[tuple[LinkFit, float]]:
@@ -123,15 +130,15 @@ def fit_link(link: str, mesh: TriangleMesh, within: float, most: int) -> LinkFit
     return LinkFit(link, mesh, shapes, within, excess_of(shapes, surface, within))
 
 
-def beyond_bound(fit: LinkFit, most: int) -> str:
+def beyond_bound(fit: LinkFit, most: int) -> Reason:
     """That the bound was not met with so many shapes at most, by how much, where, and what would do."""
-    excess = fit.excess
-    wider = f"--within {math.ceil(1000.0 * excess.p95)}mm"
-    remedy = f"--most {2 * most} or {wider}" if len(fit.shapes) >= most else wider
-    place = ", ".join(f"{1000.0 * value:.0f}" for value in excess.place)
-    return (
-        f'link "{fit.link}": {100.0 * excess.share:.0f} % of the surface of its {len(fit.shapes)} shapes is within '
-        f"{1000.0 * fit.within:.3g} mm of its mesh, not {100.0 * SHARE:.0f} %: that much is within "
-        f"{1000.0 * excess.p95:.1f} mm, and ({place}) mm stands {1000.0 * excess.worst:.1f} mm beyond it: give "
-        f"`gemelo collision fit` {remedy}"
-    )
+    excess, within = fit.excess, math.ceil(1000.0 * fit.excess.p95)
+    would_do = remedy("fit_looser", within=within)
+    if len(fit.shapes) >= most:
+        would_do = remedy("fit_more_shapes", most=2 * most, within=within)
+    return because(
+        "fit.beyond", would_do,
+        link=fit.link, shapes=len(fit.shapes), share=100.0 * excess.share, limit=100.0 * SHARE,
+        within=1000.0 * fit.within, p95=1000.0 * excess.p95, worst=1000.0 * excess.worst,
+        place=", ".join(f"{1000.0 * value:.0f}" for value in excess.place),
+    )  # fmt: skip

@@ -20,6 +20,7 @@ from gemelo.libraries.arm.kinematics.link_distances import LinkDistances
 from gemelo.libraries.arm.kinematics.self_collisions import LinkPair
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.arm.model.urdf import JointKind
+from gemelo.schemas.reasons import Reason, because
 
 Array = NDArray[np.float64]
 
@@ -55,17 +56,17 @@ class LinkPairData:
     is_doubtful: bool = False  # always near, and yet it comes to touch: a person may excuse it
 
 
-def _tell_nobody(_: str) -> None:
+def _tell_nobody(_: Reason) -> None:
     pass
 
 
 def collision_matrix(
     arm: ArmDescription,
     samples: int = SAMPLES,
-    tell: Callable[[str], None] = _tell_nobody,
+    tell: Callable[[Reason], None] = _tell_nobody,
     always_within: float | None = None,
 ) -> list[LinkPairData]:
-    """Every pair of links that have collision shapes; the same arm gives the same matrix. `tell` hears of progress.
+    """Every pair of links that have collision shapes; the same arm gives the same matrix. `tell` gets the progress.
 
     Links that can touch and are never farther apart than `always_within` [m], else the clearance, are always near:
     unless what they look like is apart in some samples and touches in the deepest ones, which is doubtful.
@@ -75,14 +76,15 @@ def collision_matrix(
     random = np.random.default_rng(SEED)
     configurations = _configurations(arm, samples, random)
     links = LinkDistances(arm, kinematics.model, kinematics.configuration, configurations)
-    tell(f"{len(configurations)} configurations sampled after {time.monotonic() - began:.1f} s")
+    tell(because("fit.pairs.sampled", count=len(configurations), time=time.monotonic() - began))
     drawn = DrawnLinks(arm, kinematics.model, kinematics.configuration)
     within = arm.clearance if always_within is None else always_within
     found, said = [], time.monotonic()
     for number in range(len(links.pairs)):
         found.append(_pair_data(arm, links, number, configurations, random, within, drawn))
         if time.monotonic() - said > SAYING:
-            tell(f"{number + 1} of {len(links.pairs)} pairs of links after {time.monotonic() - began:.1f} s")
+            seconds = time.monotonic() - began
+            tell(because("fit.pairs.seen", number=number + 1, count=len(links.pairs), time=seconds))
             said = time.monotonic()
     return found
 

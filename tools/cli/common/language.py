@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from gemelo.schemas.locale_language import ENGLISH
+from gemelo.schemas.plain_text import ENGLISH
 
 if TYPE_CHECKING:
     from gemelo.schemas.reasons import Reason

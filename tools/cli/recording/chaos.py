@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NoReturn
 
-from gemelo.schemas.locale_language import ENGLISH, known
+from gemelo.schemas.plain_text import ENGLISH, known
 from gemelo.schemas.reasons import because
 from gemelo.tools.cli.common.errors import CommandError, ExitCode
 from gemelo.tools.cli.common.language import language

@@ -173,8 +173,8 @@ def print_matrix(folder: Path, write: bool, always_within: float | None) -> Exit
     return ExitCode.OK
 
 
-def _say(progress: str) -> None:
-    print(progress, file=sys.stderr, flush=True)
+def _say(progress: Reason) -> None:
+    print(sentence(progress), file=sys.stderr, flush=True)
 
 
 def plan_of(text: str, verdicts: list[LinkPairData]) -> tuple[dict[tuple[str, str], str], list[str]]:
