@@ -9,6 +9,8 @@ from collections.abc import Mapping
 import gemelo
 from gemelo.schemas.reasons import because
 
+from .readings import Readings
+
 PAUSE = 0.5  # [s] without a target, after which the next one is the first: the gateway's stream has ended by then
 WARN_EVERY = 1.0  # [s] between two warnings about targets that were not sent
 
@@ -21,6 +23,7 @@ class Follower:
     def __init__(
         self,
         arm: gemelo.Arm,
+        readings: Readings,
         *,
         most: Mapping[str, float],
         far: Mapping[str, float],
@@ -28,7 +31,8 @@ class Follower:
         guard: bool,
     ) -> None:
         """`most`: how far a target may be from its joint, `far`: from where on a first one is planned, [rad] or [m]."""
-        self._arm, self._plan_first, self._guard = arm, plan_first, guard
+        self._arm, self._readings = arm, readings
+        self._plan_first, self._guard = plan_first, guard
         self._joints = {joint.name: joint for joint in arm.description.joints}
         self._most, self._far = most, far
         self._sent: dict[str, float] = {}  # the last target, [rad] or [m] by joint
@@ -49,10 +53,10 @@ class Follower:
 
     def follow(self, wanted: dict[str, float]) -> dict[str, float]:
         """Sends what may be sent of `wanted` [rad] or [m] by joint, and returns it; raises what gemelo raises."""
-        at = self._arm.joints
+        at = self._readings.joints
         if self._now() - self._sent_at > PAUSE:
             self._go_near(at, wanted)
-            at = self._arm.joints
+            at = self._arm.joints  # after the move
         target = self._free({name: self._bounded(name, value, at[name]) for name, value in wanted.items()}, at)
         self._arm.stream(target)
         self._note(target)

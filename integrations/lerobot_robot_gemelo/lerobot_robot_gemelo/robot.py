@@ -18,6 +18,7 @@ from .cell_cameras import CellCamera, described
 from .config_gemelo import GemeloConfig
 from .following import PAUSE, Follower, log
 from .gripper import GripperThread
+from .readings import Readings
 
 AT_REST = 1e-3  # [rad/s] or [m/s]
 TO_REST = 3.0  # [s] that the arm may take after a stop
@@ -51,6 +52,7 @@ class Gemelo(Robot):  # type: ignore[misc]  # LeRobot has no types for who does 
         self._own_cameras = make_cameras_from_configs(config.cameras)
         self.cameras = {**{each.name: each for each in self._cell_cameras}, **self._own_cameras}
         self._arm: gemelo.Arm | None = None
+        self._readings: Readings | None = None
         self._hold: gemelo.Hold | None = None
         self._follower: Follower | None = None
         self._gripper: GripperThread | None = None
@@ -89,10 +91,11 @@ class Gemelo(Robot):  # type: ignore[misc]  # LeRobot has no types for who does 
         self._arm = gemelo.connect(self.config.arm, timeout=self.config.timeout)
         try:
             self._require_same_arm(self._arm)
+            self._readings = Readings(self._arm)
             if self._values.gripper is not None and not self._arm.gripper.known:
                 raise _refused(because("lerobot.gripper"))
             if not self.config.external_commands:
-                self._prepare(self._arm, calibrate)
+                self._prepare(self._arm, self._readings, calibrate)
             for cell_camera in self._cell_cameras:
                 cell_camera.connect_to(self._arm, self.config.timeout)
             for own_camera in self._own_cameras.values():
@@ -110,10 +113,12 @@ class Gemelo(Robot):  # type: ignore[misc]  # LeRobot has no types for who does 
 
     def get_observation(self) -> dict[str, Any]:
         """Where the joints and the gripper are, and each camera's newest image (height, width, 3)."""
-        arm = self._connected()
-        found: dict[str, Any] = dict(self._values.positions(arm.joints))
+        self._connected()
+        readings = self._readings
+        assert readings is not None  # since the connection
+        found: dict[str, Any] = dict(self._values.positions(readings.joints))
         if self._values.gripper is not None:
-            found |= self._values.opening(arm.gripper.position)
+            found |= self._values.opening(readings.opening)
         return found | {name: camera.read_latest() for name, camera in self.cameras.items()}
 
     def send_action(self, action: dict[str, Any]) -> dict[str, Any]:
@@ -161,9 +166,11 @@ class Gemelo(Robot):  # type: ignore[misc]  # LeRobot has no types for who does 
         if arm.joint_names != self._description.joint_names:
             raise gemelo.Error(because("lerobot.other_arm", running=arm.name, robot=self._description.name))
 
-    def _prepare(self, arm: gemelo.Arm, needs_reference: bool) -> None:
+    def _prepare(self, arm: gemelo.Arm, readings: Readings, needs_reference: bool) -> None:
         config = self.config
-        self._follower = Follower(arm, most=self._most, far=self._far, plan_first=config.plan_first, guard=config.guard)
+        self._follower = Follower(
+            arm, readings, most=self._most, far=self._far, plan_first=config.plan_first, guard=config.guard
+        )
         require_ready(arm, needs_reference)
         if config.take_control:
             self._hold = arm.take_control("lerobot")

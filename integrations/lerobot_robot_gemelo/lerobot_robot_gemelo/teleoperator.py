@@ -14,6 +14,7 @@ from gemelo.schemas.reasons import because
 
 from .cell_cameras import described
 from .config_gemelo import GemeloTeleopConfig
+from .readings import Readings
 
 NEW = 0.2  # [s] for which a streamed target is what is wanted; after it, what the path asks for
 
@@ -62,6 +63,7 @@ class GemeloTeleop(Teleoperator):  # type: ignore[misc]  # LeRobot has no types 
         if self._arm is not None:
             raise ConnectionError(str(because("lerobot.connected", name=str(self))))
         self._arm = gemelo.connect(self.config.arm, timeout=self.config.timeout)
+        self._readings = Readings(self._arm)
         self._arm.node.subscribe(gemelo.topics.JOINT_TARGETS, self._on_targets)
         self._commands = self._arm.node.latest(gemelo.topics.JOINT_COMMANDS)
 
@@ -75,14 +77,14 @@ class GemeloTeleop(Teleoperator):  # type: ignore[misc]  # LeRobot has no types 
         """What each joint is to do now, and the gripper's target."""
         if self._arm is None:
             raise ConnectionError(str(because("lerobot.not_connected", name=str(self))))
-        wanted = self._arm.joints
+        wanted = self._readings.joints
         if (path := self._commands.message) is not None and not self._commands.is_stale:
             wanted |= dict(zip(path.name, path.position, strict=True))
         now = self._arm.node.monotonic()
         wanted |= {name: self._streamed[name] for name, at in self._streamed_at.items() if now - at < NEW}
         found = self._values.positions(wanted)
         if self._values.gripper is not None:
-            found |= self._values.opening(self._arm.gripper.target)
+            found |= self._values.opening(self._readings.opening_wanted)
         return found
 
     def send_feedback(self, feedback: dict[str, Any]) -> None:
