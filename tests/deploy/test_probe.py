@@ -37,6 +37,71 @@ def test_a_node_is_ready_while_its_file_is_young(tmp_path, age, code):
     assert probe("planner", GEMELO_PATHS_RUN=str(tmp_path)).returncode == code
 
 
+def uptime() -> int:
+    with open("/proc/uptime") as file:
+        return int(float(file.read().split()[0]))
+
+
+@pytest.mark.parametrize(
+    ("file_age", "look_age", "said", "code"),
+    [
+        (1.0, 1.5, 1, 0),
+        (2.9, 3.5, 3, 0),  # by its own age
+        (4.0, 3.5, 3, 1),
+        (4.0, 4.5, 4, 1),
+        (4.0, 3600.0, 3600, 1),
+        (4.0, 4.5, -50, 1),  # of another boot
+        (4.0, 4.5, None, 1),
+        (0.5, 4.5, None, 0),
+    ],
+)
+def test_an_earlier_look_never_makes_an_old_file_young(tmp_path, file_age, look_age, said, code):
+    """The look was `look_age` [s] ago by its file, and `said` [s] ago by what is in it."""
+    for name, age, content in (
+        ("ready", file_age, "1"),
+        ("probed", look_age, "nonsense" if said is None else f"{uptime() - said}"),
+    ):
+        file = tmp_path / f"planner.{name}"
+        file.write_text(f"{content}\n")
+        os.utime(file, (time.time() - age,) * 2)
+    assert probe("planner", GEMELO_PATHS_RUN=str(tmp_path)).returncode == code
+
+
+def test_a_second_look_at_a_file_that_was_touched_since_starts_no_other_program(tmp_path):
+    file, programs = tmp_path / "planner.ready", tmp_path / "programs"
+    programs.mkdir()
+    file.write_text("1")
+    assert probe("planner", GEMELO_PATHS_RUN=str(tmp_path)).returncode == 0
+    os.utime(file, (time.time() + 0.01,) * 2)
+    without = subprocess.run(
+        ["/bin/sh", "deploy/probe", "planner"], cwd=ROOT, env={"PATH": str(programs), "GEMELO_PATHS_RUN": str(tmp_path)}
+    )
+    assert without.returncode == 0
+    file.unlink()
+    assert probe("planner", GEMELO_PATHS_RUN=str(tmp_path)).returncode == 1
+
+
+def test_a_folder_that_takes_no_file_changes_no_answer(tmp_path):
+    file = tmp_path / "planner.ready"
+    file.write_text("1")
+    (tmp_path / "planner.probed").mkdir()
+    for _ in range(2):
+        answer = probe("planner", GEMELO_PATHS_RUN=str(tmp_path))
+        assert (answer.returncode, answer.stderr) == (0, "")
+
+
+def test_without_a_node_it_prints_the_folder(tmp_path):
+    config = tmp_path / "bench.toml"
+    config.write_text('[paths]\nrun = "elsewhere"\n')
+    folder = subprocess.run(
+        ["deploy/probe"], cwd=ROOT, env={"PATH": os.environ["PATH"], "GEMELO_CONFIG": str(config)},
+        capture_output=True, text=True, check=True,
+    ).stdout.strip()  # fmt: skip
+    assert folder == "elsewhere"
+    (tmp_path / "planner.ready").write_text("1")
+    assert probe("planner", PROBE_RUN=str(tmp_path)).returncode == 0
+
+
 def test_a_node_without_a_file_is_not_ready(tmp_path):
     answer = probe("planner", GEMELO_PATHS_RUN=str(tmp_path))
     assert answer.returncode == 1

@@ -21,6 +21,7 @@ IDLE_GOAL = FigureGoal(median=12.0)  # [% of one core]
 MOVING_GOAL = FigureGoal(median=30.0)  # [% of one core]
 MEMORY_GOAL = FigureGoal(median=400.0)  # [MB]
 SETTLE, WINDOW, WINDOWS = 15.0, 4.0, 5  # [s], [s]; chosen: the input log waits 10 s for a recorder
+SERVER, PROBES = "process-compose", "readiness probes"  # the second are children of the first that have ended
 WHERE = "a viewer, no browser"
 
 
@@ -89,7 +90,7 @@ def _cpu(stack: Stack, goal: FigureGoal) -> Figure:
         time.sleep(WINDOW)
         marks.append(_used(found))
     samples = [_share(one, other, sum(one[1].values()), sum(other[1].values())) for one, other in pairwise(marks)]
-    shares = {name: _share(marks[0], marks[-1], marks[0][1][name], marks[-1][1][name]) for name in found}
+    shares = {name: _share(marks[0], marks[-1], marks[0][1][name], marks[-1][1][name]) for name in marks[0][1]}
     note = f"{len(found)} processes, {WHERE}, {WINDOWS} windows of {WINDOW:g} s: {_by_size(shares)}"
     return of_samples(samples, goal, note=note)
 
@@ -98,7 +99,10 @@ Mark = tuple[float, dict[str, float]]  # [s] monotonic, and [s] of CPU by proces
 
 
 def _used(found: dict[str, list[psutil.Process]]) -> Mark:
-    return time.monotonic(), {name: cpu_seconds(family) for name, family in found.items()}
+    used = {name: cpu_seconds(family) for name, family in found.items()}
+    (server,) = found[SERVER]
+    times = server.cpu_times()
+    return time.monotonic(), {**used, PROBES: times.children_user + times.children_system}
 
 
 def _share(one: Mark, other: Mark, before: float, after: float) -> float:
@@ -109,7 +113,7 @@ def _share(one: Mark, other: Mark, before: float, after: float) -> float:
 def _families(stack: Stack) -> dict[str, list[psutil.Process]]:
     """By name, process-compose too."""
     assert stack.server is not None
-    return {**families(stack), "process-compose": [psutil.Process(stack.server.pid)]}
+    return {**families(stack), SERVER: [psutil.Process(stack.server.pid)]}
 
 
 def _pss(process: psutil.Process) -> float:
