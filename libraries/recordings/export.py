@@ -26,6 +26,13 @@ def export(file: Path, form: str, patterns: Sequence[str], output: Path | None) 
     reader = RecordingReader(file)
     reader.require_own()
     topics = chosen(topics_in(reader), patterns)
+    if form == ROS2:
+        from gemelo.libraries.recordings.ros2_bag import EXPORTED, write_ros2  # slow to load, of the extra `ros`
+
+        if not topics & EXPORTED.keys():
+            raise NothingToExport(because("recording.no_ros2", names=tuple(EXPORTED)))
+        yield from write_ros2(reader, topics, output or file.with_suffix(""))
+        return
     series = series_of(reader, topics)
     yield from FORMS[form](reader, series, output or file.with_suffix(SUFFIXES.get(form, "")))
 
@@ -95,4 +102,5 @@ FORMS: dict[str, Callable[[RecordingReader, dict[str, Series], Path], Iterator[W
     "parquet": _parquet,
     "rerun": _rerun,
 }
+ROS2 = "ros2"  # a bag of ROS 2
 SUFFIXES = {"rerun": ".rrd"}

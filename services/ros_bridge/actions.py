@@ -11,15 +11,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from gemelo.libraries.ros2.messages import nanoseconds, time_of
+from gemelo.libraries.ros2.types import BadRosMessage, decode, encode, make, ros_type
 from gemelo.libraries.runtime.actions.goal_handle import GoalHandle
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.ros_wire.names import DEFAULT, LATCHED, Qos, RosType
 from gemelo.libraries.runtime.ros_wire.ros_node import RosPublication, RosQuery
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.reasons import Reason
-from gemelo.services.ros_bridge.core import nanoseconds, time_of
-from gemelo.services.ros_bridge.goals import status_in_ros, uuid_of
-from gemelo.services.ros_bridge.types import BadRosMessage, decode, encode, make, ros_type
+from gemelo.services.ros_bridge.core import status_in_ros, uuid_of
 
 KEPT = 60.0  # [s] for which a result can be asked for; chosen: rcl keeps it 10 s to 15 min
 MOST_DECISIONS = 256  # that are remembered; chosen: more goals than a client sends again

@@ -1,157 +1,192 @@
-"""The arm in messages of ROS 2: joint states, frames, description, diagnostics and the log."""
+"""Goals of ROS 2 and ours: trajectories in, feedback and results out."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from msgspec.structs import replace
 
-from gemelo.schemas.device import DeviceState, DeviceStatus
-from gemelo.schemas.frames import FrameTransform, FrameTransforms, RobotDescription
-from gemelo.schemas.joints import JointState, StepErrors
+from gemelo.libraries.ros2.messages import SECOND, duration_of, header_of, nanoseconds
+from gemelo.libraries.ros2.types import FOLLOW, GRIPPER, ControlMsgs, make
+from gemelo.schemas.actions import GoalStatusCode
+from gemelo.schemas.errors import ReasonedError
+from gemelo.schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
+from gemelo.schemas.joints import JointState
 from gemelo.schemas.message import Vector
-from gemelo.schemas.reasons import Reason, because
-from gemelo.schemas.system import LogLevel, LogRecord
-from gemelo.services.ros_bridge.types import make
+from gemelo.schemas.motion import (
+    FollowErrorCode,
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
+    JointTolerance,
+    JointTrajectory,
+    TrajectoryPoint,
+)
+from gemelo.schemas.reasons import because, remedy
 
-SECOND = 1_000_000_000  # [ns]
-OK, WARN, ERROR, STALE = 0, 1, 2, 3  # the levels of diagnostic_msgs/DiagnosticStatus
-MESH = re.compile(r'(<mesh\b[^>]*\bfilename\s*=\s*")([^"]*)(")')
-
-
-def time_of(stamp: int) -> Any:
-    """builtin_interfaces/Time of `stamp` [ns]."""
-    return make("builtin_interfaces/msg/Time", sec=stamp // SECOND, nanosec=stamp % SECOND)
-
-
-def duration_of(seconds: float) -> Any:
-    """builtin_interfaces/Duration of [s]."""
-    whole = round(seconds * SECOND)
-    return make("builtin_interfaces/msg/Duration", sec=whole // SECOND, nanosec=whole % SECOND)
+POINT = "trajectory_msgs/msg/JointTrajectoryPoint"
 
 
-def nanoseconds(time: Any) -> int:
-    """[ns] of a builtin_interfaces Time or Duration."""
-    return int(time.sec) * SECOND + int(time.nanosec)
+class GoalNotTaken(ReasonedError):
+    """A goal of ROS that none of ours can be made of; the reason says what of it."""
 
 
-def header_of(stamp: int, frame: str = "") -> Any:
-    """std_msgs/Header of `stamp` [ns]."""
-    return make("std_msgs/msg/Header", stamp=time_of(stamp), frame_id=frame)
+def follow_goal(goal: Any, to_gateway: Callable[[int], int | None]) -> FollowJointTrajectoryGoal:
+    """Ours, of a control_msgs/FollowJointTrajectory goal; the joints may stand in any order.
+
+    `to_gateway(stamp)` is the same moment [ns] by the gateway's clock, None while that is not known. Raises
+    `GoalNotTaken`: for joints with several degrees of freedom, for efforts and for numbers that are not finite.
+    """
+    if goal.multi_dof_trajectory.points or goal.component_path_tolerance or goal.component_goal_tolerance:
+        raise GoalNotTaken(because("ros.goal.multi_dof", remedy("ros_joint_trajectory")))
+    stamp = nanoseconds(goal.trajectory.header.stamp)
+    start = to_gateway(stamp) if stamp else 0
+    if start is None:
+        raise GoalNotTaken(because("ros.goal.clock", remedy("ros_stamp")))
+    try:
+        return FollowJointTrajectoryGoal(
+            trajectory=JointTrajectory(
+                stamp=start,
+                joint_names=tuple(goal.trajectory.joint_names),
+                points=tuple(_point(each) for each in goal.trajectory.points),
+            ),
+            path_tolerance=tuple(map(_tolerance, goal.path_tolerance)),
+            goal_tolerance=tuple(map(_tolerance, goal.goal_tolerance)),
+            goal_time_tolerance=nanoseconds(goal.goal_time_tolerance) / SECOND,
+        )
+    except ValueError as error:
+        raise GoalNotTaken(because("ros.goal.not_finite", error=str(error))) from error
 
 
-def joint_state(state: JointState) -> Any:
-    """sensor_msgs/JointState: the stamp is that of the measurement, and effort is empty, as nothing measures it."""
-    return make(
-        "sensor_msgs/msg/JointState",
-        header=header_of(state.stamp),
-        name=list(state.name),
-        position=_floats(state.position),
-        velocity=_floats(state.velocity),
-        effort=_floats(state.effort),
+def _point(point: Any) -> TrajectoryPoint:
+    if len(point.effort):
+        raise GoalNotTaken(because("ros.goal.effort", remedy("ros_joint_trajectory")))
+    return TrajectoryPoint(
+        positions=tuple(point.positions.tolist()),
+        velocities=tuple(point.velocities.tolist()),
+        accelerations=tuple(point.accelerations.tolist()),
+        time_from_start=nanoseconds(point.time_from_start) / SECOND,
     )
 
 
-def frames(message: FrameTransforms, prefix: str = "") -> Any:
-    """tf2_msgs/TFMessage; `prefix` stands before the name of each frame."""
-    transforms = [_transform(each, prefix) for each in message.transforms]
-    return make("tf2_msgs/msg/TFMessage", transforms=transforms)
-
-
-def _transform(frame: FrameTransform, prefix: str) -> Any:
-    translation, rotation = frame.transform.translation, frame.transform.rotation
-    return make(
-        "geometry_msgs/msg/TransformStamped",
-        header=header_of(frame.stamp, prefix + frame.parent),
-        child_frame_id=prefix + frame.child,
-        transform=make(
-            "geometry_msgs/msg/Transform",
-            translation=make("geometry_msgs/msg/Vector3", **dict(zip("xyz", translation, strict=True))),
-            rotation=make("geometry_msgs/msg/Quaternion", **dict(zip("xyzw", rotation, strict=True))),
-        ),
+def _tolerance(tolerance: Any) -> JointTolerance:
+    return JointTolerance(
+        name=tolerance.name,
+        position=tolerance.position,
+        velocity=tolerance.velocity,
+        acceleration=tolerance.acceleration,
     )
 
 
-def string(text: str) -> Any:
-    """std_msgs/String."""
-    return make("std_msgs/msg/String", data=text)
-
-
-def urdf_with_meshes(description: RobotDescription, base: str) -> str:
-    """The URDF with `base` before the address of each mesh that has none of its own: RViz resolves no relative one."""
-
-    def absolute(found: re.Match[str]) -> str:
-        address = found[2] if "://" in found[2] or not base else f"{base.rstrip('/')}/{found[2]}"
-        return f"{found[1]}{address}{found[3]}"
-
-    return MESH.sub(absolute, description.urdf)
-
-
-def diagnostics(
-    now: int, robot: str, status: DeviceStatus | None, state: DeviceState | None, errors: StepErrors | None,
-    refusal: Reason | None,
-) -> Any:  # fmt: skip
-    """diagnostic_msgs/DiagnosticArray at `now` [ns]: device, steps, and the last goal of ROS if it was refused."""
-    return make(
-        "diagnostic_msgs/msg/DiagnosticArray",
-        header=header_of(now),
-        status=[_device(robot, status, state), _steps(robot, errors), _goals(robot, refusal)],
+def completed(goal: FollowJointTrajectoryGoal, state: JointState | None) -> FollowJointTrajectoryGoal:
+    """The goal for all joints of `state`: those that it does not name stay where they are."""
+    trajectory = goal.trajectory
+    named = set(trajectory.joint_names)
+    rows = zip(state.name, state.position, strict=True) if state is not None else ()
+    others = [(name, position) for name, position in rows if name not in named]
+    if not others:
+        return goal
+    names, positions = zip(*others, strict=True)
+    rest = (0.0,) * len(names)
+    points = tuple(
+        TrajectoryPoint(
+            positions=each.positions + positions,
+            velocities=each.velocities + rest if each.velocities else (),
+            accelerations=each.accelerations + rest if each.accelerations else (),
+            time_from_start=each.time_from_start,
+        )
+        for each in trajectory.points
     )
+    return replace(goal, trajectory=replace(trajectory, joint_names=trajectory.joint_names + names, points=points))
 
 
-def _device(robot: str, status: DeviceStatus | None, state: DeviceState | None) -> Any:
-    if status is None:
-        return _status(f"{robot}: device", "", STALE, _silent(), ())
-    level = ERROR if not status.online else WARN if status.warning or (state and state.fault) else OK
-    mode = state.mode.name if state is not None else "offline"
-    values = [("firmware", status.firmware), ("virtual", str(status.virtual)), ("mode", mode)]
-    if state is not None:
-        values += [("armed", str(state.armed)), ("fault", str(state.fault)), ("underruns", str(state.underruns))]
-    return _status(f"{robot}: device", status.device, level, status.reason or status.warning or mode, values)
-
-
-def _steps(robot: str, errors: StepErrors | None) -> Any:
-    if errors is None:
-        return _status(f"{robot}: steps", "", STALE, _silent(), ())
-    values = [(name, f"{error:.3f}") for name, error in zip(errors.name, errors.error, strict=True)]
-    return _status(f"{robot}: steps", "", OK, str(because("ros.diagnostics.steps")), values)
-
-
-def _goals(robot: str, refusal: Reason | None) -> Any:
-    text = str(refusal) if refusal is not None else ""
-    return _status(f"{robot}: goals", "", WARN if text else OK, text, ())
-
-
-def _silent() -> str:
-    return str(because("ros.diagnostics.silent"))
-
-
-def _status(name: str, hardware: str, level: int, message: str, values: Iterable[tuple[str, str]]) -> Any:
-    return make(
-        "diagnostic_msgs/msg/DiagnosticStatus",
-        level=level,
-        name=name,
-        message=message,
-        hardware_id=hardware,
-        values=[make("diagnostic_msgs/msg/KeyValue", key=key, value=value) for key, value in values],
-    )
-
-
-def log_record(record: LogRecord) -> Any:
-    """rcl_interfaces/Log, whose levels are ours."""
-    return log(record.stamp, record.level, record.node, record.text)
-
-
-def log(stamp: int, level: LogLevel, node: str, text: str) -> Any:
-    """rcl_interfaces/Log at `stamp` [ns]."""
-    return make(
-        "rcl_interfaces/msg/Log",
-        stamp=time_of(stamp), level=int(level), name=node, msg=text, file="", function="", line=0,
+def follow_feedback(goal_id: bytes, feedback: FollowJointTrajectoryFeedback, generation: ControlMsgs) -> Any:
+    """The message of feedback of one goal, in the form of one generation of control_msgs."""
+    index = {"index": feedback.index, "multi_dof_index": 0} if generation is ControlMsgs.NEWER else {}
+    none = make(
+        "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", generation,
+        transforms=[], velocities=[], accelerations=[], time_from_start=duration_of(0.0),
     )  # fmt: skip
+    progress = make(
+        f"{FOLLOW}_Feedback",
+        generation,
+        header=header_of(feedback.stamp),
+        joint_names=list(feedback.joint_names),
+        desired=point_of(feedback.desired),
+        actual=point_of(feedback.actual),
+        error=point_of(feedback.error),
+        multi_dof_joint_names=[],
+        multi_dof_desired=none,
+        multi_dof_actual=none,
+        multi_dof_error=none,
+        **index,
+    )
+    return make(f"{FOLLOW}_FeedbackMessage", generation, goal_id=uuid_of(goal_id), feedback=progress)
 
 
-def _floats(values: Vector) -> NDArray[np.float64]:
+def point_of(point: TrajectoryPoint) -> Any:
+    """trajectory_msgs/JointTrajectoryPoint."""
+    return make(
+        POINT,
+        positions=_floats(point.positions),
+        velocities=_floats(point.velocities),
+        accelerations=_floats(point.accelerations),
+        effort=_floats(()),
+        time_from_start=duration_of(point.time_from_start),
+    )
+
+
+def uuid_of(goal_id: bytes) -> Any:
+    """unique_identifier_msgs/UUID of 16 bytes."""
+    return make("unique_identifier_msgs/msg/UUID", uuid=np.frombuffer(goal_id, dtype=np.uint8))
+
+
+def follow_result(result: FollowJointTrajectoryResult) -> Any:
+    """The result; our codes below -10 pass, with the sentence that says what they mean."""
+    text = str(result.why) if result.why is not None else result.error_string
+    return make(f"{FOLLOW}_Result", error_code=int(result.error_code), error_string=text)
+
+
+def lost_result(text: str) -> Any:
+    """Of a goal whose server fell silent; `text` says so."""
+    return make(f"{FOLLOW}_Result", error_code=int(FollowErrorCode.DEVICE_FAILED), error_string=text)
+
+
+def no_result() -> Any:
+    """Of a goal that is not known."""
+    return make(f"{FOLLOW}_Result", error_code=0, error_string="")
+
+
+def gripper_goal(goal: Any) -> GripperCommandGoal:
+    """Ours, of a control_msgs/GripperCommand goal [m, N]; raises `GoalNotTaken`."""
+    try:
+        return GripperCommandGoal(position=goal.command.position, max_effort=goal.command.max_effort)
+    except ValueError as error:
+        raise GoalNotTaken(because("ros.goal.not_finite", error=str(error))) from error
+
+
+def gripper_feedback(goal_id: bytes, feedback: GripperCommandFeedback) -> Any:
+    """The message of feedback of one goal."""
+    return make(
+        f"{GRIPPER}_FeedbackMessage", goal_id=uuid_of(goal_id), feedback=_gripped(f"{GRIPPER}_Feedback", feedback)
+    )
+
+
+def gripper_result(result: GripperCommandResult | None) -> Any:
+    """The result; of a goal that is not known or was lost, nothing reached."""
+    return _gripped(f"{GRIPPER}_Result", result or GripperCommandResult())
+
+
+def _gripped(kind: str, at: GripperCommandFeedback | GripperCommandResult) -> Any:
+    return make(kind, position=at.position, effort=at.effort, stalled=at.stalled, reached_goal=at.reached_goal)
+
+
+def status_in_ros(status: GoalStatusCode) -> int:
+    """The number of action_msgs/GoalStatus, which has none for a goal that another one replaced: aborted."""
+    return int(GoalStatusCode.ABORTED if status is GoalStatusCode.PREEMPTED else status)
+
+
+def _floats(values: Vector) -> Any:
     return np.array(values, dtype=np.float64)

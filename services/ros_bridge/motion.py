@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from gemelo.libraries.ros2.types import FOLLOW, GRIPPER, ControlMsgs, encode, ros_type
 from gemelo.libraries.runtime.actions.client import ActionClient
 from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
 from gemelo.libraries.runtime.node import Node
@@ -21,11 +22,10 @@ from gemelo.schemas.motion import (
 )
 from gemelo.schemas.reasons import Reason
 from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GATEWAY, GRIPPER_COMMAND
-from gemelo.services.ros_bridge import goals
+from gemelo.services.ros_bridge import core
 from gemelo.services.ros_bridge.actions import AnyHandle, Decided, OnRefusal, RosActionServer
 from gemelo.services.ros_bridge.control import ControlForGoals
 from gemelo.services.ros_bridge.scene_check import SceneCheck
-from gemelo.services.ros_bridge.types import FOLLOW, GRIPPER, ControlMsgs, encode, ros_type
 
 GRIPPER_ACTION = "gripper/gripper_cmd"
 TO_DECIDE = 2.0  # [s] that the gateway has for a goal
@@ -78,8 +78,8 @@ class FollowAction:
     def begin(self, uuid: bytes, goal: Any, decided: Decided) -> None:
         """Completed, checked, with control, and sent: whatever does not work is the reason of the refusal."""
         try:
-            ours = goals.completed(goals.follow_goal(goal, self._to_gateway), self._joints())
-        except goals.GoalNotTaken as error:
+            ours = core.completed(core.follow_goal(goal, self._to_gateway), self._joints())
+        except core.GoalNotTaken as error:
             decided(error.reason)
             return
 
@@ -97,7 +97,7 @@ class FollowAction:
 
     def _on_feedback(self, uuid: bytes, feedback: FollowJointTrajectoryFeedback) -> None:
         for generation, publication in self._feedback.items():
-            message = goals.follow_feedback(uuid, feedback, generation)
+            message = core.follow_feedback(uuid, feedback, generation)
             publication.put(encode(message, generation), feedback.stamp)
 
     def _to_gateway(self, stamp: int) -> int | None:
@@ -108,12 +108,12 @@ class FollowAction:
 
     def result(self, handle: AnyHandle) -> Any:
         if handle.outcome is None:
-            return goals.lost_result(str(handle.lost))
+            return core.lost_result(str(handle.lost))
         result: FollowJointTrajectoryResult = handle.outcome.result
-        return goals.follow_result(result)
+        return core.follow_result(result)
 
     def no_result(self) -> Any:
-        return goals.no_result()
+        return core.no_result()
 
     def ended(self) -> None:
         self._control.release()
@@ -133,8 +133,8 @@ class GripperAction:
     def begin(self, uuid: bytes, goal: Any, decided: Decided) -> None:
         """With control, and sent."""
         try:
-            ours = goals.gripper_goal(goal)
-        except goals.GoalNotTaken as error:
+            ours = core.gripper_goal(goal)
+        except core.GoalNotTaken as error:
             decided(error.reason)
         else:
             self._control.acquire(partial(self._send, uuid, ours, decided))
@@ -144,14 +144,14 @@ class GripperAction:
         decided(why or sent(self._client, goal, uuid, on_feedback, self._control))
 
     def _on_feedback(self, uuid: bytes, feedback: GripperCommandFeedback) -> None:
-        self._feedback.put(encode(goals.gripper_feedback(uuid, feedback)), feedback.stamp)
+        self._feedback.put(encode(core.gripper_feedback(uuid, feedback)), feedback.stamp)
 
     def result(self, handle: AnyHandle) -> Any:
         result: GripperCommandResult | None = handle.outcome.result if handle.outcome is not None else None
-        return goals.gripper_result(result)
+        return core.gripper_result(result)
 
     def no_result(self) -> Any:
-        return goals.gripper_result(None)
+        return core.gripper_result(None)
 
     def ended(self) -> None:
         self._control.release()

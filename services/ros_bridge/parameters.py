@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gemelo.libraries.ros2.types import BadRosMessage, decode, encode, make, ros_type
 from gemelo.libraries.runtime.endpoints import parameters_request
 from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
 from gemelo.libraries.runtime.node import Node
@@ -16,7 +17,6 @@ from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.system import Empty, ParameterValue
 from gemelo.schemas.topics import GATEWAY, PLANNER
 from gemelo.services.ros_bridge.triggers import Serving
-from gemelo.services.ros_bridge.types import BadRosMessage, decode, encode, make, ros_type
 
 Value = ParameterValue | tuple[str, ...]
 Answer = Callable[[Any], dict[str, Any]]  # of the decoded request; the fields of the response

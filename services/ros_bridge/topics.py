@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Protocol
 
+from gemelo.libraries.ros2 import messages
+from gemelo.libraries.ros2.types import encode, ros_type
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.ros_wire.names import DEFAULT, LATCHED, Qos, RosType
 from gemelo.libraries.runtime.ros_wire.names import FRAMES as FRAMES_QOS
@@ -24,8 +26,6 @@ from gemelo.schemas.topics import (
     STATIC_FRAMES,
     STEP_ERRORS,
 )
-from gemelo.services.ros_bridge import core
-from gemelo.services.ros_bridge.types import encode, ros_type
 
 LOG_QOS = Qos(100, is_latched=True)  # of /rosout; chosen: what a console shows, a tenth of what rcl keeps
 STRING, JOINTS, TRANSFORMS = "std_msgs/msg/String", "sensor_msgs/msg/JointState", "tf2_msgs/msg/TFMessage"
@@ -67,7 +67,7 @@ class Topics:
     def publish_diagnostics(self) -> None:
         """How device and steps are; call once a second."""
         now = self._node.now()
-        message = core.diagnostics(
+        message = messages.diagnostics(
             now, self._node.robot, self._status.message, self._state.message, self._errors.message, self.refusal
         )
         self._put(self._diagnostics, message, now)
@@ -75,24 +75,24 @@ class Topics:
     def _on_joint_state(self, state: JointState) -> None:
         self.joints = state
         if self._last_joints.is_due(state.stamp):
-            self._put(self._joint_states, core.joint_state(state), state.stamp)
+            self._put(self._joint_states, messages.joint_state(state), state.stamp)
 
     def _on_frames(self, frames: FrameTransforms) -> None:
         stamp = max((each.stamp for each in frames.transforms), default=0)
         if self._last_frames.is_due(stamp):
-            self._put(self._tf, core.frames(frames, self._prefix), stamp)
+            self._put(self._tf, messages.frames(frames, self._prefix), stamp)
 
     def _on_static_frames(self, frames: FrameTransforms) -> None:
-        self._put(self._tf_static, core.frames(frames, self._prefix), self._node.now())
+        self._put(self._tf_static, messages.frames(frames, self._prefix), self._node.now())
 
     def _on_description(self, description: RobotDescription) -> None:
-        urdf = core.urdf_with_meshes(description, self._meshes)
-        self._put(self._description, core.string(urdf), self._node.now())
-        self._put(self._semantic, core.string(description.srdf), self._node.now())
+        urdf = messages.urdf_with_meshes(description, self._meshes)
+        self._put(self._description, messages.string(urdf), self._node.now())
+        self._put(self._semantic, messages.string(description.srdf), self._node.now())
 
     def _on_log(self, record: LogRecord) -> None:
         if record.level >= RELEVANT:
-            self._put(self._rosout, core.log_record(record), record.stamp)
+            self._put(self._rosout, messages.log_record(record), record.stamp)
 
     def _put(self, publication: RosPublication, message: Any, stamp: int) -> None:
         publication.put(encode(message), stamp)
@@ -103,7 +103,7 @@ class Pace:
 
     def __init__(self, rate: float) -> None:
         """At most `rate` [Hz]; 0: all."""
-        self._period = int((1.0 / rate - SLACK) * core.SECOND) if rate else 0
+        self._period = int((1.0 / rate - SLACK) * messages.SECOND) if rate else 0
         self._last = 0
 
     def is_due(self, stamp: int) -> bool:

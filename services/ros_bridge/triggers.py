@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol, TypeVar
 
+from gemelo.libraries.ros2.types import encode, make, ros_type
 from gemelo.libraries.runtime.errors import NoAnswer, RequestRefused
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.ros_wire.names import RosType
@@ -21,7 +22,6 @@ from gemelo.schemas.device import (
 from gemelo.schemas.message import Message
 from gemelo.schemas.reasons import because, remedy
 from gemelo.schemas.topics import DEVICE_COMMAND, DEVICE_STOP, Request
-from gemelo.services.ros_bridge.types import encode, make, ros_type
 
 TRIGGER = "std_srvs/srv/Trigger"
 TO_ANSWER = 2.0  # [s] for the device

@@ -14,8 +14,8 @@ import zenoh
 import zenoh.ext as zx
 from zenoh.handlers import Callback
 
+from gemelo.libraries.ros2.types import decode, encode, make, ros_type
 from gemelo.libraries.runtime.ros_wire.names import Attachment, RosType, read_attachment
-from gemelo.services.ros_bridge.types import decode, encode, make, ros_type
 from tests.runtime.support import free_port, until
 
 EMPTY = {"structure_needs_at_least_one_member": 0}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from gemelo.libraries.ros2.messages import duration_of, header_of
+from gemelo.libraries.ros2.types import FOLLOW, make
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTolerance
-from gemelo.services.ros_bridge.core import duration_of, header_of
-from gemelo.services.ros_bridge.goals import point_of
-from gemelo.services.ros_bridge.types import FOLLOW, make
+from gemelo.services.ros_bridge.core import point_of
 
 
 def ros_goal(goal: FollowJointTrajectoryGoal) -> Any:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.libraries.ros2.types import FOLLOW, GRIPPER, ControlMsgs, make, ros_type
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.schemas.topics import DEVICE_SHAFT
-from gemelo.services.ros_bridge.goals import uuid_of
-from gemelo.services.ros_bridge.types import FOLLOW, GRIPPER, ControlMsgs, make, ros_type
+from gemelo.services.ros_bridge.core import uuid_of
 from tests.ros_bridge.ros_goals import ros_goal
 from tests.ros_bridge.twins import ACTION, RosTwin, client_token, ros_twin, uuid
 

@@ -11,6 +11,8 @@ import pytest
 from msgspec.structs import replace
 
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.libraries.ros2 import messages
+from gemelo.libraries.ros2.types import HASHES, ros_type
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.device import (
     DeviceCommandRequest,
@@ -34,9 +36,7 @@ from gemelo.schemas.topics import (
     JOINT_STATES,
     STATIC_FRAMES,
 )
-from gemelo.services.ros_bridge import core
 from gemelo.services.ros_bridge.main import require_usable
-from gemelo.services.ros_bridge.types import HASHES, ros_type
 from gemelo.services.state_publisher.main import describe
 from tests.ros_bridge.bridges import Bridge, running
 from tests.ros_bridge.ros_client import RosClient, comes
@@ -87,7 +87,7 @@ def test_a_joint_state_arrives_with_the_stamp_of_its_measurement_and_an_attachme
 
         assert any(put_and_hear() for _ in range(300))
     message = heard[0].message
-    assert core.nanoseconds(message.header.stamp) == STATE.stamp
+    assert messages.nanoseconds(message.header.stamp) == STATE.stamp
     assert (tuple(message.name), tuple(message.position)) == (STATE.name, STATE.position)
     first, second = heard[0].attachment, heard[1].attachment
     assert second.sequence == first.sequence + 1
@@ -129,10 +129,10 @@ def test_moving_frames_go_out_on_tf(bridge: Bridge) -> None:
 def test_diagnostics_say_how_the_device_is(bridge: Bridge) -> None:
     heard = bridge.client.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
     first = comes(heard)
-    assert first.status[0].level == core.STALE
+    assert first.status[0].level == messages.STALE
     with bridge.node("stepper_gateway") as gateway:
         gateway.publisher(DEVICE_STATUS).put(DeviceStatus(online=False, reason="no cable", device="esp"))
-        assert hear(gateway, lambda: heard[-1].message.status[0].level == core.ERROR)
+        assert hear(gateway, lambda: heard[-1].message.status[0].level == messages.ERROR)
     assert (heard[-1].message.status[0].message, heard[-1].message.status[0].hardware_id) == ("no cable", "esp")
 
 
@@ -202,7 +202,7 @@ def test_parameters_are_listed_got_and_described_and_none_is_set(bridge: Bridge)
     assert [(each.name, each.read_only) for each in described.descriptors] == [("robot", True)]
     types = client.call("/gemelo/get_parameter_types", f"{PARAMETERS}/GetParameterTypes", names=asked).types
     assert list(types) == [4, 1, 3, 9, 0]
-    wanted = core.make("rcl_interfaces/msg/Parameter", name="motion", value=values[1])
+    wanted = messages.make("rcl_interfaces/msg/Parameter", name="motion", value=values[1])
     result = client.call("/gemelo/set_parameters", f"{PARAMETERS}/SetParameters", parameters=[wanted]).results[0]
     assert not result.successful
     assert result.reason == str(because("ros.parameter.read_only", remedy("ros_set_parameter"), name="motion"))

@@ -11,20 +11,8 @@ from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer
 from rosbags.interfaces import Nodetype
 
-from gemelo.schemas.device import DeviceState, DeviceStatus
-from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
-from gemelo.schemas.joints import JointState
-from gemelo.schemas.motion import (
-    FollowJointTrajectoryFeedback,
-    FollowJointTrajectoryGoal,
-    JointTolerance,
-    JointTrajectory,
-    TrajectoryPoint,
-)
-from gemelo.schemas.system import LogLevel
-from gemelo.services.ros_bridge import core, goals
-from gemelo.services.ros_bridge.parameters import value_of
-from gemelo.services.ros_bridge.types import (
+from gemelo.libraries.ros2 import messages
+from gemelo.libraries.ros2.types import (
     ACTIONS,
     FOLLOW,
     GRIPPER,
@@ -38,6 +26,19 @@ from gemelo.services.ros_bridge.types import (
     ros_type,
     store,
 )
+from gemelo.schemas.device import DeviceState, DeviceStatus
+from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
+from gemelo.schemas.joints import JointState
+from gemelo.schemas.motion import (
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryGoal,
+    JointTolerance,
+    JointTrajectory,
+    TrajectoryPoint,
+)
+from gemelo.schemas.system import LogLevel
+from gemelo.services.ros_bridge import core
+from gemelo.services.ros_bridge.parameters import value_of
 from tests.ros_bridge.ros_goals import ros_goal
 
 # From rmw_zenoh_cpp's own documents, and as hiroz and zenoh-ros2-sdk compute them.
@@ -101,7 +102,7 @@ def test_an_empty_message_is_one_byte_behind_its_header():
 
 
 def test_a_joint_state_in_bytes():
-    state = core.joint_state(JointState(stamp=2_000_000_001, name=("a",), position=(1.0,)))
+    state = messages.joint_state(JointState(stamp=2_000_000_001, name=("a",), position=(1.0,)))
     assert encode(state).hex() == (
         "00010000" "02000000" "01000000" "01000000" "00" "000000" "01000000" "02000000" "6100" "0000" "01000000"
         "000000000000f03f" "00000000" "00000000"
@@ -117,14 +118,16 @@ GOAL = FollowJointTrajectoryGoal(
     goal_time_tolerance=2.5,
 )
 SAMPLES = {
-    "joint state": core.joint_state(JointState(stamp=3, name=("a", "bcd"), position=(1.0, -2.0), velocity=(0.0, 0.5))),
-    "frames": core.frames(FrameTransforms(transforms=(FRAME, FRAME)), "rm1/"),
-    "string": core.string("<robot/>"),
-    "log": core.log(9, LogLevel.WARNING, "planner", "late"),
-    "diagnostics": core.diagnostics(1, "rm1", DeviceStatus(online=True), DeviceState(), None, None),
-    "feedback": goals.follow_feedback(bytes(range(16)), PROGRESS, ControlMsgs.JAZZY).feedback,
+    "joint state": messages.joint_state(
+        JointState(stamp=3, name=("a", "bcd"), position=(1.0, -2.0), velocity=(0.0, 0.5))
+    ),
+    "frames": messages.frames(FrameTransforms(transforms=(FRAME, FRAME)), "rm1/"),
+    "string": messages.string("<robot/>"),
+    "log": messages.log(9, LogLevel.WARNING, "planner", "late"),
+    "diagnostics": messages.diagnostics(1, "rm1", DeviceStatus(online=True), DeviceState(), None, None),
+    "feedback": core.follow_feedback(bytes(range(16)), PROGRESS, ControlMsgs.JAZZY).feedback,
     "goal": ros_goal(GOAL),
-    "result": goals.lost_result("gone"),
+    "result": core.lost_result("gone"),
     "parameters": make(
         "rcl_interfaces/srv/GetParameters_Response", values=[value_of(each) for each in (True, 1, 2.5, "x", ("y", "z"))]
     ),

@@ -14,15 +14,15 @@ from msgspec.structs import replace
 from gemelo.api.arm import Arm
 from gemelo.api.session import Session
 from gemelo.libraries.arm.model.description import load_arm
+from gemelo.libraries.ros2.types import FOLLOW, make, ros_type
 from gemelo.libraries.runtime.deployment import load_deployment, project_root
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.process.shutdown import ShutdownRequest
 from gemelo.libraries.runtime.ros_wire.names import DEFAULT, EntityKind, NodeName, endpoint_token, gid_of
 from gemelo.schemas.deployment import RosSection
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
-from gemelo.services.ros_bridge.goals import uuid_of
+from gemelo.services.ros_bridge.core import uuid_of
 from gemelo.services.ros_bridge.main import node_name, run
-from gemelo.services.ros_bridge.types import FOLLOW, make, ros_type
 from gemelo.tools.simulation.twin import ServiceNode, Twin
 from gemelo.tools.simulation.virtual_clock import VirtualClock
 from tests.ros_bridge.ros_client import Asked, RosClient, ros_router

@@ -112,11 +112,7 @@ class RosNode:
         Raises `BusError` where no router takes the session.
         """
         self.name, self._post, self._clock = name, post, clock
-        try:
-            self._session = zenoh.open(_config(locator))
-        except zenoh.ZError as error:
-            why = because("ros.router.away", remedy("ros_router_start"), router=locator, error=str(error))
-            raise BusError(why) from error
+        self._session = opened(locator)
         self._id = str(self._session.info.zid())
         self._numbers = itertools.count(1)
         self._kept: list[Any] = [self._declared(node_token(name, self._id))]
@@ -180,6 +176,15 @@ class RosNode:
 
     def _declared(self, token: str) -> ZenohDeclaration:
         return ZenohDeclaration(self._session.liveliness().declare_token(token))
+
+
+def opened(locator: str) -> zenoh.Session:
+    """A client's session without a namespace; raises `BusError` where no router takes it."""
+    try:
+        return zenoh.open(_config(locator))
+    except zenoh.ZError as error:
+        why = because("ros.router.away", remedy("ros_router_start"), router=locator, error=str(error))
+        raise BusError(why) from error
 
 
 def _config(locator: str) -> zenoh.Config:

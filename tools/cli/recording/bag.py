@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 
 from gemelo.libraries.recordings.contents import Contents, WriterClock, contents_of
-from gemelo.libraries.recordings.export import FORMS, NothingToExport, export
+from gemelo.libraries.recordings.export import FORMS, ROS2, NothingToExport, export
 from gemelo.libraries.recordings.reader import BadRecording
 from gemelo.libraries.recordings.repair import repair
 from gemelo.libraries.runtime.clock_offset import ClockOffset
@@ -71,16 +71,18 @@ def export_options(parser: Parser) -> None:
     parser.add_argument("--fps", type=float, default=30.0, metavar="HZ", help="frames of a LeRobotDataset [30]")
     parser.add_argument("--gap", type=float, default=1.0, metavar="S", help="a pause that ends an episode [1 s]")
     parser.add_argument("--each-goal", action="store_true", help="an episode is one goal, not all up to a pause")
+    parser.add_argument("--ros2", type=Path, metavar="FOLDER", help="a bag of ROS 2 there: MCAP with its messages")
 
 
 def run_export(options: Options) -> ExitCode:
-    """Writes a recording's topics as tables or as a file of Rerun, or its demonstrations as a LeRobotDataset."""
+    """Writes topics as tables, a file of Rerun or a bag of ROS 2, or demonstrations as a LeRobotDataset."""
     if options.lerobot is not None:
         return _export_dataset(options)
     if options.to not in FORMS:
         raise unknown("form", options.to, list(FORMS))
+    form, output = (ROS2, options.ros2) if options.ros2 is not None else (options.to, options.output)
     with one_sentence():
-        for path, count in export(options.file, options.to, options.topics, options.output):
+        for path, count in export(options.file, form, options.topics, output):
             print(sentence(because("recording.exported", file=str(path), count=count)) if count else str(path))
     return ExitCode.OK
 

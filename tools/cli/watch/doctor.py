@@ -97,14 +97,18 @@ def run(options: Options) -> ExitCode:
     """Prints every diagnosis; FAILED if one of them is an error."""
     found = list(diagnoses())
     if options.json:
-        rows = [Printed(each.verdict.value, each.subject, each.found, each.remedy, each.why) for each in found]
-        print(msgspec.json.encode(rows).decode())
+        print(msgspec.json.encode(as_rows(found)).decode())
     else:
-        _print(found)
+        print_diagnoses(found)
     return ExitCode.FAILED if any(each.verdict is Verdict.ERROR for each in found) else ExitCode.OK
 
 
-def _print(found: Iterable[Diagnosis]) -> None:
+def as_rows(found: Iterable[Diagnosis]) -> list[Printed]:
+    """The lines of --json."""
+    return [Printed(each.verdict.value, each.subject, each.found, each.remedy, each.why) for each in found]
+
+
+def print_diagnoses(found: Iterable[Diagnosis]) -> None:
     """A table, and below it what would do."""
     rows, remedies = [], []
     for each in found:

@@ -1,0 +1,1 @@
+"""ROS 2 without ROS: its types and encoding, and our messages as its own."""

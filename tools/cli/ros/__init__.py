@@ -1,0 +1,1 @@
+"""Commands about the arm as a node of ROS 2."""
