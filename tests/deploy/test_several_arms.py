@@ -164,6 +164,21 @@ def test_the_welcome_prints_moves_to_states_that_each_arm_has(tmp_path, text, st
     assert moves == others + own + ([("bare", "jog")] if several else [])
 
 
+@pytest.mark.parametrize("several", [True, False])
+def test_the_welcome_names_the_same_commands_and_places_in_spanish(tmp_path, several):
+    arguments = [f"{name}={ROOT}/urdf/{name}" for name in BOTH] if several else []
+    said = {}
+    for locale in ("C.UTF-8", "es_MX.UTF-8"):
+        environment = {"PATH": os.environ["PATH"], "GEMELO_PATHS_OUT": str(tmp_path), "LANG": locale}
+        command = [ROOT / "deploy/welcome", *arguments]
+        said[locale] = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+    english, spanish = (text.splitlines() for text in said.values())
+    assert spanish[0].startswith("gemelo está en marcha")
+    assert spanish[-1] == "  parar     Ctrl-C aquí (la TUI pregunta una vez más), o: make down"
+    commands = re.compile(r"\.venv/bin/gemelo .*|[\w/.-]+/panel\.log|make down$")
+    assert [commands.findall(line) for line in spanish] == [commands.findall(line) for line in english]
+
+
 def test_what_would_only_stand_aside_is_left_out(common):
     bare = msgspec.structs.replace(
         common, device=DeviceKind.BOARD, viewer=msgspec.structs.replace(common.viewer, mode=ViewerMode.NONE)

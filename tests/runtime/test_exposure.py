@@ -50,7 +50,7 @@ def test_any_other_address_without_tls_is_refused_with_the_remedy(host):
 )  # fmt: skip
 def test_make_up_names_every_open_port_that_others_reach(tmp_path, section, host):
     assert exposed(load_deployment(environ={})) == []
-    (said,) = exposed(load_deployment(deployment_file(tmp_path, section, **{host: OPEN}), {}))
+    (said,) = map(str, exposed(load_deployment(deployment_file(tmp_path, section, **{host: OPEN}), {})))
     assert said.startswith(f"[{section}] would listen on {OPEN}, beyond this machine, without TLS")
     assert exposed(load_deployment(deployment_file(tmp_path, section, **{host: OPEN}, insecure=True), {})) == []
 

@@ -9,11 +9,12 @@ from pathlib import Path
 import msgspec
 from msgspec.structs import replace
 
-from gemelo.libraries.arm.errors import suggestion
+from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.model.description import ArmDescription, load_arm
 from gemelo.libraries.runtime.deployment import ARMS
 from gemelo.schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
 from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.hosts.quoting import Value, toml
 
 HEADER = "# Written by `make up ARMS=...`, of deploy/local.toml and of the environment then.\n\n"
@@ -45,7 +46,7 @@ def stacked_arms(names: Sequence[str], common: Deployment, root: Path) -> tuple[
         for index, (arm, folder) in enumerate(zip(arms, folders, strict=True))
     )
     if problems := [*_same_names(made), *_same_devices(made), *_same_ports(made, common)]:
-        raise ConfigurationError("\n".join(problems))
+        raise ConfigurationError(because("arms.together", *problems))
     return made
 
 
@@ -63,7 +64,7 @@ def deployment_file(deployment: Deployment) -> str:
     try:
         return HEADER + toml(tables)
     except ValueError as error:
-        raise ConfigurationError(f"a deployment for several arms cannot be written: {error}") from error
+        raise ConfigurationError(because("arms.deployment", error=str(error))) from error
 
 
 def left_out(deployment: Deployment) -> frozenset[str]:
@@ -82,7 +83,7 @@ def _folder(name: str, root: Path) -> Path:
         if (folder / "robot.toml").is_file():
             return folder.resolve()
     known = sorted(path.parent.name for path in (root / "urdf").glob("*/robot.toml"))
-    raise ConfigurationError(f'ARMS: there is no arm "{name}"{suggestion(name, known)}')
+    raise ConfigurationError(because("arms.unknown", nearest(name, known), name=name))
 
 
 def _deployment(
@@ -105,51 +106,51 @@ def _is_for(cell: Path, folder: Path, all_folders: Sequence[Path]) -> bool:
     return not owners or folder in owners
 
 
-def _same_names(arms: Sequence[StackedArm]) -> Iterator[str]:
+def _same_names(arms: Sequence[StackedArm]) -> Iterator[Reason]:
     seen: dict[str, str] = {}
     for each in arms:
         folder = each.deployment.robot
         if each.name == ARMS:
-            yield f'{folder}: no robot among several can have the name "{ARMS}": change name in its robot.toml'
-        if each.name in seen:
-            both = f"{seen[each.name]} and {folder}" if seen[each.name] != folder else f"{folder} twice"
-            yield f'ARMS names {both}: the robot "{each.name}" can be on a router once; give one another name'
+            yield because("arms.name.reserved", folder=folder, name=ARMS)
+        if each.name in seen and seen[each.name] == folder:
+            yield because("arms.name.twice", folder=folder, name=each.name)
+        elif each.name in seen:
+            yield because("arms.name.both", first=seen[each.name], second=folder, name=each.name)
         seen.setdefault(each.name, folder)
 
 
-def _same_devices(arms: Sequence[StackedArm]) -> Iterator[str]:
+def _same_devices(arms: Sequence[StackedArm]) -> Iterator[Reason]:
     """Of one MQTT name, or at the end of one cable."""
     seen: dict[str, str] = {}
     for each in arms:
         deployment, name = each.deployment, each.arm.device.name
         if deployment.wire is Wire.MQTT:
-            key, what = name, f'the device "{name}" at the broker: change [device] name in one robot.toml'
+            key, code = name, "arms.device.mqtt"
         elif deployment.device is DeviceKind.BOARD:
-            key = deployment.serial.device
-            what = f"a board at {key}: several boards on cables are a site of one host (gemelo deploy)"
+            key, code = deployment.serial.device, "arms.device.cable"
         else:
             continue
         if key in seen and seen[key] != each.name:
-            yield f"{seen[key]} and {each.name} would both have {what}"
+            yield because(code, first=seen[key], second=each.name, device=key)
         seen.setdefault(key, each.name)
 
 
-def _same_ports(arms: Sequence[StackedArm], common: Deployment) -> Iterator[str]:
-    wanted = [(common.router.listening[1], "the router ([router] port)")]
+def _same_ports(arms: Sequence[StackedArm], common: Deployment) -> Iterator[Reason]:
+    wanted = [(common.router.listening[1], because("arms.port.router"))]
     if common.mqtt.broker is not Broker.EXTERNAL:
-        wanted.append((common.mqtt.listening[1], "the broker ([mqtt] port)"))
+        wanted.append((common.mqtt.listening[1], because("arms.port.broker")))
     if common.viewer.mode is not ViewerMode.NONE:
-        wanted.append((common.viewer.port, "the viewer's data ([viewer] port)"))
-        wanted.append((common.viewer.web_port, "the view ([viewer] web_port)"))
+        wanted.append((common.viewer.port, because("arms.port.viewer")))
+        wanted.append((common.viewer.web_port, because("arms.port.view")))
     for index, each in enumerate(arms):
         plus = f" + {index}" if index else ""
-        wanted.append((each.deployment.panel.port, f"the page of {each.name} ([panel] port{plus})"))
-    seen: dict[int, str] = {}
+        wanted.append((each.deployment.panel.port, because("arms.port.page", arm=each.name, plus=plus)))
+    seen: dict[int, Reason] = {}
     for port, who in wanted:
         if not 0 < port < 65536:
-            yield f"{who} would be {port}, which is no port: 1 to 65535"
+            yield because("arms.port.none", who, port=port)
         elif port in seen:
-            yield f"port {port} is wanted by {seen[port]} and by {who}: move one in deploy/local.toml"
+            yield because("arms.port.twice", seen[port], who, port=port)
         seen.setdefault(port, who)
 
 

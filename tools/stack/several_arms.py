@@ -21,8 +21,10 @@ from gemelo.libraries.runtime.deployment import forget_arms, load_deployment, ov
 from gemelo.libraries.runtime.started import keep_started
 from gemelo.schemas.deployment import Deployment
 from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.plain_text import of_environment
+from gemelo.schemas.reasons import because, say
 from gemelo.tools.stack.arms import SHARED, StackedArm, deployment_file, file_of, left_out, stacked_arms
-from gemelo.tools.stack.start_check import say_virtual, start_problems
+from gemelo.tools.stack.start_check import say_virtual, start_problems, without_doubles
 
 ABOUT = "about"
 OUT = "${GEMELO_PATHS_OUT:-out}"  # as process-compose.yaml writes it
@@ -111,25 +113,25 @@ def words(texts: Sequence[str], root: Path) -> list[str]:
         try:
             found += [text] if (root / text / "robot.toml").is_file() else shlex.split(text)
         except ValueError as error:
-            raise ConfigurationError(f"ARMS={text}: {error}: put a path with a blank into quotes of its own") from error
+            raise ConfigurationError(because("arms.quote", text=text, error=str(error))) from error
     return found
 
 
 def main(names: Sequence[str]) -> int:
     """0, or 1 with every problem on stderr."""
-    root = project_root()
+    root, language = project_root(), of_environment(os.environ)
     try:
         common = load_deployment()
         arms = stacked_arms(words(names, root), common, root)
-        problems = list(dict.fromkeys(each for arm in arms for each in start_problems(arm.deployment)))
+        problems = without_doubles(each for arm in arms for each in start_problems(arm.deployment))
         if not problems:
             print(write(arms, common, root, os.environ))
     except ConfigurationError as error:
-        problems = str(error).splitlines()
+        problems = list(error.reason.causes) if error.reason.code == "arms.together" else [error.reason]
     for problem in problems:
-        print(f"gemelo: {problem}", file=sys.stderr)
+        print(f"gemelo: {say(problem, language)}", file=sys.stderr)
     for each in arms if not problems else ():
-        say_virtual(each.arm, sys.stderr)
+        say_virtual(each.arm, sys.stderr, language)
     return 1 if problems else 0
 
 

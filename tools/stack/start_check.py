@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TextIO
 
@@ -17,11 +18,14 @@ from gemelo.libraries.runtime.process.ports import PortTaken, require_free
 from gemelo.libraries.runtime.started import keep_started
 from gemelo.schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
 from gemelo.schemas.errors import ConfigurationError
+from gemelo.schemas.plain_text import of_environment
+from gemelo.schemas.reasons import Reason, because, say
 
 
-def start_problems(deployment: Deployment) -> list[str]:
-    """Every reason why this deployment cannot start on this machine, one sentence each; empty if it can."""
-    found, device = [], ""
+def start_problems(deployment: Deployment) -> list[Reason]:
+    """Every reason why this deployment cannot start on this machine; empty if it can."""
+    found: list[Reason] = []
+    device = ""
     try:
         arm = load_arm(project_root() / deployment.robot)
         device = arm.device.name if deployment.device is DeviceKind.VIRTUAL else ""
@@ -29,7 +33,7 @@ def start_problems(deployment: Deployment) -> list[str]:
         if deployment.cell:
             load_cell(Path(deployment.cell), arm)
     except ConfigurationError as error:
-        found.append(str(error))
+        found.append(error.reason)
     found += broker_problems(deployment, device)
     router, mqtt, viewer, panel = deployment.router, deployment.mqtt, deployment.viewer, deployment.panel
     found += exposed(deployment)
@@ -43,11 +47,11 @@ def start_problems(deployment: Deployment) -> list[str]:
         try:
             require_free(host, port, section, key)
         except PortTaken as error:
-            found.append(str(error))
+            found.append(error.reason)
     return found
 
 
-def exposed(deployment: Deployment) -> list[str]:
+def exposed(deployment: Deployment) -> list[Reason]:
     """What would listen beyond this machine without TLS, where the deployment does not say `insecure`."""
     router, mqtt, viewer, panel = deployment.router, deployment.mqtt, deployment.viewer, deployment.panel
     listening = [
@@ -61,11 +65,11 @@ def exposed(deployment: Deployment) -> list[str]:
         try:
             exposure(section, host, is_locked, is_insecure)
         except ConfigurationError as error:
-            found.append(str(error))
+            found.append(error.reason)
     return found
 
 
-def broker_problems(deployment: Deployment, device: str) -> list[str]:
+def broker_problems(deployment: Deployment, device: str) -> list[Reason]:
     """Why gateway or virtual device could not join the broker; one that runs already is asked itself.
 
     `device` is the virtual device's name; empty where there is none.
@@ -76,35 +80,41 @@ def broker_problems(deployment: Deployment, device: str) -> list[str]:
         if section.broker is not Broker.EXTERNAL and section.secure_folder:
             require_made(Path(section.secure_folder))
     except ConfigurationError as error:
-        return [str(error)]
+        return [error.reason]
     if section.broker is not Broker.EXTERNAL or deployment.wire is Wire.SERIAL:
         return []
     from gemelo.libraries.mqtt.check import problem  # paho takes 50 ms that only a strange broker is worth
 
-    return list(dict.fromkeys(str(found) for found in map(problem, accesses) if found is not None))
+    return without_doubles(found for found in map(problem, accesses) if found is not None)
+
+
+def without_doubles(reasons: Iterable[Reason]) -> list[Reason]:
+    """Each once: by its sentence, as a reason holds a dictionary."""
+    return list({str(reason): reason for reason in reasons}.values())
 
 
 def main() -> int:
     """`python -m gemelo.tools.stack.start_check`: prints every problem to stderr; 0 if there is none, else 1."""
+    language = of_environment(os.environ)
     try:
         deployment = load_deployment()
         found = start_problems(deployment)
     except ConfigurationError as error:
-        found = [str(error)]
+        found = [error.reason]
     for problem in found:
-        print(f"gemelo: {problem}", file=sys.stderr)
+        print(f"gemelo: {say(problem, language)}", file=sys.stderr)
     if not found:
         forget_arms(deployment)
         keep_started(os.environ)
-        say_virtual(load_arm(project_root() / deployment.robot), sys.stdout)
+        say_virtual(load_arm(project_root() / deployment.robot), sys.stdout, language)
     return 1 if found else 0
 
 
-def say_virtual(arm: ArmDescription, to: TextIO) -> None:
+def say_virtual(arm: ArmDescription, to: TextIO, language: str) -> None:
     """What a person is to know of an arm without motors, as the stack starts."""
     if not arm.has_motors:
-        said = f"{arm.name}: {NO_MOTORS}; a virtual device is generated, at {arm.device.tick_hz / 1000:g} kHz"
-        print(said, file=to)
+        virtual = because("start.no_motors", NO_MOTORS, arm=arm.name, tick=arm.device.tick_hz / 1000)
+        print(say(virtual, language), file=to)
 
 
 if __name__ == "__main__":
