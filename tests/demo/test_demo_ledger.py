@@ -5,6 +5,9 @@ import pytest
 
 from gemelo.schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState
 from gemelo.schemas.joints import StepErrors
+from gemelo.schemas.plain_text import ENGLISH
+from gemelo.schemas.reasons import because, plain
+from gemelo.tools.cli.common.language import choose
 from gemelo.tools.demo.ledger import StepTotals, nearest_step
 from gemelo.tools.demo.report import FOLLOWING_LIMIT, DemoReport, Move, complaints, report_of, text_of
 
@@ -31,8 +34,8 @@ def a_good_run() -> StepTotals:
 
 
 MOVES = [
-    Move(name="sine", succeeded=True, took_s=10.0),
-    Move(name="home", succeeded=True, plan_ms=1.5, took_s=2.0, final_error_steps=0.39),
+    Move(name=plain("sine"), succeeded=True, took_s=10.0),
+    Move(name=plain("home"), succeeded=True, plan_ms=1.5, took_s=2.0, final_error_steps=0.39),
 ]
 
 
@@ -62,7 +65,7 @@ def test_a_step_that_the_device_did_not_make_is_lost():
     ledger = a_good_run()
     ledger.on_state(at_rest(7, 99, -1))
     assert ledger.lost_steps == 1
-    assert "1 steps lost" in complaints(report_of("rm1", MOVES, ledger), ledger)
+    assert "1 steps lost" in map(str, complaints(report_of("rm1", MOVES, ledger), ledger))
 
 
 def test_steps_are_counted_only_at_rest():
@@ -70,7 +73,7 @@ def test_steps_are_counted_only_at_rest():
     ledger.on_chunk(chunk(7, 0, 25_600, 0))
     ledger.on_state(at_rest(7, 50, 0, mode=DeviceMode.RUN, velocity=100.0))
     assert not ledger.is_settled
-    assert any("not seen at rest" in text for text in complaints(report_of("rm1", MOVES, ledger), ledger))
+    assert any("not seen at rest" in str(each) for each in complaints(report_of("rm1", MOVES, ledger), ledger))
 
 
 def test_a_stream_that_was_stopped_on_its_way_has_not_lost_steps():
@@ -116,7 +119,7 @@ def test_an_error_between_two_messages_counts_too():
     ledger.on_errors(StepErrors(name=NAMES, error=(0.0, 0.0), max_error=(0.9, 0.0)))
     report = report_of("rm1", MOVES, ledger)
     assert report.max_following_error_steps == 0.9 > FOLLOWING_LIMIT
-    assert any("following error" in text for text in complaints(report, ledger))
+    assert any("following error" in str(each) for each in complaints(report, ledger))
 
 
 def test_silence_is_not_success():
@@ -127,7 +130,7 @@ def test_silence_is_not_success():
 
 
 def test_a_failed_move_stands_in_the_table_with_its_reason():
-    moves = [*MOVES, Move(name="tool 1", succeeded=False, reason="out of reach")]
+    moves = [*MOVES, Move(name=plain("tool 1"), succeeded=False, why=plain("out of reach"))]
     report = report_of("rm1", moves, a_good_run())
     text = text_of(report, moves)
     assert "failed: out of reach" in text
@@ -168,3 +171,17 @@ def test_a_replacement_is_lost_only_where_no_later_one_was_taken():
     assert ledger.chunks_lost == 3
     ledger.on_ack(CommandAck(stream=7, seq=2))
     assert ledger.chunks_lost == 1
+
+
+def test_figures_and_failures_are_spanish_in_a_spanish_terminal():
+    ledger = a_good_run()
+    moves = [*MOVES, Move(name=because("demo.tour.tool", number=1), succeeded=False, why=because("demo.lost", steps=2))]
+    choose("es")
+    try:
+        text = text_of(report_of("rm1", moves, ledger), moves)
+    finally:
+        choose(ENGLISH)
+    assert "herramienta 1" in text
+    assert "falló: 2 pasos perdidos" in text
+    assert "mayor error de seguimiento [pasos]" in text
+    assert text.splitlines()[-1].startswith("2 de 3 movimientos con éxito; 0 pasos perdidos; ")

@@ -32,7 +32,7 @@ def test_with_a_driver_a_picture_that_cannot_be_taken_is_a_failure(
 ) -> None:
     monkeypatch.setattr(main, "missing_driver", str)
     (complaint,) = main.take_picture(tmp_path / "none.rrd", tmp_path / "none.png")
-    assert complaint.startswith("no picture: there is no recording")
+    assert str(complaint).startswith("no picture: there is no recording")
 
 
 def test_a_viewer_that_finds_nothing_that_draws_leaves_the_picture_out_with_its_remedy(

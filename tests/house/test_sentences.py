@@ -14,9 +14,8 @@ FOLDERS = {  # whose sentences stand in the code, and why
     "examples/": "is read as code, in English",
     "firmware/": "builds the core's bindings and drives the host's board, for tests",
     "tools/bench/": "measures, for who works on the project",
-    "tools/demo/": "shows a checkout, in the words of its film",
     "tools/replay/": "compares a recording with the code, for who works on that",
-    "tools/stack/": "starts and stops processes for `make`, before anything of the product is built",
+    "tools/stack/compose.py": "what process-compose itself reports, for who works on the project",
 }
 FOR_DEVELOPERS = {  # exceptions that no person is shown: a traceback or a log has them
     "AttributeError": "a mistake in a program",

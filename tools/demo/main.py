@@ -19,6 +19,9 @@ import msgspec
 import gemelo
 from gemelo.libraries.runtime.deployment import load_deployment, project_root
 from gemelo.libraries.runtime.process.ending import ended_by_signals
+from gemelo.schemas.plain_text import of_environment
+from gemelo.schemas.reasons import Reason, because
+from gemelo.tools.cli.common.language import choose, sentence
 from gemelo.tools.demo.performance import Performance
 from gemelo.tools.demo.report import complaints, report_of, text_of
 from gemelo.tools.stack.results import new_results
@@ -35,13 +38,14 @@ def main() -> None:
     parser.add_argument("--broker", choices=("embedded", "mosquitto"), default=None)
     parser.add_argument("--no-picture", action="store_true", help="leave out the PNG")
     options = parser.parse_args()
+    choose(of_environment(os.environ))
     try:
         with ended_by_signals():
             sys.exit(demonstrate(options.out.resolve(), options.broker or best_broker(), not options.no_picture))
     except KeyboardInterrupt:
-        sys.exit("demo: ended before it was over; its stack has been stopped")
+        sys.exit(f"demo: {sentence(because('demo.ended'))}")
     except StackError as error:
-        sys.exit(f"demo: {error}")
+        sys.exit(f"demo: {sentence(error.reason)}")
 
 
 def best_broker() -> str:
@@ -56,30 +60,33 @@ def demonstrate(out: Path, broker: str, with_picture: bool) -> int:
         old.unlink(missing_ok=True)
     robot = load_deployment().robot
     environment = {"GEMELO_CONFIG": str(write_deployment(folder / "deployment.toml", robot, recording))}
-    say(f"starting the stack with {broker}")
+    say(because("demo.starting", broker=broker))
     with Stack(broker=broker, viewer="none", out=folder, environment=environment) as stack:
-        say(f"all ready after {stack.ready_seconds:.1f} s")
+        say(because("demo.ready", time=stack.ready_seconds))
         os.environ.update(stack.deployment)  # where the arm is found
         with gemelo.connect(name="demo") as arm:
             performance = Performance(arm, say)
             performance.run()
-    say("the stack has stopped")
+    say(because("demo.stopped"))
     report = report_of(arm.name, performance.moves, performance.ledger)
     (out / "demo.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
     found = complaints(report, performance.ledger)
     found += missing_files(folder, recording)
     if with_picture:
         found += take_picture(recording, out / "demo.png")
-    picture = f" and {out / 'demo.png'}" if (out / "demo.png").exists() else ""
-    print(f"\n{text_of(report, performance.moves)}\n\nresults: {out / 'demo.json'}, {folder}")
-    print(f"to look at: {recording} (.venv/bin/rerun {recording}){picture}")
+    results, png = because("demo.results", file=str(out / "demo.json"), folder=str(folder)), out / "demo.png"
+    view = because("demo.view", recording=str(recording))
+    if png.exists():
+        view = because("demo.view.picture", recording=str(recording), picture=str(png))
+    print(f"\n{text_of(report, performance.moves)}\n\n{sentence(results)}\n{sentence(view)}")
     for complaint in found:
-        print(f"demo failed: {complaint}", file=sys.stderr)
+        print(sentence(because("demo.failed", complaint)), file=sys.stderr)
     return 1 if found else 0
 
 
-def say(text: str) -> None:
-    print(f"demo: {text}", flush=True)
+def say(reason: Reason) -> None:
+    """A line of progress."""
+    print(f"demo: {sentence(reason)}", flush=True)
 
 
 def write_deployment(path: Path, robot: str, recording: Path) -> Path:
@@ -92,16 +99,19 @@ def _toml(text: str) -> str:
     return msgspec.json.encode(text).decode()
 
 
-def missing_files(folder: Path, recording: Path) -> list[str]:
-    """Recordings that logger and visualizer have not left, one sentence each."""
-    missing = [f"there is no {pattern[2:]} recording in {folder}" for pattern in ("*.mcap", "*.csv")
-               if not any(folder.rglob(pattern))]  # fmt: skip
+def missing_files(folder: Path, recording: Path) -> list[Reason]:
+    """Recordings that logger and visualizer have not left."""
+    missing = [
+        because("demo.no_recording", kind=pattern[2:], folder=str(folder))
+        for pattern in ("*.mcap", "*.csv")
+        if not any(folder.rglob(pattern))
+    ]
     if not recording.exists():
-        missing.append(f"there is no {recording.name}")
+        missing.append(because("demo.no_view", file=recording.name))
     return missing
 
 
-def take_picture(recording: Path, png: Path) -> list[str]:
+def take_picture(recording: Path, png: Path) -> list[Reason]:
     """Takes a picture of the viewer; returns what went wrong, empty if nothing did.
 
     Where no driver draws it there is none: that is said with its remedy, and fails nothing.
@@ -111,13 +121,13 @@ def take_picture(recording: Path, png: Path) -> list[str]:
     try:
         save_screenshot(recording, png)
     except NoGraphics as error:
-        say(f"no picture of the view: {missing_driver() or f'{error}: {DRIVER}'}")
+        say(because("demo.picture.none", error=missing_driver() or f"{error}: {DRIVER}"))
         return []
     except (RuntimeError, OSError) as error:
         if lack := missing_driver():
-            say(f"no picture of the view: {lack}")
+            say(because("demo.picture.none", error=lack))
             return []
-        return [f"no picture: {error}"]
+        return [because("demo.picture.failed", error=str(error))]
     return []
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import gemelo
 from gemelo import topics
 from gemelo.schemas.device import DeviceMode, DeviceState
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.demo.ledger import StepTotals
 from gemelo.tools.demo.report import Move
 from gemelo.tools.demo.script import SINE_RATE, SINE_TIME, Sine, TourMove, sine_of, tour
@@ -20,7 +21,7 @@ SETTLE = 0.3  # [s] for the last states and acknowledgements
 class Performance:
     """One run of the script."""
 
-    def __init__(self, arm: gemelo.Arm, say: Callable[[str], None]) -> None:
+    def __init__(self, arm: gemelo.Arm, say: Callable[[Reason], None]) -> None:
         self.ledger = StepTotals()
         self.moves: list[Move] = []
         self._arm, self._say = arm, say
@@ -52,16 +53,17 @@ class Performance:
         rested = self._comes_to_rest()
         took = time.monotonic() - began
         lazy = [sine.joint for sine in sines if not was_followed(sine, *travel[sine.joint])]
-        reason = "" if rested else f"not at rest after {REST:g} s; "
-        reason += f"not followed by {', '.join(lazy)}" if lazy else ""
-        return Move(name="sine, streamed at 10 Hz", succeeded=not reason, reason=reason, took_s=took)
+        causes = [] if rested else [because("demo.not_at_rest", time=REST)]
+        causes += [because("demo.not_followed", joints=", ".join(lazy))] if lazy else []
+        why = because("demo.sine.failed", *causes) if causes else None
+        return Move(name=because("demo.sine", rate=SINE_RATE), succeeded=why is None, why=why, took_s=took)
 
     def go(self, stop: TourMove) -> Move:
         """Plans and follows one goal; the move has the reason if it failed."""
         try:
             motion = self._arm.move(**stop.target)
         except gemelo.Error as error:
-            return Move(name=stop.name, succeeded=False, reason=str(error))
+            return Move(name=stop.name, succeeded=False, why=error.reason)
         return Move(
             name=stop.name,
             succeeded=True,
@@ -72,7 +74,10 @@ class Performance:
 
     def _keep(self, move: Move) -> None:
         self.moves.append(move)
-        self._say(f"{move.name}: {'ok' if move.succeeded else move.reason}, {move.took_s:.2f} s")
+        if move.why is None:
+            self._say(because("demo.went", move.name, time=move.took_s))
+        else:
+            self._say(because("demo.went_wrong", move.name, move.why, time=move.took_s))
 
     def _comes_to_rest(self) -> bool:
         """True once the device stands, within `REST` [s]."""

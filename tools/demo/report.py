@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 import msgspec
 
+from gemelo.schemas.reasons import Reason, because
+from gemelo.tools.cli.common.language import columns, sentence, word
 from gemelo.tools.cli.common.text_table import table
 from gemelo.tools.demo.ledger import StepTotals
 
@@ -18,9 +20,9 @@ FINAL_LIMIT = 0.5 + 1.0 / 256.0  # [steps]
 class Move(msgspec.Struct, frozen=True, kw_only=True):
     """One motion of the demonstration."""
 
-    name: str
+    name: Reason
     succeeded: bool
-    reason: str = ""
+    why: Reason | None = None  # of one that failed
     plan_ms: float | None = None  # None for the streamed sine
     took_s: float = 0.0
     final_error_steps: float = 0.0  # largest of all joints
@@ -83,23 +85,23 @@ def quantile(values: Sequence[float], share: float) -> float:
     return ordered[max(0, math.ceil(share * len(ordered)) - 1)] if ordered else 0.0
 
 
-def complaints(report: DemoReport, ledger: StepTotals) -> list[str]:
-    """Every bound that is not kept, one sentence each; empty if the demonstration succeeded."""
-    found = []
+def complaints(report: DemoReport, ledger: StepTotals) -> list[Reason]:
+    """Every bound that is not kept; empty if the demonstration succeeded."""
+    found: list[Reason] = []
     if report.succeeded < report.moves or report.moves == 0:
-        found.append(f"{report.moves - report.succeeded} of {report.moves} moves failed")
+        found.append(because("demo.moves", failed=report.moves - report.succeeded, count=report.moves))
     if report.max_following_error_steps > FOLLOWING_LIMIT:
-        found.append(f"following error {report.max_following_error_steps:.3f} steps, limit {FOLLOWING_LIMIT:.3f}")
+        found.append(because("demo.following", error=report.max_following_error_steps, limit=FOLLOWING_LIMIT))
     if report.max_final_error_steps > FINAL_LIMIT:
-        found.append(f"final error {report.max_final_error_steps:.3f} steps, limit {FINAL_LIMIT:.3f}")
+        found.append(because("demo.final", error=report.max_final_error_steps, limit=FINAL_LIMIT))
     if report.lost_steps:
-        found.append(f"{report.lost_steps} steps lost")
+        found.append(because("demo.lost", steps=report.lost_steps))
     if not ledger.is_settled:
-        found.append("the device was not seen at rest after the last stream, so its steps are not accounted for")
+        found.append(because("demo.not_settled"))
     if report.chunks_lost:
-        found.append(f"{report.chunks_lost} of {report.chunks_sent} chunks were never acknowledged")
+        found.append(because("demo.chunks", lost=report.chunks_lost, sent=report.chunks_sent))
     if not report.chunks_sent or not report.joints:
-        found.append("nothing was heard of the device")
+        found.append(because("demo.no_device"))
     return found
 
 
@@ -107,8 +109,8 @@ def text_of(report: DemoReport, moves: Sequence[Move]) -> str:
     """Tables of moves and joints, and a closing line."""
     rows = [
         (
-            move.name,
-            "ok" if move.succeeded else f"failed: {move.reason}",
+            sentence(move.name),
+            _result(move),
             "-" if move.plan_ms is None else f"{move.plan_ms:.2f}",
             f"{move.took_s:.2f}",
             f"{move.final_error_steps:.3f}",
@@ -119,14 +121,23 @@ def text_of(report: DemoReport, moves: Sequence[Move]) -> str:
         (name, str(joint.commanded_steps), str(joint.executed_steps), f"{joint.max_following_error_steps:.3f}")
         for name, joint in report.joints.items()
     ]
+    closing = because(
+        "demo.closing",
+        succeeded=report.succeeded, moves=report.moves, steps=report.lost_steps,
+        lost=report.chunks_lost, sent=report.chunks_sent, p50=report.plan_ms.p50, p99=report.plan_ms.p99,
+    )  # fmt: skip
     return "\n".join(
         (
-            table(("move", "result", "planned in [ms]", "took [s]", "final error [steps]"), rows),
+            table(columns("move", "result", "planned in [ms]", "took [s]", "final error [steps]"), rows),
             "",
-            table(("joint", "commanded [steps]", "executed [steps]", "largest following error [steps]"), totals),
+            table(columns("joint", "commanded [steps]", "executed [steps]", "largest following error [steps]"), totals),
             "",
-            f"{report.succeeded} of {report.moves} moves succeeded; {report.lost_steps} steps lost; "
-            f"{report.chunks_lost} of {report.chunks_sent} chunks lost; "
-            f"planned in {report.plan_ms.p50:.2f} ms (p50), {report.plan_ms.p99:.2f} ms (p99)",
+            sentence(closing),
         )
     )
+
+
+def _result(move: Move) -> str:
+    if move.why is None:
+        return word("result", "ok")
+    return sentence(because("demo.move.failed", move.why))

@@ -9,6 +9,7 @@ from gemelo import Target
 from gemelo.libraries.arm.frames.transforms import compose, inverse
 from gemelo.libraries.arm.kinematics.chain import link_transforms
 from gemelo.libraries.arm.model.description import ArmDescription, Joint
+from gemelo.schemas.reasons import Reason, because
 
 SINE_RATE = 10.0  # [Hz] of the targets
 SINE_TIME = 10.0  # [s]
@@ -24,7 +25,7 @@ POSE_TOUR = ((0.60, 0.60, 0.30), (0.40, 0.60, 0.50), (0.55, 0.35, 0.20))
 class TourMove:
     """One planned move of the tour."""
 
-    name: str
+    name: Reason
     target: Target
 
 
@@ -53,17 +54,21 @@ def sine_of(joint: Joint, start: float) -> Sine:
 
 def tour(arm: ArmDescription) -> tuple[TourMove, ...]:
     """Every named state, home, some joint goals and tool positions; the last goal has step counts other than zero."""
-    named = [TourMove(f"named {name}", Target(named=name)) for name in arm.named_states if name != "home"]
+    named = [
+        TourMove(because("demo.tour.named", state=name), Target(named=name))
+        for name in arm.named_states
+        if name != "home"
+    ]
     joints = [
-        TourMove(f"joints {number}", Target(joints=positions_at(arm, shares)))
+        TourMove(because("demo.tour.joints", number=number), Target(joints=positions_at(arm, shares)))
         for number, shares in enumerate(JOINT_TOUR, 1)
     ]
     poses = [
-        TourMove(f"tool {number}", Target(position=tool_at(arm, positions_at(arm, shares))))
+        TourMove(because("demo.tour.tool", number=number), Target(position=tool_at(arm, positions_at(arm, shares))))
         for number, shares in enumerate(POSE_TOUR, 1)
     ]
     home = Target(joints=arm.reference_position)
-    return (*named, TourMove("home", home), *joints, *poses)
+    return (*named, TourMove(because("demo.tour.home"), home), *joints, *poses)
 
 
 def positions_at(arm: ArmDescription, shares: tuple[float, ...]) -> tuple[float, ...]:

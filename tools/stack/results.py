@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from gemelo.schemas.reasons import because
 from gemelo.tools.stack.stack import StackError
 
 MARK = ".gemelo-results"  # in every such folder: what lies beside it may be removed by the next run
@@ -18,11 +19,10 @@ def new_results(folder: Path) -> Path:
     try:
         if folder.exists() and any(folder.iterdir()):
             if not (folder / MARK).is_file():
-                raise StackError(f"{folder} holds files that no such run has left there, and results would replace "
-                                 "them: choose a new folder with --out, or empty it")  # fmt: skip
+                raise StackError(because("stack.results.others", folder=str(folder)))
             shutil.rmtree(folder)
         folder.mkdir(parents=True, exist_ok=True)
         (folder / MARK).write_text("the next run that writes here removes all that lies in this folder\n")
     except OSError as error:
-        raise StackError(f"no results can be written into {folder}: {error.strerror}") from error
+        raise StackError(because("stack.results.unwritable", folder=str(folder), error=error.strerror or "")) from error
     return folder

@@ -18,7 +18,7 @@ from gemelo.libraries.mqtt import secure_folder
 from gemelo.libraries.runtime.deployment import project_root
 from gemelo.libraries.runtime.process.readiness import says_ready
 from gemelo.schemas.errors import ReasonedError
-from gemelo.schemas.reasons import Reason
+from gemelo.schemas.reasons import Reason, because
 from gemelo.tools.stack.compose import Compose, ComposeError
 from gemelo.tools.stack.guard import Guard
 from gemelo.tools.stack.not_ready import NotReady, not_ready
@@ -183,15 +183,16 @@ class Stack:
         missing = wanted
         while time.monotonic() < deadline:
             if self.server is None or self.server.poll() is not None:
-                raise StackError(f"process-compose ended by itself:\n{self.console()[-2000:]}")
+                raise StackError(because("stack.ended", console=self.console()[-2000:]))
             missing = tuple(name for name in missing if not self.is_ready(name))
             if not missing:
                 return
             time.sleep(POLL)
         unready = self.why_not_ready(missing)
-        head = f"not ready after {timeout:.0f} s: {', '.join(missing)} (load {os.getloadavg()[0]:.1f})"
-        silent = () if any(each.lines for each in unready) else (self.console()[-1000:],)
-        raise StackError("\n".join([head, *map(str, unready), *silent]), unready)
+        lines = [*map(str, unready), *([] if any(each.lines for each in unready) else [self.console()[-1000:]])]
+        names, load = ", ".join(missing), os.getloadavg()[0]
+        why = because("stack.not_ready", time=timeout, names=names, load=load, console="\n".join(lines))
+        raise StackError(why, unready)
 
     def is_ready(self, name: str) -> bool:
         """As deploy/probe: True if `name` has said so within the last 3 s."""
@@ -222,7 +223,7 @@ class Stack:
         """
         pid = self.pid(name)
         if pid == 0:
-            raise StackError(f"{name} does not run")
+            raise StackError(because("stack.not_running", name=name))
         os.kill(pid, number)
         if number is signal.SIGKILL:
             with contextlib.suppress(OSError):  # on a read-only disk it is old soon
@@ -256,5 +257,5 @@ def free_ports(count: int) -> tuple[int, ...]:
 def _process_compose(root: Path) -> Path:
     found = root / ".venv/bin/process-compose"
     if not found.exists():
-        raise StackError("process-compose is not there: run make setup")
+        raise StackError(because("stack.no_compose"))
     return found
