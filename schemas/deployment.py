@@ -115,7 +115,8 @@ class RosMeshes(StrEnum):
     """Where RViz finds the meshes of the robot's description."""
 
     NONE = "none"  # the description is as the arm's own file has it
-    FILE = "file"  # on this host
+    FILE = "file"  # on this host, as they are
+    HTTP = "http"  # from the bridge, on loopback, as STL
 
 
 class RosSection(DeploymentRecord, frozen=True, kw_only=True):
@@ -127,7 +128,7 @@ class RosSection(DeploymentRecord, frozen=True, kw_only=True):
     node: str = "gemelo"
     controller: str = "arm_controller"  # the action is <controller>/follow_joint_trajectory
     motion: bool = False  # whoever reaches the ROS router may move the arm
-    meshes: RosMeshes = RosMeshes.FILE
+    meshes: RosMeshes = RosMeshes.HTTP
     rate: float = 0.0  # [Hz] of joint states and frames at most; 0: each of them
 
 

@@ -122,7 +122,7 @@ ROLES: tuple[Role, ...] = (
     Role("ros_bridge", "the arm as a node of ROS 2", ROS_BRIDGE, reads=SEEN_FROM_ROS, asks=STOPS),
     Role(
         "ros_operator", "the same, where ROS 2 may move the arm", ROS_OPERATOR,
-        reads=SEEN_FROM_ROS, asks=(*STOPS, *LOOKS, DEVICE_COMMAND, *CONTROLS), acts=ACTIONS,
+        writes=(JOG,), reads=SEEN_FROM_ROS, asks=(*STOPS, *LOOKS, DEVICE_COMMAND, *CONTROLS), acts=ACTIONS,
     ),
     Role(
         "panel", "the operator's page", "panel",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gemelo.libraries.ros2.types import make
 from gemelo.schemas.device import DeviceState, DeviceStatus
-from gemelo.schemas.frames import FrameTransform, FrameTransforms, RobotDescription
+from gemelo.schemas.frames import FrameTransform, FrameTransforms
 from gemelo.schemas.joints import JointState, StepErrors
 from gemelo.schemas.message import Vector
 from gemelo.schemas.reasons import Reason, because
@@ -80,14 +80,18 @@ def string(text: str) -> Any:
     return make("std_msgs/msg/String", data=text)
 
 
-def urdf_with_meshes(description: RobotDescription, base: str) -> str:
-    """The URDF with `base` before the address of each mesh that has none of its own: RViz resolves no relative one."""
+def relative_meshes(urdf: str) -> tuple[str, ...]:
+    """The addresses of meshes that begin with no scheme."""
+    return tuple(dict.fromkeys(found[2] for found in MESH.finditer(urdf) if "://" not in found[2]))
+
+
+def urdf_with_meshes(urdf: str, address_of: Callable[[str], str]) -> str:
+    """The URDF with other addresses of the meshes that have a relative one: RViz resolves none of these."""
 
     def absolute(found: re.Match[str]) -> str:
-        address = found[2] if "://" in found[2] or not base else f"{base.rstrip('/')}/{found[2]}"
-        return f"{found[1]}{address}{found[3]}"
+        return f"{found[1]}{found[2] if '://' in found[2] else address_of(found[2])}{found[3]}"
 
-    return MESH.sub(absolute, description.urdf)
+    return MESH.sub(absolute, urdf)
 
 
 def diagnostics(

@@ -28,6 +28,8 @@ MESSAGES = {
     "control_msgs/msg/JointTolerance": "string name\nfloat64 position\nfloat64 velocity\nfloat64 acceleration",
     "control_msgs/msg/JointComponentTolerance":
         "string joint_name\nuint16 component\nfloat64 position\nfloat64 velocity\nfloat64 acceleration",
+    "control_msgs/msg/JointJog":
+        "std_msgs/Header header\nstring[] joint_names\nfloat64[] displacements\nfloat64[] velocities\nfloat64 duration",
     "control_msgs/msg/GripperCommand": "float64 position\nfloat64 max_effort",
 }  # fmt: skip
 SERVICES = {  # request and response
@@ -85,6 +87,7 @@ HASHES = {  # RIHS01, in hexadecimal; of services and of the parts of actions th
     "rcl_interfaces/msg/Log": "e28ce254ca8abc06abf92773b74602cdbf116ed34fbaf294fb9f81da9f318eac",
     "action_msgs/msg/GoalStatusArray": "6c1684b00f177d37438febe6e709fc4e2b0d4248dca4854946f9ed8b30cda83e",
     "visualization_msgs/msg/MarkerArray": "86cb8800b6fb05b5eff1abd7a56f62a5641d3ae9a1c29e78e67e704f1d067dcf",
+    "control_msgs/msg/JointJog": "ba249455a20f70168a1acb7bf43b776b72ff1f7eb5fc4cfea443f749e963c6e7",
     "geometry_msgs/msg/TwistStamped": "5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
     f"{FOLLOW}_FeedbackMessage": "80398fcb9674a79081a9906e2ccf0c804dd7cb15e22e362e606ee87186beab71",
     f"{GRIPPER}_FeedbackMessage": "392ff03fcd872f9dc2405cbeb2897fcf011ad9998458b6aa85c603b8a49e431d",

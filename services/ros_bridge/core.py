@@ -24,6 +24,7 @@ from gemelo.schemas.motion import (
     JointTrajectory,
     TrajectoryPoint,
 )
+from gemelo.schemas.planning import JogCommand
 from gemelo.schemas.reasons import because, remedy
 
 POINT = "trajectory_msgs/msg/JointTrajectoryPoint"
@@ -58,6 +59,46 @@ def follow_goal(goal: Any, to_gateway: Callable[[int], int | None]) -> FollowJoi
         )
     except ValueError as error:
         raise GoalNotTaken(because("ros.goal.not_finite", error=str(error))) from error
+
+
+def goal_of_trajectory(trajectory: Any) -> Any:
+    """The goal of FollowJointTrajectory that a trajectory_msgs/JointTrajectory is, with the usual tolerances."""
+    return make(
+        f"{FOLLOW}_Goal",
+        trajectory=trajectory,
+        multi_dof_trajectory=make(
+            "trajectory_msgs/msg/MultiDOFJointTrajectory", header=header_of(0), joint_names=[], points=[]
+        ),
+        path_tolerance=[],
+        component_path_tolerance=[],
+        goal_tolerance=[],
+        component_goal_tolerance=[],
+        goal_time_tolerance=duration_of(0.0),
+    )
+
+
+def joint_jog(message: Any, now: int) -> JogCommand | None:
+    """Ours at `now` [ns], of control_msgs/JointJog; None for one that has displacements alone, which are no speed.
+
+    Raises ValueError for a number that is not finite.
+    """
+    if not len(message.velocities):
+        return None
+    return JogCommand(stamp=now, name=tuple(message.joint_names), velocity=tuple(message.velocities.tolist()))
+
+
+def twist_jog(message: Any, now: int, prefix: str) -> JogCommand:
+    """Ours at `now` [ns], of geometry_msgs/TwistStamped [m/s, rad/s]; without a frame in that of the base.
+
+    `prefix` is before the names of frames. Raises ValueError for a number that is not finite.
+    """
+    linear, angular = message.twist.linear, message.twist.angular
+    return JogCommand(
+        stamp=now,
+        linear=(linear.x, linear.y, linear.z),
+        angular=(angular.x, angular.y, angular.z),
+        frame=message.header.frame_id.removeprefix(prefix),
+    )
 
 
 def _point(point: Any) -> TrajectoryPoint:

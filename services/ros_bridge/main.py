@@ -32,6 +32,7 @@ def run(node: Node, deployment: Deployment) -> None:
     ros = RosNode(section.router, name, node.post, node.clock)
     node.at_end(ros.close)
     topics = Topics(node, ros, section, Path(arm.folder))
+    node.at_end(topics.close)
     serve_triggers(node, ros, section.motion)
     if section.motion:
         decided = partial(on_decision, node, topics)

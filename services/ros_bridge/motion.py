@@ -25,6 +25,7 @@ from gemelo.schemas.topics import FOLLOW_JOINT_TRAJECTORY, GATEWAY, GRIPPER_COMM
 from gemelo.services.ros_bridge import core
 from gemelo.services.ros_bridge.actions import AnyHandle, Decided, OnRefusal, RosActionServer
 from gemelo.services.ros_bridge.control import ControlForGoals
+from gemelo.services.ros_bridge.inputs import subscribe_inputs
 from gemelo.services.ros_bridge.scene_check import SceneCheck
 
 GRIPPER_ACTION = "gripper/gripper_cmd"
@@ -39,8 +40,10 @@ def serve_motion(
 ) -> None:  # fmt: skip
     """Serves the actions; `joints()` is the newest joint state."""
     control = ControlForGoals(node)
-    actions = [FollowAction(node, ros, section.controller, control, joints)]
-    servers = [RosActionServer(node, ros, each, on_refusal) for each in actions]
+    follow = FollowAction(node, ros, section.controller, control, joints)
+    servers = [RosActionServer(node, ros, follow, on_refusal)]
+    prefix = f"{section.namespace}/" if section.namespace else ""
+    subscribe_inputs(node, ros, section.controller, follow, prefix, on_refusal)
     if has_gripper:
         servers.append(RosActionServer(node, ros, GripperAction(node, ros, control), on_refusal))
 

@@ -26,6 +26,7 @@ from gemelo.schemas.topics import (
     STATIC_FRAMES,
     STEP_ERRORS,
 )
+from gemelo.services.ros_bridge.meshes import MeshServer, served_as
 
 LOG_QOS = Qos(100, is_latched=True)  # of /rosout; chosen: what a console shows, a tenth of what rcl keeps
 STRING, JOINTS, TRANSFORMS = "std_msgs/msg/String", "sensor_msgs/msg/JointState", "tf2_msgs/msg/TFMessage"
@@ -45,7 +46,8 @@ class Topics:
     def __init__(self, node: Node, ros: Publishing, section: RosSection, robot_folder: Path) -> None:
         self._node, self._section = node, section
         self._prefix = f"{section.namespace}/" if section.namespace else ""
-        self._meshes = robot_folder.as_uri() if section.meshes is RosMeshes.FILE else ""
+        self._folder = robot_folder
+        self._meshes: MeshServer | None = None
         self.refusal: Reason | None = None  # of the last goal of ROS, where it was refused
         self._joint_states = ros.publisher("joint_states", ros_type(JOINTS))
         self._tf = ros.publisher("/tf", ros_type(TRANSFORMS), FRAMES_QOS)
@@ -86,9 +88,25 @@ class Topics:
         self._put(self._tf_static, messages.frames(frames, self._prefix), self._node.now())
 
     def _on_description(self, description: RobotDescription) -> None:
-        urdf = messages.urdf_with_meshes(description, self._meshes)
+        urdf = self._with_meshes(description.urdf)
         self._put(self._description, messages.string(urdf), self._node.now())
         self._put(self._semantic, messages.string(description.srdf), self._node.now())
+
+    def _with_meshes(self, urdf: str) -> str:
+        match self._section.meshes:
+            case RosMeshes.HTTP:
+                self.close()
+                server = self._meshes = MeshServer(urdf, self._folder)
+                return messages.urdf_with_meshes(urdf, lambda each: f"{server.base}/{served_as(each)}")
+            case RosMeshes.FILE:
+                return messages.urdf_with_meshes(urdf, lambda each: (self._folder / each).as_uri())
+        return urdf
+
+    def close(self) -> None:
+        """Serves no mesh any more."""
+        server, self._meshes = self._meshes, None
+        if server is not None:
+            server.close()
 
     def _on_log(self, record: LogRecord) -> None:
         if record.level >= RELEVANT:

@@ -134,6 +134,12 @@ class RosClient:
         )  # fmt: skip
         return asked
 
+    def publish(self, name: str, message: Any) -> None:
+        """One message on a topic, as a publisher of ROS sends it."""
+        attachment = Attachment(next(self._numbers), time.time_ns(), secrets.token_bytes(16))
+        key = self.key(name, ros_type(message.__msgtype__))
+        self.session.put(key, encode(message), attachment=attachment.packed())
+
     def declare_client(self, token: str) -> Any:
         """The token of a service client, to be undeclared."""
         return self.session.liveliness().declare_token(token)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gemelo.libraries.ros2 import messages
 from gemelo.libraries.ros2.types import FOLLOW, decode, encode
 from gemelo.schemas.actions import GoalStatusCode
-from gemelo.schemas.frames import FrameTransform, FrameTransforms, RobotDescription, Transform
+from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.motion import (
     FollowErrorCode,
@@ -129,6 +129,6 @@ def test_a_goal_that_another_one_replaced_is_aborted_and_all_other_states_are_th
 
 def test_only_relative_addresses_of_meshes_get_a_base():
     urdf = '<a><mesh filename="meshes/a.glb"/><mesh scale="1 1 1" filename="package://x/b.stl"/></a>'
-    found = messages.urdf_with_meshes(RobotDescription(urdf=urdf), "file:///arm")
+    found = messages.urdf_with_meshes(urdf, lambda each: f"file:///arm/{each}")
     assert found == urdf.replace('"meshes/a.glb"', '"file:///arm/meshes/a.glb"')
-    assert messages.urdf_with_meshes(RobotDescription(urdf=urdf), "") == urdf
+    assert messages.relative_meshes(urdf) == ("meshes/a.glb",)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from gemelo.libraries.ros2.messages import header_of
 from gemelo.libraries.ros2.types import FOLLOW, GRIPPER, ControlMsgs, make, ros_type
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.schemas.topics import DEVICE_SHAFT
@@ -256,3 +259,42 @@ def test_the_gripper_closes_with_feedback_and_its_own_result(ros: RosTwin) -> No
     assert result.result.position == pytest.approx(0.01, abs=1e-3)
     assert ros.run_until(lambda: feedback)
     assert bytes(feedback[0].message.goal_id.uuid) == uuid(1)
+
+
+def test_a_trajectory_on_the_topic_moves_the_arm_and_a_refused_one_is_told(ros: RosTwin) -> None:
+    name = "/arm_controller/joint_trajectory"
+    ros.client.publish(name, ros_goal(reach(ros)).trajectory)
+    wanted = dict(zip(ros.twin.arm.joint_names, ros.twin.arm.named_states["left"], strict=True))
+    assert ros.run_until(lambda: off(ros, wanted) <= 0.5, 0.02)
+    assert ros.run_until(lambda: not ros.arm.control.held, 0.02)
+    log = ros.client.subscribe("/rosout", "rcl_interfaces/msg/Log", latched=True)
+    ros.client.publish(name, ros_goal(FollowJointTrajectoryGoal()).trajectory)
+    assert ros.run_until(lambda: any("a goal of ROS was refused" in each.message.msg for each in log))
+
+
+def test_a_jog_moves_a_joint_as_long_as_it_is_sent_and_the_tool_along_an_axis(ros: RosTwin) -> None:
+    joint = ros.twin.arm.joint_names[0]
+    before, height = at(ros), ros.arm.pose().position[2]
+
+    def jog(kind: str, name: str, **fields: Any) -> None:
+        ros.client.publish(name, make(kind, header=header_of(0, "base_link"), **fields))
+
+    def by_joint() -> bool:
+        jog("control_msgs/msg/JointJog", "/gemelo/delta_joint_cmds", joint_names=[joint], displacements=np.array([]),
+            velocities=np.array([0.2]), duration=0.1)  # fmt: skip
+        return at(ros)[joint] > before[joint] + 0.05
+
+    assert ros.run_until(by_joint)
+    ros.clock.sleep(1.0)
+    stood = at(ros)
+    ros.clock.sleep(0.5)
+    assert at(ros) == stood
+    up = make("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.05)
+    still = make("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.0)
+
+    def by_tool() -> bool:
+        twist = make("geometry_msgs/msg/Twist", linear=up, angular=still)
+        jog("geometry_msgs/msg/TwistStamped", "/gemelo/delta_twist_cmds", twist=twist)
+        return ros.arm.pose().position[2] > height + 0.005
+
+    assert ros.run_until(by_tool)

@@ -128,7 +128,7 @@ def test_a_frozen_subscriber_of_ros_disturbs_nobody(site: Site) -> None:
         states = site.client.subscribe("/joint_states", JOINTS)
         comes(states, 400)
         numbers = [each.attachment.sequence for each in states]
-        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        assert numbers[-1] - numbers[0] < 1.1 * len(numbers)  # of those that were sent meanwhile hardly any is lost
         end(reader, signal.SIGKILL)
     finally:
         code, said = end(bridge)

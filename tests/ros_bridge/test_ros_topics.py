@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import re
 import threading
+import urllib.error
+import urllib.request
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import pytest
+import trimesh
 from msgspec.structs import replace
 
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.ros2 import messages
 from gemelo.libraries.ros2.types import HASHES, ros_type
 from gemelo.libraries.runtime.node import Node
+from gemelo.schemas.deployment import RosMeshes
 from gemelo.schemas.device import (
     DeviceCommandRequest,
     DeviceCommandResponse,
@@ -107,9 +113,30 @@ def test_a_late_joiner_gets_description_and_static_frames_and_they_have_the_mesh
             urdf = comes(late.subscribe("/robot_description", "std_msgs/msg/String", latched=True)).data
             srdf = comes(late.subscribe("/robot_description_semantic", "std_msgs/msg/String", latched=True)).data
             static = comes(late.subscribe("/tf_static", "tf2_msgs/msg/TFMessage", latched=True))
-    assert f'filename="{rm1.folder.as_uri()}/' in urdf
+        for address in re.findall(r'filename="(http://127\.0\.0\.1:[^"]+)"', urdf):
+            mesh = trimesh.load(BytesIO(fetched(address)), file_type="stl")
+            own = trimesh.load(rm1.folder / f"meshes/{Path(address).stem}.glb", force="mesh")
+            assert mesh.bounds == pytest.approx(own.bounds, abs=1e-6)
+        with pytest.raises(urllib.error.HTTPError):
+            fetched(f"{address.partition('/meshes')[0]}/robot.toml")
+    assert urdf.count("http://127.0.0.1") == describe(rm1).urdf.count(".glb")
     assert srdf == describe(rm1).srdf
     assert [each.child_frame_id for each in static.transforms] == ["plate"]
+
+
+def fetched(address: str) -> bytes:
+    with urllib.request.urlopen(address, timeout=60.0) as answer:
+        return bytes(answer.read())
+
+
+@pytest.mark.parametrize(("meshes", "begin"), [(RosMeshes.FILE, "file:///"), (RosMeshes.NONE, "meshes/")])
+def test_meshes_are_files_of_this_host_or_as_the_arm_has_them(
+    tmp_path: Path, rm1: ArmDescription, meshes: RosMeshes, begin: str
+) -> None:
+    with running(tmp_path, meshes=meshes) as bridge, bridge.node("state_publisher") as publisher:
+        publisher.publisher(DESCRIPTION).put(describe(rm1))
+        urdf = comes(bridge.client.subscribe("/robot_description", "std_msgs/msg/String", latched=True)).data
+    assert f'filename="{begin}' in urdf
 
 
 def test_moving_frames_go_out_on_tf(bridge: Bridge) -> None:

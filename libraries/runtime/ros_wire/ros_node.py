@@ -39,6 +39,7 @@ from gemelo.schemas.reasons import because, remedy
 HEARTBEAT = 0.5  # [s] as rmw_zenoh_cpp has it: by it a late reader notices that it misses the last message
 CLOSE_TIMEOUT = 1.0  # [s]
 OPEN_MS = 2000  # that the router may take
+MOST_WAITING = 64  # questions to one service; chosen: more than all tools of a person ask at once
 
 Post = Callable[[Callable[[], None]], object]
 
@@ -103,6 +104,47 @@ class ZenohRosQuery:
             pass
 
 
+class Waiting:
+    """The questions to one service that wait for the node's own thread: a flood of them is dropped."""
+
+    def __init__(self, post: Post) -> None:
+        self._post, self._count, self._lock = post, 0, threading.Lock()
+
+    def put(self, task: Callable[[], None]) -> bool:
+        """False where too many wait."""
+        with self._lock:
+            if self._count >= MOST_WAITING:
+                return False
+            self._count += 1
+        self._post(lambda: self._run(task))
+        return True
+
+    def _run(self, task: Callable[[], None]) -> None:
+        with self._lock:
+            self._count -= 1
+        task()
+
+
+class NewestMessage:
+    """The newest message of a topic until the node's own thread takes it."""
+
+    def __init__(self, post: Post, on_message: Callable[[bytes], None]) -> None:
+        self._post, self._on_message, self._lock = post, on_message, threading.Lock()
+        self._payload: bytes | None = None
+
+    def put(self, payload: bytes) -> None:
+        with self._lock:
+            is_first, self._payload = self._payload is None, payload
+        if is_first:
+            self._post(self._take)
+
+    def _take(self) -> None:
+        with self._lock:
+            payload, self._payload = self._payload, None
+        if payload is not None:
+            self._on_message(payload)
+
+
 class RosNode:
     """One node of ROS 2; everything that it declares lasts until it is closed."""
 
@@ -146,13 +188,26 @@ class RosNode:
         """`on_query(query)` runs in the node's own thread for every question to the service; it replies, once."""
         full = self.name.full(name)
 
+        waiting = Waiting(self._post)
+
         def hand_over(query: zenoh.Query) -> None:
             asked = ZenohRosQuery(query, self._clock)
-            self._post(lambda: on_query(asked))
+            if not waiting.put(lambda: on_query(asked)):
+                asked.drop()
 
         key = data_key(self.name.domain, full, kind)
         queryable = self._session.declare_queryable(key, hand_over, complete=True)
         self._kept += [queryable, self._declared(self._token(EntityKind.SERVER, full, kind, DEFAULT))]
+
+    def subscribe(self, name: str, kind: RosType, on_message: Callable[[bytes], None]) -> None:
+        """`on_message(payload)` runs in the node's own thread for the newest message of a topic alone."""
+        full, newest = self.name.full(name), NewestMessage(self._post, on_message)
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            newest.put(bytes(sample.payload))
+
+        subscriber = self._session.declare_subscriber(data_key(self.name.domain, full, kind), on_sample)
+        self._kept += [subscriber, self._declared(self._token(EntityKind.SUBSCRIPTION, full, kind, DEFAULT))]
 
     def watch_clients(self, on_change: Callable[[bytes, bool], None]) -> None:
         """`on_change(gid, is_there)` runs in the node's own thread for every service client of the domain."""
