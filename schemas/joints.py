@@ -40,6 +40,7 @@ class JointTargets(Message, frozen=True, kw_only=True):
     client: str = ""  # the node whose jogging they are, where the planner writes them; empty: the writer's own
     velocity: Vector = ()  # [rad/s] or [m/s] there; empty: estimated from the targets; zeros: a place to rest at
     ahead: tuple[TargetAhead, ...] = ()  # by their times, at most `MOST_AHEAD`
+    to_watch: bool = False  # the planner's own whose way nobody has looked at yet, as that of others; not a jog's
 
 
 class StepErrors(Message, frozen=True, kw_only=True):

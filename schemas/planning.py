@@ -374,6 +374,27 @@ class JogStatus(Message, frozen=True, kw_only=True):
     why: Reason | None = None  # there is no jogging, as data; absent where `limits` say what slows it
 
 
+class StreamPath(Message, frozen=True, kw_only=True):
+    """What the gateway is about to send of a stream of targets: the next tenth of a second, and the stop behind it."""
+
+    stamp: int = 0  # [ns] UNIX time
+    session: int = 0  # of the gateway
+    number: int = 0  # in this session
+    name: tuple[str, ...] = ()
+    positions: tuple[Vector, ...] = ()  # [rad] or [m] from where it goes on, 25 ms apart at most
+    margin: float = 0.0  # [m] that is to stay free; 0: the robot's own clearance
+
+
+class StreamVerdict(Message, frozen=True, kw_only=True):
+    """The planner's answer to one `StreamPath`."""
+
+    stamp: int = 0  # [ns] UNIX time
+    session: int = 0  # of the gateway, as in the path
+    number: int = 0
+    free: bool = False
+    limit: JogLimit | None = None  # what is in the way
+
+
 class JogTaken(Message, frozen=True, kw_only=True, tag="taken"):
     """A command that the jog has taken."""
 

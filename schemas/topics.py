@@ -121,6 +121,13 @@ JOINT_TARGETS = Topic(
     "joint_targets", joints.JointTargets, LATEST, None, True, ANY, "streamed targets from a slider or script",
     (GATEWAY,),
 )
+STREAM_PATHS = Topic(
+    "stream/paths", planning.StreamPath, LATEST, None, False, GATEWAY, "paths of streamed targets, to be looked at",
+    (PLANNER,),
+)
+STREAM_VERDICTS = Topic(
+    "stream/verdicts", planning.StreamVerdict, LATEST, None, False, PLANNER, "whether they are free", (GATEWAY,),
+)
 FRAMES = Topic(
     "frames", frames.FrameTransforms, LATEST, 50.0, True, STATE_PUBLISHER, "poses of the moving links",
     rest_rate=REST_RATE,

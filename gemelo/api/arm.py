@@ -637,6 +637,8 @@ class Arm:
         one. A new call replaces what of it is not due yet. A target that the gateway has refused raises `Refused` at
         the next call, a gateway that says nothing for 1 s `Lost`.
 
+        Where something is in the way, the arm stops clear of it, and the status that is returned says what it is.
+
         With `pose` the tool follows a pose, or a position (3,) [m] with the tool turned as it is, in the base: from the
         configuration where the arm is, slowed near singularities and joint limits. What limits it is in the status that
         is returned; a pose out of reach raises `Refused`, the arm stands as near as it gets, and follows the next one
@@ -652,8 +654,7 @@ class Arm:
         if pose is None:
             if joints is None:
                 raise BadArgument(because("argument.stream.which", joints="joints", pose="pose"))
-            self._parts.streaming.say(joints, velocity, ahead, period)
-            return None
+            return self._parts.streaming.say(joints, velocity, ahead, period)
         if joints is not None or velocity is not None or ahead or period:
             raise BadArgument(because("argument.stream.pose", argument="pose"))
         return self._parts.streaming.lead(pose)

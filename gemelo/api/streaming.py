@@ -21,6 +21,7 @@ from gemelo.schemas.reasons import Reason, because, plain, remedy
 from gemelo.schemas.topics import DEVICE_EVENTS, JOG_STATUS, JOINT_STATES, JOINT_TARGETS, POSE_TARGETS
 
 PAUSE = 0.5  # [s] without a target, after which the next one begins a new stream
+OBSTRUCTED = 1.2  # [s] for which an obstruction is told; the gateway publishes one a second
 ANSWER = 3.0  # [s] of poses without a status of the planner, after which it counts as lost
 GAP = 1.0  # [s] without a state in the middle: the gateway publishes fifty a second
 
@@ -31,6 +32,8 @@ class Streaming:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._refused: Reason | None = None  # why the gateway did not take the last target
+        self._obstruction = JogStatus()  # what was in the way of joint targets
+        self._obstructed = -math.inf  # [s] monotonic, when that was published
         self._status: JogStatus | None = None  # of the planner, on this stream of poses
         self._heard = -math.inf  # [s] monotonic, when that came
         self._began = self._said = -math.inf  # [s] monotonic, of this stream's first and last target
@@ -54,13 +57,19 @@ class Streaming:
             raise Refused(because("client.refused", why), check="stream", reason=why)
         return status
 
-    def say(self, joints: Joints, velocity: Joints | None, ahead: Iterable[Joints], period: float) -> None:
-        """As `targets_of`, with a `period` [s]; raises `Refused` where the gateway has refused the target before, or
-        `Lost` where it is silent."""
+    def say(self, joints: Joints, velocity: Joints | None, ahead: Iterable[Joints], period: float) -> JogStatus | None:
+        """What is in the way; as `targets_of`, with a `period` [s]. Raises `Refused` where the gateway has refused the
+        target before, or `Lost` where it is silent."""
         targets = targets_of(self._session.description, joints, velocity, ahead, period)
         self._prepare(targets.ahead[-1].time if targets.ahead else 0.0)
         node = self._session.node
         node.publisher(JOINT_TARGETS).put(replace(targets, stamp=node.now()))
+        return self._in_the_way()
+
+    def _in_the_way(self) -> JogStatus | None:
+        now = self._session.clock.monotonic()
+        is_new = self._obstructed >= self._began and now - self._obstructed < OBSTRUCTED
+        return self._obstruction if is_new else None
 
     def _prepare(self, lasts: float) -> None:
         """Before a target is sent that leads the arm for `lasts` [s]."""
@@ -84,6 +93,10 @@ class Streaming:
         """Only of the stream that runs, and not of another's: events of before may come late."""
         if event.client not in ("", self._session.node.address):
             return
+        now = self._session.clock.monotonic()
+        if event.event == "target_obstructed" and now - self._said < PAUSE:
+            why = event.why or plain(event.detail)
+            self._obstruction, self._obstructed = JogStatus(active=True, limited_by=str(why), why=why), now
         if event.event == "target_refused" and self._session.clock.monotonic() - self._said < PAUSE:
             self._refused = event.why or plain(event.detail)
 

@@ -17,6 +17,7 @@ from gemelo.services.planner.pose_service import PoseService
 from gemelo.services.planner.request.start_state import STALE_AFTER
 from gemelo.services.planner.scene.answer_log import AnswerLog
 from gemelo.services.planner.scene.scene_keeper import SceneKeeper
+from gemelo.services.planner.watch_service import WatchService
 from gemelo.services.planner.workers.in_process import PlansInProcess
 from gemelo.services.planner.workers.plan_service import PlanMaker, PlanService
 from gemelo.services.planner.workers.workers import Present, Workers
@@ -35,6 +36,7 @@ def run(node: Node, deployment: Deployment) -> None:
     keeper = SceneKeeper(node, arm, states, project_root() / deployment.paths.run, planner.set_world, log)
     JogService(node, arm, states, lambda: keeper.world, lambda: parameters.value.record_inputs)
     PoseService(node, arm, states)
+    WatchService(node, arm, lambda: keeper.world)
     KinematicService(node, arm, states, lambda: planner.checker.newest, log)
     present: Present = lambda: (states.message, states.age())  # noqa: E731
     workers: PlanMaker

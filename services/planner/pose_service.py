@@ -51,7 +51,7 @@ class PoseService:
         self._taken, self._client = now, writer if control is not None and control.held else ""
         stamp = pose.stamp or self._node.now()
         names = self._arm.joint_names
-        self._targets.put(JointTargets(stamp=stamp, name=names, position=posed.position, client=writer))
+        self._targets.put(JointTargets(stamp=stamp, name=names, position=posed.position, client=writer, to_watch=True))
         if now - self._published >= STATUS_PERIOD:
             limits = tuple(worded(limit) for limit in posed.limits)
             said = "; ".join(limit.message for limit in limits)

@@ -45,6 +45,7 @@ from gemelo.services.stepper_gateway.inputs import (
     StopInput,
     TakeControlInput,
     TargetsInput,
+    VerdictInput,
 )
 from gemelo.services.stepper_gateway.ledger.confidence import LedgerRecord
 from gemelo.services.stepper_gateway.links.frames import BadFrame, CommandFrame, Heartbeat, NoFrame, Sync, encode
@@ -101,6 +102,8 @@ class GatewayCore:
                 self._on_link(given, moment)
             case TargetsInput():
                 self._take_targets(given, moment)
+            case VerdictInput(verdict):
+                parts.streaming.on_verdict(verdict, moment)
             case GoalInput():
                 reply = self._accept_goal(given, moment)
             case CancelInput(goal_id):
@@ -223,7 +226,7 @@ class GatewayCore:
         """A target that is refused for control's sake neither keeps nor ends the holder's stream."""
         parts = self._components
         if parts.control.permits_targets(MotionCaller(node=given.node), moment):
-            parts.streaming.on_targets(given.targets, parts.goals.is_active, moment)
+            parts.streaming.on_targets(given.targets, parts.goals.is_active, moment, given.watched)
 
     def _accept_goal(self, given: GoalInput, moment: Moment) -> GoalVerdict:
         parts, caller = self._components, MotionCaller(given.session)

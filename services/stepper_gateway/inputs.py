@@ -16,6 +16,7 @@ from gemelo.schemas.device import DeviceCommandRequest, DeviceStopRequest, Injec
 from gemelo.schemas.gripper import GripperCommandGoal
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.motion import FollowJointTrajectoryGoal
+from gemelo.schemas.planning import StreamVerdict
 from gemelo.schemas.reasons import Reason
 from gemelo.services.stepper_gateway.goals.goal_executor import CancelVerdict, GoalVerdict
 from gemelo.services.stepper_gateway.ledger.confidence import LedgerRecord
@@ -39,6 +40,7 @@ class BeganInput(_Input, frozen=True):
     kept: LedgerRecord | None = None
     has_rest_rate: bool = False  # of recordings before that parameter, whose core published every state
     has_readings_rest_rate: bool = False  # the same of the parameter `readings_rest_rate`
+    has_watch: bool = False  # of recordings before the parameter `watch_streams`, whose core watched none
 
 
 class ParametersInput(_Input, frozen=True):
@@ -117,6 +119,13 @@ class NewcomerInput(_Input, frozen=True):
 class TargetsInput(_Input, frozen=True):
     targets: JointTargets
     node: str = ""  # that they come from
+    watched: bool = False  # the planner has looked at their way already
+
+
+class VerdictInput(_Input, frozen=True):
+    """The planner's answer to a path of streamed targets."""
+
+    verdict: StreamVerdict
 
 
 class CommandInput(_Input, frozen=True):
@@ -165,8 +174,8 @@ class GiveControlInput(_Input, frozen=True):
 
 Input = (
     BeganInput | ParametersInput | StepInput | LinkInput | FrameInput | GoalInput | CancelInput | GripInput
-    | GripCancelInput | SceneInput | PlannerInput | TargetsInput | CommandInput | StopInput | ConfigureInput
-    | InjectInput | EchoInput | NewcomerInput | TakeControlInput | JoinControlInput | GiveControlInput
+    | GripCancelInput | SceneInput | PlannerInput | TargetsInput | VerdictInput | CommandInput | StopInput
+    | ConfigureInput | InjectInput | EchoInput | NewcomerInput | TakeControlInput | JoinControlInput | GiveControlInput
 )  # fmt: skip
 Reply = GoalVerdict | CancelVerdict | None  # what is answered at once
 

@@ -42,7 +42,7 @@ def run(node: Node, deployment: Deployment, open_wire: OpenDevice | None = None)
     kept, trouble = read_ledger(file.path)
     if trouble:
         node.log.warning(trouble)
-    began = BeganInput(node.clock.bits(31) or 1, parameters.value, kept, True, True)
+    began = BeganInput(node.clock.bits(31) or 1, parameters.value, kept, True, True, True)
     core = GatewayCore(arm, began.session, began.parameters, began.kept)
     shell = Shell(node, core, began, parameters, file)
     link = (open_wire or open_device)(deployment, arm, shell.wake)

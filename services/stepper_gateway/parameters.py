@@ -31,6 +31,12 @@ class GatewayParameters(msgspec.Struct, frozen=True, kw_only=True):
     catch_up: Annotated[
         bool, Meta(description="an arm far behind streamed targets keeps their velocity; if not, it swings less")
     ] = True
+    watch_streams: Annotated[
+        bool, Meta(description="streamed targets move the arm only as far as the planner finds their way free")
+    ] = True
+    stream_margin: Annotated[
+        float, Meta(ge=0.0, le=0.05, description="[m] that stays free on their way; 0: the robot's own clearance")
+    ] = 0.0
     goal_time_tolerance: Annotated[
         float, Meta(ge=0.1, le=600.0, description="[s] a goal may end late, where it does not say itself")
     ] = 2.0

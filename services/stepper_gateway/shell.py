@@ -32,6 +32,7 @@ from gemelo.schemas.motion import (
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
 )
+from gemelo.schemas.planning import StreamVerdict
 from gemelo.schemas.reasons import Reason, because
 from gemelo.schemas.topics import (
     CONTROL_GIVE,
@@ -47,6 +48,7 @@ from gemelo.schemas.topics import (
     GRIPPER_COMMAND,
     JOINT_TARGETS,
     SCENE,
+    STREAM_VERDICTS,
 )
 from gemelo.services.stepper_gateway.control.control import seal
 from gemelo.services.stepper_gateway.core import GatewayCore
@@ -77,6 +79,7 @@ from gemelo.services.stepper_gateway.inputs import (
     StopInput,
     TakeControlInput,
     TargetsInput,
+    VerdictInput,
     link_input,
 )
 from gemelo.services.stepper_gateway.ledger.ledger_file import LedgerFile
@@ -136,6 +139,7 @@ class Shell:
         self._gripper: Gripper = node.serve_action(GRIPPER_COMMAND, self._on_grip, self._on_grip_cancel)
         self._absences = node.absences()
         node.subscribe_signed(JOINT_TARGETS, self._on_targets)
+        node.subscribe_signed(STREAM_VERDICTS, self._on_verdict)
         node.watch_service(PLANNER, self._on_planner)
         node.watch_newcomers(self._on_newcomer)
         node.subscribe_signed(SCENE, lambda scene, by: self._handle(SceneInput(scene.version, scene.epoch, by)))
@@ -242,7 +246,14 @@ class Shell:
         """The planner's are those of whom it jogs for; of anybody else it does not count what they say of that."""
         if self._is_silent():
             return
-        self._handle(TargetsInput(targets, targets.client or writer if writer == PLANNER else writer))
+        if writer == PLANNER:
+            self._handle(TargetsInput(targets, targets.client or writer, watched=not targets.to_watch))
+        else:
+            self._handle(TargetsInput(targets, writer))
+
+    def _on_verdict(self, verdict: StreamVerdict, writer: str) -> None:
+        if writer == PLANNER and not self._is_silent():
+            self._handle(VerdictInput(verdict))
 
     def _on_newcomer(self) -> None:
         self._handle(NewcomerInput())

@@ -96,3 +96,20 @@ def test_a_pose_is_streamed_alone(twin: SimulatedArm) -> None:
         twin.stream()
     with pytest.raises(gemelo.BadArgument, match="millimetres"):
         twin.stream(pose=(200.0, 0.0, 200.0))
+
+
+def test_what_stands_in_the_way_of_streamed_targets_and_poses_is_named_and_not_touched(twin: SimulatedArm) -> None:
+    rest_at_ready(twin)
+    joint = twin.description.joint_names[0]
+    begin = twin.joints[joint]
+    x, y, _ = twin.fk({**twin.joints, joint: begin + 0.5}).position
+    twin.scene.add_box("post", size=(0.04, 0.04, 0.6), at=(x, y, 0.3))
+    said: set[str] = set()
+    for index in range(120):
+        status = twin.stream({joint: begin + min(0.8, 0.3 * PERIOD * index)})
+        said |= set() if status is None or status.why is None else {status.why.code}
+        twin.sim.sleep(PERIOD)
+    assert said == {"target.obstructed"}
+    assert twin.joints[joint] < begin + 0.5
+    rest_at_ready(twin)  # nothing is touched: a plan leads away
+    twin.scene.clear()

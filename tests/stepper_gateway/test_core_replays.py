@@ -37,7 +37,9 @@ class Watched(VirtualArm):
     def start_core(self, arm, session_id, parameters=None):
         super().start_core(arm, session_id, parameters)
         self.calls: list[tuple[Input, Moment, Any]] = []
-        self.began = BeganInput(session_id, parameters or GatewayParameters())
+        self.began = BeganInput(
+            session_id, msgspec.structs.replace(parameters or GatewayParameters(), watch_streams=False)
+        )
         self.core.handle = self._watched(self.core.handle)
 
     def _watched(self, handle):

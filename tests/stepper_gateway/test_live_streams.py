@@ -289,7 +289,7 @@ def test_the_same_inputs_give_the_same_replacements() -> None:
     rig.ready()
     lead(rig, persons(rig.arm, 4, 3.0), 3.0, Sender(50.0, jitter=0.01))
     rig.run(2.0)
-    again = GatewayCore(rig.arm, rig.began)
+    again = GatewayCore(rig.arm, rig.began, rig.core.device.parameters)
     encoded = [msgspec.msgpack.encode(Given(m.unix, m.monotonic, 0, given)) for given, m, _ in rig.calls]
     for given, (_, _, was) in zip(unpacked(packed(encoded)), rig.calls, strict=True):
         assert again.handle(given.input, given.moment) == was

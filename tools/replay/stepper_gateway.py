@@ -158,7 +158,10 @@ class GatewayAgain:
             said.begin(unix)
 
     def _as_they_were(self, parameters: GatewayParameters) -> GatewayParameters:
-        """A core of before `rest_rate` published every state, one of before `readings_rest_rate` every reading."""
+        """A core of before `rest_rate` published every state, one of before `readings_rest_rate` every reading; one of
+        before `watch_streams` watched none."""
+        if not self._began.has_watch:
+            parameters = replace(parameters, watch_streams=False)
         if not self._began.has_rest_rate:
             parameters = replace(parameters, rest_rate=ALL_STATES)
         return parameters if self._began.has_readings_rest_rate else replace(parameters, readings_rest_rate=ALL_STATES)

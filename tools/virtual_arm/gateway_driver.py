@@ -10,6 +10,8 @@ from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
+from msgspec.structs import replace
+
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlTake
@@ -61,6 +63,7 @@ from gemelo.services.stepper_gateway.inputs import (
     StopInput,
     TakeControlInput,
     TargetsInput,
+    VerdictInput,
     link_input,
 )
 from gemelo.services.stepper_gateway.ledger.confidence import LedgerRecord
@@ -84,7 +87,7 @@ from gemelo.services.stepper_gateway.parameters import GatewayParameters
 __all__ = [
     "CancelInput", "ConfigureInput", "EchoInput", "FrameInput", "GatewayDriver", "GatewayParameters", "GripCancelInput",
     "InjectInput", "Kind", "LinkInput", "Moment", "NewcomerInput", "PlannerInput", "SceneInput", "StepInput",
-    "TargetsInput", "asked", "link_input",
+    "TargetsInput", "VerdictInput", "asked", "link_input",
 ]  # fmt: skip
 
 Ended = tuple[GoalStatusCode, FollowJointTrajectoryResult]
@@ -94,6 +97,7 @@ class GatewayDriver(ABC):
     """A gateway core and everything that it has said; a subclass has the clock, the wire and the device."""
 
     core: GatewayCore
+    watches = False  # there is a planner that looks at the way of streamed targets
 
     def __init__(self, on_message: Callable[[Message], None] | None = None) -> None:
         """`on_message` receives the published messages; without it they are kept in `published`."""
@@ -129,6 +133,7 @@ class GatewayDriver(ABC):
 
     def start_core(self, arm: ArmDescription, session_id: int, parameters: GatewayParameters | None = None) -> None:
         """The gateway's process starts, perhaps again, with the ledger that it kept last; its link is not up yet."""
+        parameters = replace(parameters or GatewayParameters(), watch_streams=self.watches)
         self.core = GatewayCore(arm, session_id, parameters, self.kept[-1] if self.kept else None)
 
     @property

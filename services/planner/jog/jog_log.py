@@ -83,9 +83,9 @@ def digest_of(targets: JointTargets | None, status: JogStatus | None) -> str:
 
 
 def _without_chunk(targets: JointTargets) -> bytes:
-    """In msgpack; a jog has no targets ahead, and older recordings do not have the field."""
+    """In msgpack; without the fields that no jog uses, which older recordings do not have."""
     fields = msgspec.to_builtins(targets)
-    del fields["ahead"]
+    del fields["ahead"], fields["to_watch"]
     return msgspec.msgpack.encode(fields)
 
 

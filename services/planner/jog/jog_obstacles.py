@@ -55,6 +55,13 @@ class Nearness:
         self._look_at(np.flatnonzero(counts & ~self._is_exact & (self._least - moved < margin)))
         return np.flatnonzero(counts & (self._least - moved < margin))
 
+    def pairs_along(self, margin: float, moved: Array) -> Pairs:
+        """Which may be nearer than `margin` [m] somewhere on a path on which each pair moves by `moved` (pairs,) [m] at
+        most; those that do not move are none of them."""
+        counts = moved > STILL
+        self._look_at(np.flatnonzero(counts & ~self._is_exact & (self._least - moved < margin)))
+        return np.flatnonzero(counts & (self._least - moved < margin))
+
     def distances(self, pairs: Pairs) -> Array:
         """(k,) [m] here; exact for pairs that are not known to be farther."""
         return self._least[pairs]

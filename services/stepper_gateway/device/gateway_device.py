@@ -37,6 +37,7 @@ class GatewayDevice:
         self.joints = arm.joints
         self.parameters = parameters
         self.out = out
+        self.gateway_id = session_id  # of this gateway among those before and after it
         self.session = DeviceSession(arm.device.name, len(arm.joints), session_id)
         self.configuration = Configuration(arm, self.session, out)
         self.commands = PendingCommands(session_id)

@@ -79,10 +79,11 @@ class LiveStream(Stream):
         """True if the device has taken the first chunk: only then can it be replaced."""
         return self._confirmed >= 0
 
-    def splice(self, now: float, clock: ClockSync) -> Splice:
-        """From where the path can be replaced by a chunk that is sent at `now` [s] monotonic."""
+    def splice(self, now: float, clock: ClockSync, later: float = 0.0) -> Splice:
+        """From where the path can be replaced by a chunk that is sent `later` [s] than `now` [s] monotonic."""
         self._half_trip = 0.5e6 * clock.round_trip
         self._give_up(now)
+        now += later
         played, newest = self.played_us(now, clock), self.log.newest
         index = newest.next_after(played + round(self._delay(SURE) + SLOTS))
         from_us, knot = newest.times[index], newest.knots[index]
@@ -90,10 +91,14 @@ class LiveStream(Stream):
         wait = self._delay(0.5) + SLOTS if is_standing else from_us - played
         return Splice(from_us, knot, now + wait * 1e-6, is_standing)
 
-    def first(self, start: Knot, now: float, clock: ClockSync) -> Splice:
-        """That of the first chunk, from rest at `start`, sent at `now` [s] monotonic."""
+    def begin(self, clock: ClockSync) -> None:
+        """Know how long the wire takes as the clocks' exchanges have it, before anything is sent."""
         self._half_trip = 0.5e6 * clock.round_trip
-        return Splice(0, start, now + (self._delay(0.5) + SLOTS) * 1e-6, is_standing=True)
+
+    @staticmethod
+    def first(start: Knot, now: float, clock: ClockSync) -> Splice:
+        """That of the first chunk, from rest at `start`, sent at `now` [s] monotonic."""
+        return Splice(0, start, now + (0.5e6 * clock.round_trip + SLOTS) * 1e-6, is_standing=True)
 
     def replace(self, splice: Splice, near: list[Knot], near_dt: int, tail: list[Knot], tail_dt: int) -> SentChunk:
         """The chunk after which the path goes on from `splice` by `near`, and comes to rest by `tail`."""

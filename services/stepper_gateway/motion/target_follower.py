@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.message import Vector
+from gemelo.schemas.planning import StreamVerdict
 from gemelo.schemas.reasons import Reason, because
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
@@ -26,11 +27,14 @@ class TargetFollower:
         self._device, self._controller = device, controller
         self._targets = TargetStream(device.joints)
         self._live = LiveTargets(device, controller)
-        self._complained = -1.0e9  # [s] monotonic
+        self._complained = self._obstructed = -1.0e9  # [s] monotonic, of the newest event of each kind
         self._unsaid = 0
 
-    def on_targets(self, targets: JointTargets, goal_is_active: bool, moment: Moment) -> None:
-        """Take the newest target, or refuse it and keep the one before."""
+    def on_targets(
+        self, targets: JointTargets, goal_is_active: bool, moment: Moment, was_watched: bool = False
+    ) -> None:
+        """Take the newest target, or refuse it and keep the one before; `was_watched`: the planner has looked at its
+        way already."""
         silence = self._device.parameters.stream_silence
         self._targets.note_message(targets, moment.monotonic, silence)
         try:
@@ -43,7 +47,7 @@ class TargetFollower:
         except GoalRejected as rejected:
             return self._complain(rejected.reason, moment)
         if self._device.replaces_paths:
-            return self._live.take(targets, columns, moment)
+            return self._live.take(targets, columns, moment, was_watched)
         self._targets.take(columns, self._present(moment))
         self._targets.plan(targets, tuple(columns), moment.monotonic)
         self._begin(moment)
@@ -56,15 +60,25 @@ class TargetFollower:
         failure = self._live.step(is_silent, moment)
         if failure is not None:
             self._targets.interrupt()
-            self._fail(failure, moment)
+            self._complain(failure, moment)
+            if self._controller.is_followable:
+                self._controller.stop(moment)
         if (complaint := self._live.take_complaint()) is not None:
             self._complain(complaint, moment)
+        obstruction = self._live.take_obstruction()
+        if obstruction is not None and moment.monotonic - self._obstructed >= COMPLAINT:
+            self._obstructed = moment.monotonic
+            self._device.event("target_obstructed", obstruction, moment)
         stream = self._controller.stream
         if self._targets.is_active and (stream is None or not self._controller.transmission.is_open):
             self._end(None if stream is None else stream.failure, moment)
         if is_silent:
             self._fall_silent(moment)
         self._begin(moment)
+
+    def on_verdict(self, verdict: StreamVerdict, moment: Moment) -> None:
+        """The planner has looked at the way of the newest targets."""
+        self._live.on_verdict(verdict, moment)
 
     def on_ack(self, moment: Moment) -> None:
         """The device has answered a chunk: what it has not taken is sent anew."""
