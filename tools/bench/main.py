@@ -98,6 +98,8 @@ FIGURES = {
     "cli_start_ms": FigureRow("stack:cli_start_ms", "ms"),
     "import_gemelo_ms": FigureRow("stack:import_gemelo_ms", "ms"),
     "handshake_ms": FigureRow("handshake:handshake_ms", "ms"),
+    "ros_bridge_cpu_percent": FigureRow("ros:ros_bridge_cpu_percent", "% of one core"),
+    "ros_latency_ms": FigureRow("ros:ros_latency_ms", "ms"),
     "broker_echo_ms": FigureRow("brokers:broker_echo_ms", "ms"),
     "arms_on_one_router": FigureRow("many_arms:arms_on_one_router", "arms"),
     "tick_instructions": FigureRow("firmware_cost:tick_instructions", "instr"),
