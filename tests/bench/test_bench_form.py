@@ -33,7 +33,7 @@ OF_THE_ISSUES = (
     "box_mm", "image_to_pose_ms", "mount_mm", "mount_images_mm", "mount_touch_mm", "camera_cpu_percent",
     "detector_cpu_percent", "image_to_detection_ms", "pick_mm", "pick_success", "replay_speed",
     "simulate_speed", "simulate_start_ms",
-    "stream_lag_ms", "stream_lag_live_ms", "stream_watch_cpu",
+    "stream_lag_ms", "stream_lag_live_ms", "stream_watch_cpu", "lerobot_loop_hz", "lerobot_lag_ms",
     "lost_of_45000_at_25hz", "seed_move_percent", "ra_remainder_steps", "text_link_ms", "clock_sync_error_us",
     "hold_reaction_ms", "stopping_distance", "ledger", "gripper_reaction_ms", "max_step_rate_hz",
     "parse_mb_per_s", "step_time_error_us", "estop_reaction_ticks", "render_ms", "cli_start_ms",

@@ -81,6 +81,8 @@ FIGURES = {
     "simulate_start_ms": FigureRow("simulation:simulate_start_ms", "ms"),
     "stream_lag_ms": FigureRow("stream_lag:stream_lag_ms", "ms"),
     "stream_watch_cpu": FigureRow("stream_watch:stream_watch_cpu", "%"),
+    "lerobot_loop_hz": FigureRow("lerobot:lerobot_loop_hz", "Hz"),
+    "lerobot_lag_ms": FigureRow("lerobot:lerobot_lag_ms", "ms"),
     "lost_of_45000_at_25hz": FigureRow("virtual_time:lost_of_45000_at_25hz", "chunks"),
     "seed_move_percent": FigureRow("old_dialects:seed_move_percent", "%"),
     "ra_remainder_steps": FigureRow("ra_remainder:ra_remainder_steps", "steps"),
