@@ -8,6 +8,7 @@ import socket
 import ssl
 import struct
 import threading
+from collections.abc import Iterator
 from contextlib import AbstractContextManager
 
 from paho.mqtt import client as paho
@@ -21,6 +22,19 @@ log = logging.getLogger("mqtt")
 CONNECT_TIMEOUT = 2.0  # [s]
 OLD_BROKER = 132  # CONNACK: Unsupported protocol version
 NO_ANSWER = 141  # DISCONNECT: Keep alive timeout
+
+
+class Waker(socket.socket):
+    """The socket by which paho wakes its thread for what is queued; not for a thread that writes it itself."""
+
+    writer = 0  # the thread that does
+    count = 0  # how often it has woken paho's
+
+    def send(self, data: object, flags: int = 0, /) -> int:
+        if threading.get_ident() == self.writer:
+            return 0
+        self.count += 1
+        return super().send(data, flags)  # type: ignore[arg-type]
 
 
 class MqttClient(paho.Client):
@@ -65,6 +79,34 @@ class MqttClient(paho.Client):
         """
         with self._writing:
             self._packet_write()
+
+    @property
+    def _sockpairW(self) -> socket.socket | None:  # noqa: N802 - paho's name
+        return self.waker
+
+    @_sockpairW.setter
+    def _sockpairW(self, waker: socket.socket | None) -> None:  # noqa: N802 - before paho's thread begins
+        self.waker = None if waker is None else Waker(fileno=waker.detach())
+        if self.waker is not None:
+            self.waker.setblocking(False)
+
+    @contextlib.contextmanager
+    def written_here(self) -> Iterator[None]:
+        """What is published in it is written by this thread at its end; paho's is woken for what the socket does not
+        take at once, or where the connection has failed. For one thread."""
+        waker = self.waker
+        if waker is None:
+            yield
+            return
+        waker.writer = threading.get_ident()
+        try:
+            yield
+            self.write_now()
+        finally:
+            waker.writer = 0
+            if self.want_write():
+                with contextlib.suppress(OSError):  # full: it is woken already; closed: it has ended
+                    waker.send(b"0")
 
     def loop_write(self) -> MQTTErrorCode:
         """As paho's; its thread calls it."""

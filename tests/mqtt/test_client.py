@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 import struct
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 
 import pytest
@@ -111,3 +111,82 @@ def test_a_thread_that_ends_just_as_it_is_waited_for_is_no_error() -> None:
     client.looks = 0
     client.loop_stop()
     assert client.looks == 3
+
+
+class CountingBroker:
+    """Takes one connection, and keeps what comes on it; `reads` once it may read."""
+
+    def __init__(self) -> None:
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listening.getsockname()[1]
+        self.received = bytearray()
+        self.reads = threading.Event()
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def _serve(self) -> None:
+        wire, _ = self._listening.accept()
+        wire.recv(1024)
+        wire.sendall(CONNACK)
+        self.reads.wait()
+        with wire:
+            while data := wire.recv(65536):
+                self.received += data
+
+    def close(self) -> None:
+        self.reads.set()
+        self._listening.close()
+
+
+@contextmanager
+def writing_to(broker: CountingBroker) -> Iterator[tuple[MqttClient, Callable[[], int]]]:
+    """A client that is connected for as long as the block lasts, and how often its thread was woken since."""
+    client = MqttClient(BrokerAccess("127.0.0.1", broker.port), "writer", speaks_5=False)
+    connected = threading.Event()
+    client.on_connect = lambda *_: connected.set()
+    client.connect("127.0.0.1", broker.port)
+    client.loop_start()
+    waker = client.waker
+    assert waker is not None
+    try:
+        assert connected.wait(60.0)
+        before = waker.count
+        yield client, lambda: waker.count - before
+    finally:
+        client.disconnect()
+        client.loop_stop()
+
+
+def test_what_a_thread_writes_itself_wakes_no_other_and_all_comes_in_order() -> None:
+    with closing(CountingBroker()) as broker, writing_to(broker) as (client, woken):
+        broker.reads.set()
+        for number in range(200):
+            with client.written_here():
+                client.publish("a/b", b"%03d" % number)
+        assert woken() == 0
+        sent = b"".join(publish(b"a/b", b"%03d" % number) for number in range(200))
+        assert until(lambda: bytes(broker.received) == sent, 60.0)
+        client.publish("a/b", b"by paho's thread")
+        assert woken() > 0
+        assert until(lambda: broker.received.endswith(b"by paho's thread"), 60.0)
+
+
+def test_what_the_socket_does_not_take_at_once_is_written_by_pahos_thread() -> None:
+    large = bytes(1_000_000)
+    with closing(CountingBroker()) as broker, writing_to(broker) as (client, woken):
+        for _ in range(20):
+            with client.written_here():
+                client.publish("a/b", large)
+        assert woken() > 0, "the broker does not read yet"
+        broker.reads.set()
+        assert until(lambda: len(broker.received) > 20 * len(large), 60.0)
+
+
+def test_another_threads_message_wakes_pahos_while_one_writes_itself() -> None:
+    with closing(CountingBroker()) as broker, writing_to(broker) as (client, woken):
+        broker.reads.set()
+        with client.written_here():
+            other = threading.Thread(target=lambda: client.publish("a/b", b"other"))
+            other.start()
+            other.join()
+            assert woken() > 0
+        assert until(lambda: broker.received.endswith(b"other"), 60.0)

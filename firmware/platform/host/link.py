@@ -116,10 +116,11 @@ class DeviceLink:
         if self._client.speaks_5 and kind not in self._tried:  # only for QoS 1 a broker says that its ACL denies it
             self._tried.add(kind)
             qos = 1
-        sent = self._client.publish(self._topic + kind, payload, qos=qos, retain=kind == "status")
-        if len(self._sent) >= MOST_UNANSWERED:
-            self._sent.clear()
-        self._sent[sent.mid] = kind
+        with self._client.written_here():
+            sent = self._client.publish(self._topic + kind, payload, qos=qos, retain=kind == "status")
+            if len(self._sent) >= MOST_UNANSWERED:
+                self._sent.clear()
+            self._sent[sent.mid] = kind
 
     def subscribe(self) -> None:
         """To everything that is sent to the device; once more changes nothing where the broker knows of it."""

@@ -19,6 +19,8 @@ from gemelo.services.visualizer.render.layout import ArmLayout, blueprint
 from gemelo.services.visualizer.render.recording_file import RecordingFile
 from gemelo.services.visualizer.render.sink import APPLICATION, Sink
 
+# Rerun looks 125 times a second whether there is something to send; this is half of what comes ten times a second.
+BATCHES = rr.ChunkBatcherConfig(flush_tick=0.05)  # [s] chosen
 SHARED_RECORDING = "arms-live"  # the same of every arm, or the viewer would show them one at a time
 
 
@@ -98,7 +100,7 @@ class Outputs:
 
     def _viewers_sink(self, url: str, core: Visualizer) -> Sink:
         recording_id = _own_recording(core) if self._shared is None else SHARED_RECORDING
-        stream = rr.RecordingStream(APPLICATION, recording_id=recording_id)
+        stream = rr.RecordingStream(APPLICATION, recording_id=recording_id, batcher_config=BATCHES)
         stream.connect_grpc(url)
         if self._shared is None:
             return self._own_sink(stream, core)
