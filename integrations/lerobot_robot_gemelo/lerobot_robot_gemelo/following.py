@@ -1,4 +1,4 @@
-"""An action on its way to the arm: within limits, not too far, free of collisions, the first one planned."""
+"""An action on its way to the arm: within limits, not too far, the first one planned, what is in the way said."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gemelo.schemas.reasons import because
 from .readings import Readings
 
 PAUSE = 0.5  # [s] without a target, after which the next one is the first: the gateway's stream has ended by then
-WARN_EVERY = 1.0  # [s] between two warnings about targets that were not sent
+WARN_EVERY = 1.0  # [s] between two warnings about what is in the way
 
 log = logging.getLogger("lerobot_robot_gemelo")
 
@@ -58,7 +58,9 @@ class Follower:
             self._go_near(at, wanted)
             at = self._arm.joints  # after the move
         target = self._free({name: self._bounded(name, value, at[name]) for name, value in wanted.items()}, at)
-        self._arm.stream(target)
+        status = self._arm.stream(target)
+        if status is not None and status.limited_by:
+            self._warn("the arm stops before its target", status.why or status.limited_by)
         self._note(target)
         return target
 
@@ -87,11 +89,14 @@ class Follower:
         try:
             self._arm.check(target)
         except gemelo.Refused as refused:
-            if self._now() - self._warned_at > WARN_EVERY:
-                self._warned_at = self._now()
-                log.warning("a target was not sent: %s", refused)
+            self._warn("a target was not sent", refused)
             return {name: self._sent.get(name, at[name]) for name in target}
         return target
+
+    def _warn(self, what: str, why: object) -> None:
+        if self._now() - self._warned_at > WARN_EVERY:
+            self._warned_at = self._now()
+            log.warning("%s: %s", what, why)
 
     def _note(self, target: dict[str, float]) -> None:
         self._sent_at = self._now()
