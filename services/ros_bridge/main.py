@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.runtime.application import service
@@ -31,7 +30,7 @@ def run(node: Node, deployment: Deployment) -> None:
     name = NodeName(section.node, section.namespace.strip("/"), section.domain)
     ros = RosNode(section.router, name, node.post, node.clock)
     node.at_end(ros.close)
-    topics = Topics(node, ros, section, Path(arm.folder))
+    topics = Topics(node, ros, section, arm)
     node.at_end(topics.close)
     serve_triggers(node, ros, section.motion)
     if section.motion:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, Protocol
 
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.ros2 import messages
+from gemelo.libraries.ros2.markers import MARKERS, path_markers, scene_markers
 from gemelo.libraries.ros2.types import encode, ros_type
 from gemelo.libraries.runtime.node import Node
 from gemelo.libraries.runtime.ros_wire.names import DEFAULT, LATCHED, Qos, RosType
@@ -14,7 +15,9 @@ from gemelo.libraries.runtime.ros_wire.ros_node import RosPublication
 from gemelo.schemas.deployment import RosMeshes, RosSection
 from gemelo.schemas.frames import FrameTransforms, RobotDescription
 from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import PlannedPath
 from gemelo.schemas.reasons import Reason
+from gemelo.schemas.scene import PlanningScene
 from gemelo.schemas.system import LogRecord
 from gemelo.schemas.topics import (
     DESCRIPTION,
@@ -23,6 +26,8 @@ from gemelo.schemas.topics import (
     FRAMES,
     JOINT_STATES,
     LOG,
+    PLANNED_PATH,
+    SCENE,
     STATIC_FRAMES,
     STEP_ERRORS,
 )
@@ -43,10 +48,10 @@ class Publishing(Protocol):
 class Topics:
     """Everything that the bridge publishes of its own accord."""
 
-    def __init__(self, node: Node, ros: Publishing, section: RosSection, robot_folder: Path) -> None:
+    def __init__(self, node: Node, ros: Publishing, section: RosSection, arm: ArmDescription) -> None:
         self._node, self._section = node, section
         self._prefix = f"{section.namespace}/" if section.namespace else ""
-        self._folder = robot_folder
+        self._folder, self._base = arm.folder, arm.base_frame
         self._meshes: MeshServer | None = None
         self.refusal: Reason | None = None  # of the last goal of ROS, where it was refused
         self._joint_states = ros.publisher("joint_states", ros_type(JOINTS))
@@ -54,6 +59,8 @@ class Topics:
         self._tf_static = ros.publisher("/tf_static", ros_type(TRANSFORMS), LATCHED)
         self._description = ros.publisher("robot_description", ros_type(STRING), LATCHED)
         self._semantic = ros.publisher("robot_description_semantic", ros_type(STRING), LATCHED)
+        self._scene = ros.publisher("~/scene", ros_type(MARKERS), LATCHED)
+        self._path = ros.publisher("~/planned_path", ros_type(MARKERS), LATCHED)
         self._diagnostics = ros.publisher("/diagnostics", ros_type("diagnostic_msgs/msg/DiagnosticArray"))
         self._rosout = ros.publisher("/rosout", ros_type("rcl_interfaces/msg/Log"), LOG_QOS)
         self._status, self._state = node.latest(DEVICE_STATUS), node.latest(DEVICE_STATE, on_demand=True)
@@ -64,6 +71,8 @@ class Topics:
         node.subscribe(FRAMES, self._on_frames)
         node.subscribe(STATIC_FRAMES, self._on_static_frames)
         node.subscribe(DESCRIPTION, self._on_description)
+        node.subscribe(SCENE, self._on_scene)
+        node.subscribe(PLANNED_PATH, self._on_path)
         node.subscribe(LOG, self._on_log, own=True)
 
     def publish_diagnostics(self) -> None:
@@ -107,6 +116,12 @@ class Topics:
         server, self._meshes = self._meshes, None
         if server is not None:
             server.close()
+
+    def _on_scene(self, scene: PlanningScene) -> None:
+        self._put(self._scene, scene_markers(scene, self._base, self._prefix), self._node.now())
+
+    def _on_path(self, path: PlannedPath) -> None:
+        self._put(self._path, path_markers(path, self._base, self._prefix), self._node.now())
 
     def _on_log(self, record: LogRecord) -> None:
         if record.level >= RELEVANT:

@@ -31,6 +31,9 @@ def test_rviz_shows_the_description_in_the_arm_s_base_frame(rm1: ArmDescription)
     assert found["Global Options"]["Fixed Frame"] == rm1.base_frame
     topic = next(each["Description Topic"] for each in found["Displays"] if "Description Topic" in each)
     assert (topic["Value"], topic["Durability Policy"]) == ("/robot_description", "Transient Local")
+    assert {each["Topic"]["Value"] for each in found["Displays"] if "Topic" in each} == {
+        f"/{RosSection().node}/{name}" for name in ("scene", "planned_path")
+    }
 
 
 def test_the_launch_file_starts_rviz_on_the_router_of_ros() -> None:

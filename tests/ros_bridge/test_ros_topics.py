@@ -17,6 +17,7 @@ from msgspec.structs import replace
 
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.ros2 import messages
+from gemelo.libraries.ros2.markers import MARKERS
 from gemelo.libraries.ros2.types import HASHES, ros_type
 from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.deployment import RosMeshes
@@ -30,9 +31,19 @@ from gemelo.schemas.device import (
     StopKind,
 )
 from gemelo.schemas.errors import ConfigurationError
-from gemelo.schemas.frames import FrameTransform, FrameTransforms
+from gemelo.schemas.frames import FrameTransform, FrameTransforms, Transform
 from gemelo.schemas.joints import JointState
+from gemelo.schemas.planning import PlannedPath
 from gemelo.schemas.reasons import because, remedy
+from gemelo.schemas.scene import (
+    BoxShape,
+    CylinderShape,
+    MeshShape,
+    PlaneShape,
+    PlanningScene,
+    SceneObject,
+    SphereShape,
+)
 from gemelo.schemas.topics import (
     DESCRIPTION,
     DEVICE_COMMAND,
@@ -40,6 +51,8 @@ from gemelo.schemas.topics import (
     DEVICE_STOP,
     FRAMES,
     JOINT_STATES,
+    PLANNED_PATH,
+    SCENE,
     STATIC_FRAMES,
 )
 from gemelo.services.ros_bridge.main import require_usable
@@ -48,6 +61,7 @@ from tests.ros_bridge.bridges import Bridge, running
 from tests.ros_bridge.ros_client import RosClient, comes
 from tests.runtime.support import hear, until
 
+MARKED = {"%gemelo%scene", "%gemelo%planned_path"}
 TRIGGER = "std_srvs/srv/Trigger"
 PARAMETERS = "rcl_interfaces/srv"
 STATE = JointState(stamp=1_700_000_000_123_456_789, name=("a", "b"), position=(0.5, -1.0), velocity=(0.0, 0.1))
@@ -75,7 +89,7 @@ def test_everything_that_ros_lists_is_there_by_its_token(bridge: Bridge) -> None
     assert f"{start}/1/MP/%/%/gemelo/%joint_states/{joints}" in tokens
     publishers = {each.split("/")[9]: each.split("/")[12] for each in tokens if "/MP/" in each}
     latched = {name for name, qos in publishers.items() if qos.startswith(":1:")}
-    assert latched == {"%tf_static", "%robot_description", "%robot_description_semantic", "%rosout"}
+    assert latched == {"%tf_static", "%robot_description", "%robot_description_semantic", "%rosout", *MARKED}
     assert publishers["%tf"] == "::,100:,:,:,,"
     services = {each.split("/")[9] for each in tokens if "/SS/" in each}
     assert {f"%gemelo%{name}" for name in ("stop", "hold", "resume", "reset", "list_parameters")} <= services
@@ -137,6 +151,30 @@ def test_meshes_are_files_of_this_host_or_as_the_arm_has_them(
         publisher.publisher(DESCRIPTION).put(describe(rm1))
         urdf = comes(bridge.client.subscribe("/robot_description", "std_msgs/msg/String", latched=True)).data
     assert f'filename="{begin}' in urdf
+
+
+def test_the_scene_and_the_planned_path_are_markers_for_late_joiners(bridge: Bridge) -> None:
+    pose = Transform(translation=(0.1, 0.2, 0.3))
+    scene = PlanningScene(objects=(
+        SceneObject(name="wall", shape=BoxShape(size=(0.1, 0.2, 0.3)), pose=pose),
+        SceneObject(name="ball", shape=SphereShape(radius=0.05), frame="tool_link", attached=True),
+        SceneObject(name="mesh", shape=MeshShape(path="a.stl")),
+        SceneObject(name="floor", shape=PlaneShape()),
+        SceneObject(name="pole", shape=CylinderShape(radius=0.02, length=0.5)),
+    ))  # fmt: skip
+    points = ((0.0, 0.0, 0.0), (0.1, 0.0, 0.2))
+    with bridge.node("planner") as planner:
+        planner.publisher(SCENE).put(scene)
+        planner.publisher(PLANNED_PATH).put(PlannedPath(points=points))
+        drawn = comes(bridge.client.subscribe("/gemelo/scene", MARKERS, latched=True)).markers
+        line = comes(bridge.client.subscribe("/gemelo/planned_path", MARKERS, latched=True)).markers
+    assert [(each.action, each.type, each.text) for each in drawn] == [
+        (3, 1, ""), (0, 1, "wall"), (0, 2, "ball"), (0, 1, "floor"), (0, 3, "pole"),
+    ]  # fmt: skip
+    wall, ball, pole = drawn[1], drawn[2], drawn[4]
+    assert (wall.header.frame_id, wall.scale.y, wall.pose.position.z) == ("base_link", 0.2, 0.3)
+    assert (ball.header.frame_id, ball.scale.x, pole.scale.z) == ("tool_link", 0.1, 0.5)
+    assert [(each.x, each.y, each.z) for each in line[1].points] == list(points)
 
 
 def test_moving_frames_go_out_on_tf(bridge: Bridge) -> None:

@@ -12,6 +12,7 @@ from mcap_ros2.writer import Writer
 from rosbags.interfaces import Nodetype
 
 from gemelo.libraries.ros2 import messages
+from gemelo.libraries.ros2.markers import path_markers
 from gemelo.libraries.ros2.types import (
     ACTIONS,
     FOLLOW,
@@ -36,6 +37,7 @@ from gemelo.schemas.motion import (
     JointTrajectory,
     TrajectoryPoint,
 )
+from gemelo.schemas.planning import PlannedPath
 from gemelo.schemas.system import LogLevel
 from gemelo.services.ros_bridge import core
 from gemelo.services.ros_bridge.parameters import value_of
@@ -127,6 +129,7 @@ SAMPLES = {
     "diagnostics": messages.diagnostics(1, "rm1", DeviceStatus(online=True), DeviceState(), None, None),
     "feedback": core.follow_feedback(bytes(range(16)), PROGRESS, ControlMsgs.JAZZY).feedback,
     "goal": ros_goal(GOAL),
+    "markers": path_markers(PlannedPath(points=((0.0, 1.0, 2.0),)), "base"),
     "result": core.lost_result("gone"),
     "parameters": make(
         "rcl_interfaces/srv/GetParameters_Response", values=[value_of(each) for each in (True, 1, 2.5, "x", ("y", "z"))]
