@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 from gemelo.libraries.arm.interpolation import TrajectorySampler
 from gemelo.libraries.arm.model.description import Joint
+from gemelo.schemas.message import Vector
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.services.stepper_gateway.goals.limit_checks import Samples, path_within, points_within
 from gemelo.services.stepper_gateway.goals.pieces import PIECE, Part, Pieces
@@ -19,14 +20,19 @@ from gemelo.services.stepper_gateway.parameters import GatewayParameters
 
 
 class GoalChecks:
-    """Those of one goal with these parameters."""
+    """Those of one goal with these parameters; joints that it does not name stay at `hold` (n,) [rad] or [m]."""
 
     def __init__(
-        self, goal: FollowJointTrajectoryGoal, joints: tuple[Joint, ...], parameters: GatewayParameters, tick_hz: int
+        self,
+        goal: FollowJointTrajectoryGoal,
+        joints: tuple[Joint, ...],
+        parameters: GatewayParameters,
+        tick_hz: int,
+        hold: Vector | None = None,
     ) -> None:
-        self.goal, self.parameters = goal, parameters
+        self.goal, self.parameters, self.hold = goal, parameters, hold
         self._joints, self._tick_hz = joints, tick_hz
-        self.form = Part(ordered_trajectory(goal.trajectory, joints))
+        self.form = Part(ordered_trajectory(goal.trajectory, joints, hold))
         self.points = Part(self._points())
         self._lines = Part(self._straight_lines())
         self.path = Part(self._own_path())
@@ -44,6 +50,11 @@ class GoalChecks:
         yield from self.path.go_on()
         if start is not None:
             yield from self._lead_in_part(start, 0.0).go_on()
+
+    def are_of(self, goal: FollowJointTrajectoryGoal, parameters: GatewayParameters, hold: Vector | None) -> bool:
+        """True if they are the checks of that very goal; `hold` (n,) [rad] or [m] counts where it names some joints."""
+        is_whole = len(goal.trajectory.joint_names) == len(self._joints)
+        return self.goal is goal and self.parameters == parameters and (is_whole or self.hold == hold)
 
     @property
     def is_single_point(self) -> bool:

@@ -13,7 +13,7 @@ from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.schemas.system import LogLevel
 from gemelo.services.stepper_gateway.device.gateway_device import GatewayDevice
 from gemelo.services.stepper_gateway.goals.active_goal import ActiveGoal, GoalEnding
-from gemelo.services.stepper_gateway.goals.goal_validator import GoalValidator, ValidatedGoal
+from gemelo.services.stepper_gateway.goals.goal_validator import GoalValidator, MotionStart, ValidatedGoal
 from gemelo.services.stepper_gateway.goals.next_goal import CANCELED, NextGoal
 from gemelo.services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from gemelo.services.stepper_gateway.goals.scene_versions import PlannedIn, SceneVersions
@@ -82,10 +82,8 @@ class GoalExecutor:
     def prepare(self, goal: FollowJointTrajectoryGoal, moment: Moment) -> Iterator[None]:
         """Checks ahead, in pieces, what `accept` finds done then; it decides the same without."""
         start = None
-        if goal.after and self._current is not None:
-            start = NextGoal.start_of(self._current).start
-        elif not self._device.refusal(moment, self._controller.comes_to_rest()):
-            start = self._controller.motion_start(moment).start
+        if self._is_next(goal) or not self._device.refusal(moment, self._controller.comes_to_rest()):
+            start = self._start_of(goal, moment).start
         yield from self._validator.prepare(goal, start, self._device.parameters)
 
     def accept(self, goal_id: str, goal: FollowJointTrajectoryGoal, moment: Moment) -> GoalVerdict:
@@ -97,7 +95,8 @@ class GoalExecutor:
             if self._current is not None and self._current.ending is not None:
                 raise invalid(because("goal.decelerating", remedy("wait_for_rest")))
             self.scenes.require_newest(PlannedIn.of(goal))
-            checked = self._validator.check(goal, moment.unix, self._device.parameters)
+            hold = self._start_of(goal, moment).start.position
+            checked = self._validator.check(goal, moment.unix, self._device.parameters, hold)
             checked = checked.with_more_time(self._device.settling_time)
             if goal.after and (present := self._next.require_place(checked, self._current, goal.after)) is not None:
                 return self._accept_next(goal_id, checked, present, moment)
@@ -111,6 +110,16 @@ class GoalExecutor:
             self._waiting.accepted_from = motion_start
         self._start_waiting(moment, path)
         return GoalVerdict(True)
+
+    def _is_next(self, goal: FollowJointTrajectoryGoal) -> bool:
+        """True if it is to begin where the present one ends."""
+        return bool(goal.after) and self._current is not None
+
+    def _start_of(self, goal: FollowJointTrajectoryGoal, moment: Moment) -> MotionStart:
+        """From where its path would begin."""
+        if goal.after and self._current is not None:
+            return NextGoal.start_of(self._current)
+        return self._controller.motion_start(moment)
 
     def cancel(self, goal_id: str, moment: Moment) -> Reason | None:
         """Decelerate; None, or why there is nothing to cancel."""

@@ -80,25 +80,30 @@ class GoalValidator:
 
         Whatever they find, done or not, they decide the same.
         """
-        checks = GoalChecks(goal, self._joints, parameters, self._tick_hz)
+        checks = GoalChecks(goal, self._joints, parameters, self._tick_hz, None if start is None else start.position)
         yield from checks.pieces(start)
         self._prepared = checks
 
-    def check(self, goal: FollowJointTrajectoryGoal, now: int, parameters: GatewayParameters) -> ValidatedGoal:
-        """What does not depend on where the arm is; `now` in ns UNIX; raises `GoalRejected`."""
+    def check(
+        self, goal: FollowJointTrajectoryGoal, now: int, parameters: GatewayParameters, hold: Vector | None = None
+    ) -> ValidatedGoal:
+        """What does not depend on where the arm is, but for the joints that the goal does not name: they stay at `hold`
+        (n,) [rad] or [m]. `now` in ns UNIX; raises `GoalRejected`."""
         path_bounds, end_bounds = tolerances(goal, self._joints, parameters.tolerance_factor)
         late = time_tolerance(goal, parameters.goal_time_tolerance)
-        checks = self._checks_of(goal, parameters)
+        checks = self._checks_of(goal, parameters, hold)
         trajectory = checks.form.result()
         _require_time_ahead(trajectory, now)
         checks.points.result()
         return ValidatedGoal(trajectory, path_bounds, end_bounds, late, PlannedIn.of(goal), checks)
 
-    def _checks_of(self, goal: FollowJointTrajectoryGoal, parameters: GatewayParameters) -> GoalChecks:
+    def _checks_of(
+        self, goal: FollowJointTrajectoryGoal, parameters: GatewayParameters, hold: Vector | None
+    ) -> GoalChecks:
         prepared, self._prepared = self._prepared, None
-        if prepared is not None and prepared.goal is goal and prepared.parameters == parameters:
+        if prepared is not None and prepared.are_of(goal, parameters, hold):
             return prepared
-        return GoalChecks(goal, self._joints, parameters, self._tick_hz)
+        return GoalChecks(goal, self._joints, parameters, self._tick_hz, hold)
 
     def path(
         self, goal: ValidatedGoal, motion_start: MotionStart, now: int, parameters: GatewayParameters
@@ -107,7 +112,11 @@ class GoalValidator:
         trajectory = goal.trajectory
         offset = max(0.0, (now - trajectory.stamp) * 1e-9) if trajectory.stamp else 0.0
         start = motion_start.start
-        checks = goal.checks if goal.checks.parameters == parameters else self._checks_of(goal.checks.goal, parameters)
+        checks = (
+            goal.checks
+            if goal.checks.parameters == parameters
+            else self._checks_of(goal.checks.goal, parameters, goal.checks.hold)
+        )
         if checks.is_single_point:
             return self._single_point(trajectory.points[0], start, offset)
         path = checks.path_from(start, offset)

@@ -24,28 +24,31 @@ REST = 1e-6  # [rad/s] or [m/s] that a final velocity may be off zero; chosen: f
 MAX_DURATION = 3600.0  # [s] chosen: an hour; longer work is several goals
 
 
-def ordered_trajectory(trajectory: JointTrajectory, joints: tuple[Joint, ...]) -> Pieces[JointTrajectory]:
-    """The trajectory with its columns in the arm's order; raises `GoalRejected`."""
-    require_names(trajectory.joint_names, joints)
+def ordered_trajectory(
+    trajectory: JointTrajectory, joints: tuple[Joint, ...], hold: Vector | None = None
+) -> Pieces[JointTrajectory]:
+    """The trajectory with its columns in the arm's order; joints that it does not name stay at `hold` (n,) [rad] or
+    [m], where that is known. Raises `GoalRejected`."""
+    require_names(trajectory.joint_names, joints, hold is not None)
     yield from _require_points(trajectory)
     names = tuple(joint.name for joint in joints)
     if trajectory.joint_names != names:
-        order = [trajectory.joint_names.index(name) for name in names]
+        order = [_index(trajectory.joint_names, name) for name in names]
         points = []
         for begin in range(0, len(trajectory.points), PIECE):
-            points += [_reordered(point, order) for point in trajectory.points[begin : begin + PIECE]]
+            points += [_reordered(point, order, hold or ()) for point in trajectory.points[begin : begin + PIECE]]
             yield
         trajectory = JointTrajectory(stamp=trajectory.stamp, joint_names=names, points=tuple(points))
     _require_rest_at_end(trajectory.points[-1], joints)
     return trajectory
 
 
-def require_names(names: tuple[str, ...], joints: tuple[Joint, ...]) -> None:
-    """Every joint of the arm exactly once."""
+def require_names(names: tuple[str, ...], joints: tuple[Joint, ...], may_hold: bool = False) -> None:
+    """Every joint of the arm exactly once; some of them where the others `may_hold` their places."""
     require_known(names, joints)
     known = [joint.name for joint in joints]
     missing = [name for name in known if name not in names]
-    if missing:
+    if missing and not (names and may_hold):
         raise invalid_joints(because("goal.joints.missing", joints=tuple(missing), known=tuple(known)))
 
 
@@ -168,11 +171,22 @@ def _require_times(times: list[float]) -> Pieces[None]:
         raise invalid(because("goal.time.too_long", parts, time=times[-1], limit=MAX_DURATION))
 
 
-def _reordered(point: TrajectoryPoint, order: list[int]) -> TrajectoryPoint:
+def _index(names: tuple[str, ...], name: str) -> int | None:
+    return names.index(name) if name in names else None
+
+
+def _reordered(point: TrajectoryPoint, order: list[int | None], hold: Vector) -> TrajectoryPoint:
+    """The columns in `order`; a joint of which there is none stands at its place in `hold`."""
+
+    def row(values: Vector, others: Vector) -> Vector:
+        columns = enumerate(order)
+        return tuple(others[at] if index is None else values[index] for at, index in columns) if values else ()
+
+    zeros = (0.0,) * len(order)
     return TrajectoryPoint(
-        positions=tuple(point.positions[i] for i in order),
-        velocities=tuple(point.velocities[i] for i in order) if point.velocities else (),
-        accelerations=tuple(point.accelerations[i] for i in order) if point.accelerations else (),
+        positions=row(point.positions, hold),
+        velocities=row(point.velocities, zeros),
+        accelerations=row(point.accelerations, zeros),
         time_from_start=point.time_from_start,
     )
 
