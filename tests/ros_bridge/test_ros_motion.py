@@ -14,7 +14,7 @@ from gemelo.libraries.ros2.types import FOLLOW, GRIPPER, ControlMsgs, make, ros_
 from gemelo.schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from gemelo.schemas.topics import DEVICE_SHAFT
 from gemelo.services.ros_bridge.core import uuid_of
-from tests.ros_bridge.ros_goals import ros_goal
+from tests.ros_bridge.ros_goals import quintic, ros_goal
 from tests.ros_bridge.twins import ACTION, RosTwin, client_token, ros_twin, uuid
 
 FEEDBACK = f"{FOLLOW}_FeedbackMessage"
@@ -190,25 +190,10 @@ def test_a_joint_of_several_degrees_of_freedom_is_refused(ros: RosTwin) -> None:
     assert not answer.accepted
 
 
-def like_moveit(ros: RosTwin, name: str, seconds: float = 6.0, count: int = 30) -> FollowJointTrajectoryGoal:
-    """`count` points of a quintic polynomial of so many `seconds` [s], with velocities and accelerations."""
-    start = ros.twin.arm.joint_names, tuple(at(ros)[each] for each in ros.twin.arm.joint_names)
-    way = [b - a for a, b in zip(start[1], ros.twin.arm.named_states[name], strict=True)]
-
-    def point(share: float) -> TrajectoryPoint:
-        u = share
-        position = 10 * u**3 - 15 * u**4 + 6 * u**5
-        velocity = (30 * u**2 - 60 * u**3 + 30 * u**4) / seconds
-        acceleration = (60 * u - 180 * u**2 + 120 * u**3) / seconds**2
-        return TrajectoryPoint(
-            positions=tuple(a + d * position for a, d in zip(start[1], way, strict=True)),
-            velocities=tuple(d * velocity for d in way),
-            accelerations=tuple(d * acceleration for d in way),
-            time_from_start=seconds * u,
-        )
-
-    points = tuple(point(index / (count - 1)) for index in range(count))
-    return FollowJointTrajectoryGoal(trajectory=JointTrajectory(joint_names=start[0], points=points))
+def like_moveit(ros: RosTwin, name: str) -> FollowJointTrajectoryGoal:
+    """Thirty points of six seconds, with velocities and accelerations."""
+    names = ros.twin.arm.joint_names
+    return quintic(names, tuple(at(ros)[each] for each in names), ros.twin.arm.named_states[name], 6.0, 30)
 
 
 @pytest.mark.parametrize(("robot", "target"), [("rm1", "left"), ("parol6", "ready")])
