@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from math import isfinite
+from typing import Any
 
 import msgspec
 
 from gemelo.schemas.message import Message
 from gemelo.schemas.reasons.sentences import PLAIN, Value, say
+
+OWN = frozenset((float, int, str, bool))
 
 
 class Remedy(Message, frozen=True, kw_only=True):
@@ -51,11 +54,11 @@ def _require_finite(values: dict[str, Value]) -> None:
 def because(code: str, /, *parts: Reason | Remedy, **values: Value) -> Reason:
     """The reason `code` with its values, the reasons behind it and what would do.
 
-    A number that is not finite goes along as its word.
+    A number that is not finite goes along as its word, and one of numpy's as Python's own.
     """
     causes = tuple(part for part in parts if isinstance(part, Reason))
     remedies = tuple(part for part in parts if isinstance(part, Remedy))
-    return Reason(code=code, values=_finite(values), causes=causes, remedies=remedies)
+    return Reason(code=code, values=_sendable(values), causes=causes, remedies=remedies)
 
 
 def plain(text: str) -> Reason:
@@ -65,11 +68,21 @@ def plain(text: str) -> Reason:
 
 def remedy(code: str, /, **values: Value) -> Remedy:
     """The remedy `code` with its values."""
-    return Remedy(code=code, values=_finite(values))
+    return Remedy(code=code, values=_sendable(values))
 
 
-def _finite(values: dict[str, Value]) -> dict[str, Value]:
+def _sendable(values: dict[str, Value]) -> dict[str, Value]:
+    """With Python's own numbers in the place of numpy's, which no message takes, and words in that of infinite ones."""
     for name, value in values.items():
-        if type(value) is float and not isfinite(value):
-            values[name] = str(value)
+        if type(value) is tuple:
+            values[name] = tuple(_own(each) for each in value)
+        elif type(value) is dict:
+            values[name] = {key: _own(each) for key, each in value.items()}
+        elif type(value) is not str:
+            own = _own(value)
+            values[name] = own if type(own) is not float or isfinite(own) else str(own)
     return values
+
+
+def _own(value: Any) -> Any:
+    return value if type(value) in OWN or not hasattr(value, "item") else value.item()

@@ -8,7 +8,10 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
+from typing import Any
 
+import msgspec
+import numpy as np
 import polib
 import pytest
 
@@ -62,6 +65,18 @@ def places(template: str) -> set[str]:
     for _, name, spec, _ in string.Formatter().parse(template):
         found |= ({name} if name else set()) | (places(spec) if spec else set())
     return found
+
+
+def test_numbers_of_numpy_go_along_as_pythons_own() -> None:
+    values: dict[str, Any] = {
+        "value": np.float64(1.5), "count": np.int64(3), "is_on": np.bool_(True), "far": np.float64(np.inf),
+        "pair": (np.float64(0.25), "rad"), "joints": {"brazo_joint": np.float32(0.5)},
+    }  # fmt: skip
+    own = {"value": 1.5, "count": 3, "is_on": True, "far": "inf", "pair": (0.25, "rad"), "joints": {"brazo_joint": 0.5}}
+    for made in (because("a.code", **values), remedy("a_remedy", **values)):
+        assert made.values == own
+        assert {type(each) for each in made.values.values()} == {float, int, bool, str, tuple, dict}
+        assert msgspec.json.decode(msgspec.json.encode(made.values)) == {**own, "pair": [0.25, "rad"]}
 
 
 def test_every_code_that_is_raised_is_in_the_catalogue():
