@@ -7,13 +7,26 @@ from dataclasses import dataclass, field, replace
 
 from gemelo.api.arm import Arm
 from gemelo.api.errors import BadArgument, Refused
+from gemelo.programs.demonstrations import demonstrations_of, require_free, require_same_arm
 from gemelo.programs.meaning import find_mistakes
-from gemelo.programs.mistakes import Mistake
+from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.planning import plan_leg
 from gemelo.programs.points import Point
 from gemelo.programs.program import Program
 from gemelo.programs.sequence import Leg, legs_of, lost_blend
-from gemelo.programs.steps import Attach, Detach, Grip, MotionStep, Pick, StepPath, Wait, WaitFor, path_text, words_of
+from gemelo.programs.steps import (
+    Attach,
+    Detach,
+    Grip,
+    MotionStep,
+    Pick,
+    Play,
+    StepPath,
+    Wait,
+    WaitFor,
+    path_text,
+    words_of,
+)
 from gemelo.schemas.reasons import Reason, because
 
 SAME = 1e-6  # [rad] or [m] between two states that are one
@@ -169,6 +182,8 @@ class _Check:
         if not leg.is_motion:
             if isinstance(step, Pick):
                 return self._picked(step, made), None
+            if isinstance(step, Play):
+                return self._played(step, made)
             if isinstance(step, Attach | Detach | Grip):
                 self._scene_note = because("program.check.scene_as_now", step=path_text(leg.path), text=text)
             return replace(made, duration=step.time if isinstance(step, Wait) else 0.0), self._joints
@@ -185,6 +200,19 @@ class _Check:
             planning_time=plan.planning_time,
         )
         return done, plan.end
+
+    def _played(self, step: Play, made: CheckedLeg) -> tuple[CheckedLeg, Mapping[str, float] | None]:
+        """The way to where a demonstration begins is planned, and the demonstration held against the scene."""
+        try:
+            shown = demonstrations_of(self._arm).require(step.demonstration)
+            require_same_arm(self._arm, shown)
+            require_free(self._arm, shown)
+            way = self._arm.plan(joints=shown.start, from_joints=self._joints)
+        except (Refused, BadArgument, ProgramError) as error:
+            if not isinstance(error, Refused):
+                error = Refused(str(error), check="demonstration", subject=step.demonstration, reason=error.reason)
+            return replace(made, refusal=error), None
+        return replace(made, duration=way.duration + shown.duration / step.share), shown.end
 
     def _picked(self, step: Pick, made: CheckedLeg) -> CheckedLeg:
         """A pick is planned when its thing is seen; whether the cell has thing and place is known now."""

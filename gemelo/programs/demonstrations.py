@@ -18,8 +18,10 @@ from gemelo.api.planning import Plan
 from gemelo.api.whole_files import write_whole
 from gemelo.libraries.arm.errors import nearest
 from gemelo.libraries.arm.model.description import ArmDescription
+from gemelo.programs.folder import programs_folder
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import checked_folder, program_name
+from gemelo.programs.values import FASTEST_PLAYED
 from gemelo.schemas.actions import GoalStatusCode
 from gemelo.schemas.gripper import GripperState
 from gemelo.schemas.joints import JointState
@@ -36,7 +38,6 @@ SLOWER = 0.95  # of the speed at most, where samples are beyond a limit by their
 REST = 0.1  # [s] chosen: of standing that is kept before the first motion and after the last
 GRIPPED = 0.001  # [m] by which a target of the gripper is a new one
 LOOKED_AT = 0.1  # [s] between two samples that are checked for collisions before they are played
-FASTEST = 10.0  # times as fast as it was shown
 
 Values = tuple[float, ...]
 
@@ -128,6 +129,11 @@ class Demonstrations(Mapping[str, Demonstration]):
         return file
 
 
+def demonstrations_of(arm: Arm) -> Demonstrations:
+    """Those in the arm's folder of programs."""
+    return Demonstrations(programs_folder(arm), arm.description)
+
+
 def record_demonstration(arm: Arm, is_over: Callable[[], bool], timeout: float | None = None) -> Demonstration:
     """What the arm is asked for until `is_over()`, or for `timeout` [s], without the rests at both ends.
 
@@ -203,12 +209,13 @@ def play_demonstration(
 
     Its samples are checked against arm and scene before. Raises `Refused`, `Aborted`, `Lost` or `BadArgument`.
     """
-    if not 0.0 < speed <= FASTEST:
-        raise BadArgument(because("demonstration.speed", value=speed, most=FASTEST))
-    if demonstration.robot != arm.name:
-        raise BadArgument(because("demonstration.robot", robot=demonstration.robot, present=arm.name))
+    if not 0.0 < speed <= FASTEST_PLAYED:
+        raise BadArgument(because("demonstration.speed", value=speed, most=FASTEST_PLAYED))
+    require_same_arm(arm, demonstration)
     require_free(arm, demonstration)
-    arm.move(joints=demonstration.start)
+    there = _followed(arm, arm.start(joints=demonstration.start), is_cancelled)
+    if is_cancelled():
+        return there
     motion = arm.start(plan_of(demonstration, within_limits(demonstration, arm.description, speed)))
     try:
         for time, opening in demonstration.gripper:
@@ -216,11 +223,26 @@ def play_demonstration(
             if is_cancelled() or (motion.is_over and motion.status is not GoalStatusCode.SUCCEEDED):
                 break
             arm.grip(opening, is_cancelled=is_cancelled)
+    except BaseException:
+        motion.cancel()
+        raise
+    return _followed(arm, motion, is_cancelled)
+
+
+def _followed(arm: Arm, motion: Motion, is_cancelled: Callable[[], bool]) -> Motion:
+    """To its end; where it is cancelled the arm decelerates, and `Canceled` is raised."""
+    try:
         arm.wait_for(lambda: motion.is_over or is_cancelled())
     finally:
         if not motion.is_over:
             motion.cancel()
     return motion.wait()
+
+
+def require_same_arm(arm: Arm, demonstration: Demonstration) -> None:
+    """Raises `BadArgument` for a demonstration of another arm."""
+    if demonstration.robot != arm.name:
+        raise BadArgument(because("demonstration.robot", robot=demonstration.robot, present=arm.name))
 
 
 def within_limits(demonstration: Demonstration, robot: ArmDescription, speed: float) -> float:

@@ -13,10 +13,11 @@ from gemelo.api.arm import Arm
 from gemelo.api.errors import Aborted, Error, Refused
 from gemelo.api.motion import Motion
 from gemelo.api.planning import Plan
+from gemelo.programs.demonstrations import demonstrations_of, play_demonstration
 from gemelo.programs.planning import plan_leg
 from gemelo.programs.points import Point
 from gemelo.programs.sequence import Leg
-from gemelo.programs.steps import Attach, Detach, Grip, Output, Pick, Wait, WaitFor
+from gemelo.programs.steps import Attach, Detach, Grip, Output, Pick, Play, Wait, WaitFor
 from gemelo.schemas.motion import FollowErrorCode
 from gemelo.schemas.reasons import Reason, because
 
@@ -117,6 +118,9 @@ class Execution:
             case Pick():
                 stopped = self._controls.stop.is_set
                 self._arm.pick(step.thing, to=step.place, camera=step.camera, is_cancelled=stopped)
+            case Play():
+                shown = demonstrations_of(self._arm).require(step.demonstration)
+                play_demonstration(self._arm, shown, step.share, self._controls.stop.is_set)
             case Wait():
                 self._arm.wait_for(self._controls.stop.is_set, step.time)
             case WaitFor():
@@ -224,7 +228,7 @@ class Execution:
     def _upcoming(self) -> Leg | None:
         for index in range(LOOK_AHEAD):
             leg = self._peek(index)
-            if leg is None or isinstance(leg.steps[0], Attach | Detach | Grip | Pick):
+            if leg is None or isinstance(leg.steps[0], Attach | Detach | Grip | Pick | Play):
                 return None
             if leg.is_motion:
                 return leg

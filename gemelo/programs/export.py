@@ -1,4 +1,4 @@
-"""A program as a Python script on `gemelo`, which runs by itself and needs none of the program's files."""
+"""A program as a Python script on `gemelo`, which runs by itself and needs no file but those of demonstrations."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from gemelo.programs.steps import (
     MotionStep,
     Output,
     Pick,
+    Play,
     Repeat,
     Speed,
     Wait,
@@ -43,6 +44,7 @@ WAIT_FOR = '''def wait_for(
             raise SystemExit(f"sensor {sensor} reads {value} after {timeout:g} s, not above {above} or below {below}")
         time.sleep(0.05)
 '''
+PLAYED = "from gemelo.programs.demonstrations import demonstrations_of, play_demonstration\n"
 INDENT = "    "
 
 
@@ -77,7 +79,10 @@ class _Script:
     def _head(self) -> str:
         said = f"Program {self._name}, written by `gemelo program export`; m, rad, s."
         needs_time = any(isinstance(step, Wait | WaitFor) for step in self._steps)
-        return f'"""{_in_docstring(said)}"""\n\n' + ("import time\n\n" if needs_time else "") + "import gemelo\n"
+        played = PLAYED if any(isinstance(step, Play) for step in self._steps) else ""
+        return (
+            f'"""{_in_docstring(said)}"""\n\n' + ("import time\n\n" if needs_time else "") + "import gemelo\n" + played
+        )
 
     def _table(self, names: list[str]) -> Iterator[str]:
         yield "POINTS: dict[str, dict[str, float]] = {  # [rad] or [m] by joint"
@@ -119,6 +124,9 @@ class _Script:
             case Pick():
                 camera = f", camera={_py(step.camera)}" if step.camera else ""
                 return f"arm.pick({_py(step.thing)}, to={_py(step.place)}{camera})"
+            case Play():
+                shown = f"demonstrations_of(arm).require({_py(step.demonstration)})"
+                return f"play_demonstration(arm, {shown}, {step.share!r})"
             case Wait():
                 return f"time.sleep({step.time!r})"
             case WaitFor():

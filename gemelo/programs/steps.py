@@ -105,6 +105,13 @@ class Detach(Step, frozen=True, kw_only=True, tag="detach"):
     object: str
 
 
+class Play(Step, frozen=True, kw_only=True, tag="play"):
+    """Goes to where a demonstration begins, and does it again."""
+
+    demonstration: str  # of `gemelo teach list`
+    share: float = 1.0  # of the speed at which it was shown, above 0; a file says it in per cent: "50%"
+
+
 class Repeat(Step, frozen=True, kw_only=True, tag="repeat"):
     """Its steps, `count` times."""
 
@@ -118,8 +125,10 @@ class Call(Step, frozen=True, kw_only=True, tag="call"):
     program: str
 
 
-AnyStep = Go | Line | Arc | Output | Grip | Pick | Wait | WaitFor | Speed | Attach | Detach | Repeat | Call
-KINDS: tuple[type[Step], ...] = (Go, Line, Arc, Output, Grip, Pick, Wait, WaitFor, Speed, Attach, Detach, Repeat, Call)
+AnyStep = Go | Line | Arc | Output | Grip | Pick | Wait | WaitFor | Speed | Attach | Detach | Play | Repeat | Call
+KINDS: tuple[type[Step], ...] = (
+    Go, Line, Arc, Output, Grip, Pick, Wait, WaitFor, Speed, Attach, Detach, Play, Repeat, Call,
+)  # fmt: skip
 GOALS = ("point", "state", "joints", "position", "offset")  # of a motion: exactly one of them
 
 

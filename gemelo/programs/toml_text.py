@@ -8,7 +8,7 @@ from decimal import Decimal
 
 import msgspec
 
-from gemelo.programs.steps import AnyStep, Repeat, Speed
+from gemelo.programs.steps import AnyStep, Play, Repeat, Speed
 
 BARE = re.compile(r"[A-Za-z0-9_-]+")
 INDENT = "  "
@@ -47,7 +47,7 @@ def _lines(steps: Iterable[AnyStep], indent: str) -> Iterable[str]:
             yield from _lines(step.steps, indent + INDENT)
             yield f"{indent}]}},"
             continue
-        if isinstance(step, Speed):
+        if isinstance(step, Play | Speed) and "share" in given:
             given["share"] = percent_text(step.share)
         yield f"{indent}{value_text(given)},"
 

@@ -8,7 +8,7 @@ from functools import partial
 
 from gemelo.api.errors import BadArgument
 from gemelo.api.targets import FASTEST, point, quaternion, turned, vector
-from gemelo.programs.steps import Arc, Line, MotionStep, Repeat, Speed, Step, Wait, WaitFor, goal_of
+from gemelo.programs.steps import Arc, Line, MotionStep, Play, Repeat, Speed, Step, Wait, WaitFor, goal_of
 from gemelo.schemas.reasons import Reason, because, remedy
 
 Wrong = tuple[str, Reason]  # the key, and what is wrong with it
@@ -18,6 +18,7 @@ MOST_ROUNDS = 1_000_000  # of a repeat
 MOST_STEPS = 2_000  # of a program, those of its repeats included
 DEEPEST = 8  # repeats within one another, and calls within one another
 WIDEST_BLEND = 1.0  # [m]
+FASTEST_PLAYED = 10.0  # times as fast as a demonstration was shown
 
 
 def wrong_values(step: Step) -> Iterator[Wrong]:
@@ -31,6 +32,9 @@ def wrong_values(step: Step) -> Iterator[Wrong]:
             yield from _wait_for(step)
         case Speed():
             yield from _share(step.share)
+        case Play():
+            if not 0.0 < step.share <= FASTEST_PLAYED:
+                yield "share", because("demonstration.speed", value=step.share, most=FASTEST_PLAYED)
         case Repeat():
             yield from _repeat(step)
         case _:

@@ -8,7 +8,17 @@ import threading
 import pytest
 
 import gemelo
-from gemelo.programs import ProgramError
+from gemelo.programs import (
+    Go,
+    Play,
+    Points,
+    Program,
+    ProgramError,
+    ProgramRun,
+    Programs,
+    check_program,
+    export_script,
+)
 from gemelo.programs.demonstrations import (
     Demonstrations,
     plan_of,
@@ -198,3 +208,52 @@ def test_the_commands_list_and_play_it(ready, tmp_path, monkeypatch):
     assert "--overwrite" in typed("teach", "record", "wave", code=ExitCode.USAGE)
     said = typed("teach", "record", "other", "--duration", "0.3", code=ExitCode.USAGE)
     assert "has not moved" in said
+
+
+@pytest.fixture
+def waving(ready, tmp_path, monkeypatch):
+    """A program that plays a demonstration, and what it is run with."""
+    monkeypatch.setattr("gemelo.programs.demonstrations.programs_folder", lambda arm: tmp_path)
+    Demonstrations(tmp_path, ready.description).save("wave", shown_by(ready, jogged))
+    ready.move(named="home")
+    steps = (Go(state="left"), Play(demonstration="wave", share=0.8), Go(state="home"))
+    Program("greet", steps).save(tmp_path)
+    programs = Programs(tmp_path)
+    return programs["greet"], Points.load(tmp_path, ready.description), programs
+
+
+def test_a_program_checks_and_plays_it_as_a_step_between_others(ready, waving, tmp_path):
+    program, points, programs = waving
+    assert 'share = "80%"' in (tmp_path / "greet.toml").read_text()
+    assert program.steps[1] == Play(demonstration="wave", share=0.8)
+    check = check_program(ready, program, points, programs)
+    assert check.ok, check.refusals
+    assert check.legs[1].duration > Demonstrations(tmp_path, ready.description)["wave"].duration / 0.8
+    run = ProgramRun(ready, program, points, programs)
+    run.start()
+    state = run.wait(120.0)
+    assert (state.status.name, state.done) == ("DONE", 3), state.message
+    assert ready.joints == pytest.approx(ready.states["home"], abs=0.01)
+    script = export_script(program, points, programs)
+    assert 'play_demonstration(arm, demonstrations_of(arm).require("wave"), 0.8)' in script
+    compile(script, "greet.py", "exec")
+
+
+def test_a_program_that_is_stopped_while_it_plays_lets_the_arm_rest(ready, waving):
+    program, points, programs = waving
+    run, states = ProgramRun(ready, program, points, programs), ready.node.latest(JOINT_STATES)
+    run.start((1,))
+    assert ready.wait_for(lambda: states.message is not None and abs(states.message.velocity[0]) > 0.1, 20.0)
+    run.stop()
+    assert run.wait(20.0).status.name == "STOPPED"
+    assert max(map(abs, ready.velocities.values())) < 1e-2
+
+
+def test_a_step_without_its_demonstration_fails_the_check_with_the_nearest_name(ready, waving):
+    _, points, programs = waving
+    program = Program("other", (Play(demonstration="wawe"),))
+    check = check_program(ready, program, points, programs)
+    assert not check.ok
+    assert check.legs[0].refusal.reason.code == "demonstration.unknown"
+    wrong = check_program(ready, Program("third", (Play(demonstration="wave", share=0.0),)), points, programs)
+    assert [each.reason.causes[0].code for each in wrong.mistakes] == ["demonstration.speed"]

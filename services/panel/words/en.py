@@ -190,6 +190,7 @@ ENGLISH: dict[str, str] = {
     "step_attach": "attach",
     "step_detach": "detach",
     "step_repeat": "repeat",
+    "step_play": "play",
     "step_call": "call a program",
     "target": "Where to",
     "through": "Through",

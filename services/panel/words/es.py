@@ -190,6 +190,7 @@ SPANISH: dict[str, str] = {
     "step_attach": "sujetar",
     "step_detach": "soltar",
     "step_repeat": "repetir",
+    "step_play": "repetir demostración",
     "step_call": "llamar a un programa",
     "target": "Adónde",
     "through": "Pasando por",

@@ -13,6 +13,7 @@ from gemelo.programs import (
     Line,
     Output,
     Pick,
+    Play,
     Repeat,
     Speed,
     Wait,
@@ -38,6 +39,8 @@ def _about(step: AnyStep, words: Words) -> str:
             return known.get(step.to, step.to) if isinstance(step.to, str) else f"{1e3 * step.to:g} mm"
         case Pick():
             return f"{step.thing} → {step.place}"
+        case Play():
+            return f"{step.demonstration}, {100.0 * step.share:g} %"
         case Wait():
             return f"{step.time:g} s"
         case WaitFor():
