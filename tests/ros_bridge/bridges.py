@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ from gemelo.libraries.runtime.node import Node
 from gemelo.schemas.deployment import Deployment, RosSection
 from gemelo.services.ros_bridge.main import node_name, run
 from tests.ros_bridge.ros_client import RosClient, ros_router
+from tests.runtime.support import free_port
 
 
 class Bridge(NamedTuple):
@@ -25,6 +26,7 @@ class Bridge(NamedTuple):
     deployment: Deployment
     client: RosClient
     locator: str
+    restart_router: Callable[[], None]
 
     def node(self, name: str) -> Node:
         """Another node of ours."""
@@ -34,7 +36,15 @@ class Bridge(NamedTuple):
 @contextmanager
 def running(folder: Path, **section: object) -> Iterator[Bridge]:
     """`section`: of the deployment's [ros]."""
-    with ros_router() as locator, RosClient(locator, int(str(section.get("domain", 0)))) as client:
+    port = free_port()
+    with ExitStack() as routers, ExitStack() as clients:
+        locator = routers.enter_context(ros_router(port))
+        client = clients.enter_context(RosClient(locator, int(str(section.get("domain", 0)))))
+
+        def restart() -> None:
+            routers.close()
+            routers.enter_context(ros_router(port))
+
         deployment = load_deployment(environ={"GEMELO_PATHS_RUN": str(folder / "run")})
         deployment = replace(deployment, ros=RosSection(router=locator, **section))
         network = MemoryNetwork()
@@ -42,7 +52,7 @@ def running(folder: Path, **section: object) -> Iterator[Bridge]:
             thread = threading.Thread(target=run, args=(node, deployment))
             thread.start()
             try:
-                yield Bridge(network, deployment, client, locator)
+                yield Bridge(network, deployment, client, locator, restart)
             finally:
                 node.stop()
                 thread.join(60.0)

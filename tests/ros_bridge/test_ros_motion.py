@@ -232,6 +232,18 @@ def test_the_death_of_the_bridge_ends_its_goal_and_the_arm_decelerates(ros: RosT
     assert ros.run_until(lambda: not ros.arm.control.held, 0.02)
 
 
+def test_a_router_of_ros_that_goes_takes_the_goals_of_its_clients_with_it(ros: RosTwin) -> None:
+    token, gid = client_token(ros.client)
+    declared = ros.client.declare_client(token)
+    assert ros.run_until(lambda: token in ros.client.tokens())
+    assert ros.send_goal(uuid(1), like_moveit(ros, "left"), gid).accepted
+    ros.clock.sleep(1.0)
+    ros.cut_router()
+    assert ros.run_until(lambda: not ros.arm.control.held)
+    assert off(ros, dict(zip(ros.twin.arm.joint_names, ros.twin.arm.named_states["left"], strict=True))) > 10
+    assert declared
+
+
 def test_the_gripper_closes_with_feedback_and_its_own_result(ros: RosTwin) -> None:
     name = "/gripper/gripper_cmd/_action"
     feedback = ros.client.subscribe(f"{name}/feedback", f"{GRIPPER}_FeedbackMessage")

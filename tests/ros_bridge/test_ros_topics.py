@@ -138,6 +138,18 @@ def test_a_late_joiner_gets_description_and_static_frames_and_they_have_the_mesh
     assert [each.child_frame_id for each in static.transforms] == ["plate"]
 
 
+def test_a_router_of_ros_that_starts_anew_finds_everything_again(bridge: Bridge, rm1: ArmDescription) -> None:
+    with bridge.node("state_publisher") as publisher:
+        publisher.publisher(DESCRIPTION).put(describe(rm1))
+        comes(bridge.client.subscribe("/robot_description", "std_msgs/msg/String", latched=True))
+        before = len(bridge.client.tokens())
+        bridge.restart_router()
+        with RosClient(bridge.locator) as late:
+            assert until(lambda: len(late.tokens()) == before)
+            comes(late.subscribe("/robot_description", "std_msgs/msg/String", latched=True))
+            assert not late.call("/gemelo/resume", TRIGGER).success
+
+
 def fetched(address: str) -> bytes:
     with urllib.request.urlopen(address, timeout=60.0) as answer:
         return bytes(answer.read())

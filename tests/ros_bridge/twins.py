@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,7 @@ class RosTwin:
     def __init__(self, twin: Twin, operator: Node, watcher: Node, client: RosClient) -> None:
         """`operator` is the bridge's node, `watcher` that of `arm`."""
         self.clock, self.twin, self.operator, self.watcher, self.client = twin.clock, twin, operator, watcher, client
+        self.cut_router: Callable[[], None] = lambda: None
         self.arm = Arm(Session(twin.deployment, twin.arm, watcher))
 
     def run_until(self, is_so: Callable[[], object], step: float = 0.001) -> bool:
@@ -83,7 +84,9 @@ class RosTwin:
 def ros_twin(folder: Path, robot: str = "rm1", **section: Any) -> Iterator[RosTwin]:
     """Ready: the action's server is seen by the client."""
     description, clock = load_arm(project_root() / f"urdf/{robot}"), VirtualClock()
-    with ros_router() as locator, RosClient(locator) as client:
+    with ExitStack() as routers, ExitStack() as clients:
+        locator = routers.enter_context(ros_router())
+        client = clients.enter_context(RosClient(locator))
         settings = RosSection(router=locator, **({"motion": True} | section))
         deployment = replace(load_deployment(environ={}), robot=str(description.folder), ros=settings, cell="")
         twin = Twin(clock, description, deployment, folder)
@@ -94,6 +97,7 @@ def ros_twin(folder: Path, robot: str = "rm1", **section: Any) -> Iterator[RosTw
                 run(operator, twin.deployment)
                 node = Node("program", bus=twin.bus(), log_level="warning", **named)
                 found = RosTwin(twin, operator, node, client)
+                found.cut_router = routers.close
                 with found.arm:
                     assert found.run_until(lambda: any("set_parameters_atomically" in each for each in client.tokens()))
                     yield found
