@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import random
+
 import msgspec
 import numpy as np
 import pytest
 
 from gemelo.libraries.arm.kinematics.kinematics import Kinematics
+from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.schemas.device import DeviceEvent, DeviceMode
 from gemelo.schemas.joints import JointTargets
 from gemelo.schemas.reasons import because
@@ -107,12 +110,50 @@ def test_the_margin_stays_free(margin: float) -> None:
     assert margin < rig.nearest() < margin + 0.02
 
 
-@pytest.mark.parametrize("name", ARMS)
-@pytest.mark.parametrize("seed", [1, 2])
-def test_whatever_a_person_leads_into_the_arm_touches_nothing_and_keeps_its_limits(name: str, seed: int) -> None:
-    rig = rig_at_ready(name, post_before(name, 0.3))
-    lead(rig, persons(rig.arm, seed, 6.0, 0.8), 6.0, Sender(30.0, jitter=0.01), seed)
-    assert rig.nearest() > min(rig.arm.clearance, rig.world.distance(np.array(rig.arm.named_states["ready"])) - 1e-3)
+def among_boxes(arm: ArmDescription, chance: random.Random) -> World:
+    """Four boxes about the arm, none of which is near to it at "ready"."""
+    ready = np.array(arm.named_states["ready"])
+    while True:
+        places = [(chance.uniform(-0.5, 0.5), chance.uniform(-0.5, 0.5), chance.uniform(0.0, 0.5)) for _ in range(4)]
+        world = world_with(arm, *(((chance.uniform(0.03, 0.2),) * 3, place) for place in places))
+        if world.distance(ready) > 0.012:
+            return world
+
+
+def wander(rig: VirtualArm, chance: random.Random, seconds: float) -> None:
+    """Streams the way to one configuration after the other, by jumps and evenly, without a care for what is there."""
+    joints, here = rig.arm.joints, rig.position
+    ready = goal = here
+    for index in range(round(seconds / PERIOD)):
+        if index % 15 == 0:
+            reach = [1.2 if joint.unit == "rad" else 0.12 for joint in joints]
+            goal = tuple(
+                joint.clamp(p + chance.uniform(-r, r)) for joint, p, r in zip(joints, ready, reach, strict=True)
+            )
+            share = chance.choice((0.1, 0.3, 1.0))
+        here = tuple(a + share * (b - a) for a, b in zip(here, goal, strict=True))
+        rig.handle(TargetsInput(JointTargets(stamp=rig.moment.unix, name=rig.arm.joint_names, position=here)))
+        rig.run(PERIOD + chance.uniform(-0.01, 0.01))
+    rig.run(1.0)
+
+
+WANDERERS = [("rm1", 0), ("parol6", 9)]
+MORE = [(name, seed) for name in ARMS for seed in range(24) if (name, seed) not in WANDERERS]
+
+
+@pytest.mark.parametrize(("name", "seed"), [*WANDERERS, *(pytest.param(*row, marks=pytest.mark.full) for row in MORE)])
+def test_wherever_the_targets_wander_among_boxes_the_arm_stays_clear_and_within_its_limits(
+    name: str, seed: int
+) -> None:
+    arm, chance = ARMS[name], random.Random(seed)
+    world = among_boxes(arm, chance)
+    wire = VirtualWire(delay=0.003, jitter=0.01, loss=0.03)
+    rig = WatchedArm(wire, arm=arm, start=arm.named_states["ready"], world=world, seed=seed)
+    rig.ready().run(0.3)
+    rig.path.clear()
+    wander(rig, chance, 6.0)
+    assert rig.nearest(5) > arm.clearance
+    assert obstructions(rig) or (name, seed) not in WANDERERS
     assert not violations(rig, rig.path)
 
 
