@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 
+from gemelo.libraries.arm.cell.cell_file import load_cell
 from gemelo.libraries.arm.model.description import load_arm
 from gemelo.libraries.runtime.application import service
 from gemelo.libraries.runtime.deployment import project_root
@@ -14,6 +16,7 @@ from gemelo.schemas.deployment import Deployment, RosSection
 from gemelo.schemas.errors import ConfigurationError
 from gemelo.schemas.reasons import Reason, because, remedy
 from gemelo.schemas.topics import ROS_BRIDGE, ROS_OPERATOR
+from gemelo.services.ros_bridge.cameras import CameraTopics
 from gemelo.services.ros_bridge.motion import serve_motion
 from gemelo.services.ros_bridge.parameters import RosParameters, Value
 from gemelo.services.ros_bridge.topics import Topics
@@ -33,6 +36,9 @@ def run(node: Node, deployment: Deployment) -> None:
     topics = Topics(node, ros, section, arm)
     node.at_end(topics.close)
     serve_triggers(node, ros, section.motion)
+    if deployment.cell:
+        for camera in load_cell(Path(deployment.cell), arm).cameras:
+            CameraTopics(node, ros, camera.name, topics.prefix, topics.add_static)
     if section.motion:
         decided = partial(on_decision, node, topics)
         serve_motion(node, ros, section, lambda: topics.joints, arm.gripper is not None, decided)

@@ -13,7 +13,7 @@ from gemelo.libraries.runtime.ros_wire.names import DEFAULT, LATCHED, Qos, RosTy
 from gemelo.libraries.runtime.ros_wire.names import FRAMES as FRAMES_QOS
 from gemelo.libraries.runtime.ros_wire.ros_node import RosPublication
 from gemelo.schemas.deployment import RosMeshes, RosSection
-from gemelo.schemas.frames import FrameTransforms, RobotDescription
+from gemelo.schemas.frames import FrameTransform, FrameTransforms, RobotDescription
 from gemelo.schemas.joints import JointState
 from gemelo.schemas.planning import PlannedPath
 from gemelo.schemas.reasons import Reason
@@ -50,7 +50,9 @@ class Topics:
 
     def __init__(self, node: Node, ros: Publishing, section: RosSection, arm: ArmDescription) -> None:
         self._node, self._section = node, section
-        self._prefix = f"{section.namespace}/" if section.namespace else ""
+        self.prefix = f"{section.namespace}/" if section.namespace else ""
+        self._static: tuple[FrameTransform, ...] = ()
+        self._cameras: dict[str, FrameTransform] = {}  # by their names
         self._folder, self._base = arm.folder, arm.base_frame
         self._meshes: MeshServer | None = None
         self.refusal: Reason | None = None  # of the last goal of ROS, where it was refused
@@ -91,10 +93,20 @@ class Topics:
     def _on_frames(self, frames: FrameTransforms) -> None:
         stamp = max((each.stamp for each in frames.transforms), default=0)
         if self._last_frames.is_due(stamp):
-            self._put(self._tf, messages.frames(frames, self._prefix), stamp)
+            self._put(self._tf, messages.frames(frames, self.prefix), stamp)
 
     def _on_static_frames(self, frames: FrameTransforms) -> None:
-        self._put(self._tf_static, messages.frames(frames, self._prefix), self._node.now())
+        self._static = frames.transforms
+        self._publish_static()
+
+    def add_static(self, frame: FrameTransform) -> None:
+        """A camera's frame; all static ones are in one message, the last that a late joiner gets."""
+        self._cameras[frame.child] = frame
+        self._publish_static()
+
+    def _publish_static(self) -> None:
+        whole = FrameTransforms(transforms=(*self._static, *self._cameras.values()))
+        self._put(self._tf_static, messages.frames(whole, self.prefix), self._node.now())
 
     def _on_description(self, description: RobotDescription) -> None:
         urdf = self._with_meshes(description.urdf)
@@ -118,10 +130,10 @@ class Topics:
             server.close()
 
     def _on_scene(self, scene: PlanningScene) -> None:
-        self._put(self._scene, scene_markers(scene, self._base, self._prefix), self._node.now())
+        self._put(self._scene, scene_markers(scene, self._base, self.prefix), self._node.now())
 
     def _on_path(self, path: PlannedPath) -> None:
-        self._put(self._path, path_markers(path, self._base, self._prefix), self._node.now())
+        self._put(self._path, path_markers(path, self._base, self.prefix), self._node.now())
 
     def _on_log(self, record: LogRecord) -> None:
         if record.level >= RELEVANT:

@@ -34,7 +34,7 @@ class Bridge(NamedTuple):
 
 
 @contextmanager
-def running(folder: Path, **section: object) -> Iterator[Bridge]:
+def running(folder: Path, cell: str = "", **section: object) -> Iterator[Bridge]:
     """`section`: of the deployment's [ros]."""
     port = free_port()
     with ExitStack() as routers, ExitStack() as clients:
@@ -45,7 +45,7 @@ def running(folder: Path, **section: object) -> Iterator[Bridge]:
             routers.close()
             routers.enter_context(ros_router(port))
 
-        deployment = load_deployment(environ={"GEMELO_PATHS_RUN": str(folder / "run")})
+        deployment = load_deployment(environ={"GEMELO_PATHS_RUN": str(folder / "run"), "GEMELO_CELL": cell})
         deployment = replace(deployment, ros=RosSection(router=locator, **section))
         network = MemoryNetwork()
         with Node(node_name(deployment), deployment, bus=MemoryBus(network)) as node:

@@ -17,9 +17,11 @@ from msgspec.structs import replace
 
 from gemelo.libraries.arm.model.description import ArmDescription
 from gemelo.libraries.ros2 import messages
+from gemelo.libraries.ros2.images import IMAGE, INFO
 from gemelo.libraries.ros2.markers import MARKERS
 from gemelo.libraries.ros2.types import HASHES, ros_type
 from gemelo.libraries.runtime.node import Node
+from gemelo.schemas.camera import CameraImage, CameraInfo
 from gemelo.schemas.deployment import RosMeshes
 from gemelo.schemas.device import (
     DeviceCommandRequest,
@@ -54,6 +56,8 @@ from gemelo.schemas.topics import (
     PLANNED_PATH,
     SCENE,
     STATIC_FRAMES,
+    camera_image,
+    camera_info,
 )
 from gemelo.services.ros_bridge.main import require_usable
 from gemelo.services.state_publisher.main import describe
@@ -148,6 +152,38 @@ def test_a_router_of_ros_that_starts_anew_finds_everything_again(bridge: Bridge,
             assert until(lambda: len(late.tokens()) == before)
             comes(late.subscribe("/robot_description", "std_msgs/msg/String", latched=True))
             assert not late.call("/gemelo/resume", TRIGGER).success
+
+
+def test_a_camera_s_images_go_out_as_they_are_with_lens_and_frame(tmp_path: Path, rm1: ArmDescription) -> None:
+    stands = Transform(translation=(0.0, 0.2, 0.7))
+    info = CameraInfo(
+        name="overhead", width=64, height=48, intrinsics=(50.0, 0.0, 32.0, 0.0, 50.0, 24.0, 0.0, 0.0, 1.0),
+        distortion=(0.1,), parent="base_link", parent_from_camera=stands, is_mounted=True,
+    )  # fmt: skip
+    with running(tmp_path, str(rm1.folder / "cell.toml")) as bridge, bridge.node("camera") as camera:
+        heard = bridge.client.subscribe("/camera/overhead/image/compressed", IMAGE)
+        lenses = bridge.client.subscribe("/camera/overhead/camera_info", INFO)
+        static = bridge.client.subscribe("/tf_static", "tf2_msgs/msg/TFMessage", latched=True)
+        camera.publisher(camera_info("overhead")).put(info)
+        comes(static)
+        images = camera.publisher(camera_image("overhead"))
+
+        def put_and_hear() -> bool:
+            images.put(CameraImage(stamp=7, camera="overhead", width=64, height=48, data=b"jpeg's bytes"))
+            return hear(camera, lambda: heard and lenses, 0.1)
+
+        assert any(put_and_hear() for _ in range(300))
+    message, lens, frame = heard[0].message, lenses[0].message, static[-1].message.transforms[-1]
+    assert (message.format, bytes(message.data)) == ("jpeg", b"jpeg's bytes")
+    assert messages.nanoseconds(message.header.stamp) == messages.nanoseconds(lens.header.stamp) == 7
+    assert (lens.distortion_model, list(lens.d), tuple(lens.k)) == (
+        "plumb_bob",
+        [0.1, 0.0, 0.0, 0.0, 0.0],
+        info.intrinsics,
+    )
+    assert (lens.p[0], lens.p[2], lens.p[3], lens.width) == (50.0, 32.0, 0.0, 64)
+    assert message.header.frame_id == frame.child_frame_id == "overhead_optical_frame"
+    assert (frame.header.frame_id, frame.transform.translation.z) == ("base_link", 0.7)
 
 
 def fetched(address: str) -> bytes:
