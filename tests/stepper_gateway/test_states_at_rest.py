@@ -128,6 +128,17 @@ def test_a_stamp_and_a_round_trip_that_are_measured_anew_are_no_change() -> None
     assert topics.passes(STOPPING_DISTANCE, replace(again, distance=0.1), 2.0, Moment(3, 100.04))
 
 
+def test_a_node_that_comes_waits_for_no_reading_that_comes_seldom() -> None:
+    arm = resting()
+    for _ in range(5):
+        arm.run(0.27)
+        arm.handle(NewcomerInput())
+        arm.run(0.03)  # until it has subscribed
+        counts = {topic.key: len(arm.messages(topic)) for topic in (STEP_LEDGER, STOPPING_DISTANCE, JOINT_STATES)}
+        arm.run(0.081)
+        assert all(len(arm.published[key]) > count for key, count in counts.items()), counts
+
+
 def test_in_motion_the_stopping_distance_comes_at_its_full_rate() -> None:
     arm = resting()
     arm.goal(move(arm.position, tuple(each + 0.2 for each in arm.position)), "there")

@@ -11,6 +11,8 @@ from gemelo.services.stepper_gateway.moment import Moment
 NO_CHANGE = ("stamp", "round_trip")  # fields that are measured anew for each message, also at rest
 NEWCOMER = 0.6  # [s] after a node has come, in which nothing is left out; chosen: three messages of the slowest topic
 
+FOR_NEWCOMER = 0.04  # [s] meanwhile between two of what comes seldom; chosen: nobody sees that he waits for it
+
 
 class RestThinner:
     """What differs from the one before passes at once; between equal ones the gap at most doubles each time.
@@ -52,6 +54,10 @@ class RestingTopics:
     def on_newcomer(self, moment: Moment) -> None:
         """A node has come."""
         self._all_until = moment.monotonic + NEWCOMER
+
+    def period(self, usual: float, moment: Moment) -> float:
+        """[s] between two looks whether a reading has changed, `usual` [s] but while a node is new."""
+        return min(usual, FOR_NEWCOMER) if moment.monotonic < self._all_until else usual
 
     def longest_gap(self, rest_rate: float, moment: Moment) -> float:
         """[s] between two at rest, with `rest_rate` [Hz]; 0 while nothing is left out."""

@@ -97,7 +97,7 @@ class LedgerKeeper:
         """Tell and keep what is due."""
         if self._device.state is None or self._device.session.status is None:
             return
-        if moment.monotonic - self._told >= PERIOD:
+        if moment.monotonic - self._told >= self._device.resting.period(PERIOD, moment):
             self._told = moment.monotonic
             self._device.publish(STEP_LEDGER, self.message(moment), moment)
         self._keep(moment)

@@ -44,7 +44,8 @@ class StoppingWatch:
 
     def step(self, moment: Moment) -> None:
         """Tell what is due."""
-        if self._device.session.latest is not None and moment.monotonic - self._told >= PERIOD:
+        period = self._device.resting.period(PERIOD, moment)
+        if self._device.session.latest is not None and moment.monotonic - self._told >= period:
             self._told = moment.monotonic
             self._device.publish(STOPPING_DISTANCE, self.message(moment), moment)
 

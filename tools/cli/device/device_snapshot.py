@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from gemelo.api.homing import joint_name
 from gemelo.schemas.device import DeviceConfiguration, DeviceState, DeviceStatus, SensorReadings
 from gemelo.schemas.device_faults import FaultDescription, explain
 from gemelo.schemas.device_link import why_offline
@@ -146,6 +145,8 @@ def device_snapshot(
     about = explain(state.fault) if state is not None else None
     about = about or FaultDescription("", "", "")
     active = frozenset(state.inputs) if state is not None else frozenset[str]()
+    from gemelo.api.homing import joint_name  # slow to load, and `gemelo state` has no need of it
+
     on = frozenset(state.outputs) if state is not None else frozenset[str]()
     why = configuration_in_force(status, configuration)
     return DeviceSnapshot(
