@@ -131,7 +131,9 @@ class RosActionServer:
         for query in queries:
             query.reply(answer)
         self._on_refusal(decision if isinstance(decision, Reason) else None)
-        if not isinstance(decision, Reason):
+        if isinstance(decision, Reason):
+            self._gone.discard(queries[0].client)
+        else:
             self._accept(RosGoal(uuid, queries[0].client, now, decision))
 
     def _accept(self, goal: RosGoal) -> None:
