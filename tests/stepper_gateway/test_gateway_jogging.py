@@ -41,7 +41,7 @@ class JoggedRig:
             state = self.rig.messages(JOINT_STATES)[-1]
             output = self.jog.step(self.rig.now, self.rig.moment.unix, state, 0.02, self.goal_is_active)
             if output.targets is not None:
-                self.rig.handle(TargetsInput(output.targets))
+                self.rig.handle(TargetsInput(output.targets, watched=True))
             if self.jog.commanded is not None:
                 self.led = tuple(self.jog.commanded[0].tolist())
             if output.status is not None:
