@@ -117,6 +117,24 @@ def test_before_what_differs_comes_the_last_state_that_was_left_out() -> None:
     assert sieve.sift(state(4, steps=(8,)), lambda t_us: t_us == 80_000) == [state(4, steps=(8,))]
 
 
+@pytest.mark.parametrize("kind", [Kind.CMD_ACK, Kind.TRAJ_ACK, Kind.EVENT, Kind.STATUS, Kind.CONFIG_ACK])
+def test_what_was_before_an_answer_is_not_given_after_it(kind: Kind) -> None:
+    """Else a path that was resumed would be held by somebody else at once: the state of before says so."""
+    sieve, answer = StateSieve(), Received(kind, b"answer", False, 3 * PERIOD)
+    assert sieve.sift(state(0), lambda _: False) == [state(0)]
+    assert sieve.sift(state(1), lambda _: False) == []
+    assert sieve.sift(answer, lambda _: False) == [state(1), answer]
+    assert sieve.sift(state(4, mode=4), lambda _: False) == [state(4, mode=4)]
+
+
+def test_readings_between_repeated_states_give_the_core_no_more_of_these() -> None:
+    sieve, readings = StateSieve(), Received(Kind.SENSORS, b"readings", False, 2 * PERIOD)
+    sieve.sift(state(0), lambda _: False)
+    sieve.sift(state(1), lambda _: False)
+    assert sieve.sift(readings, lambda _: False) == [readings]
+    assert sieve.sift(state(3, mode=4), lambda _: False) == [state(1), state(3, mode=4)]
+
+
 def test_the_last_state_before_a_silence_is_not_lost() -> None:
     sieve = StateSieve()
     sieve.sift(state(0), lambda _: False)

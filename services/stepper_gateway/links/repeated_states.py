@@ -9,6 +9,7 @@ from gemelo.services.stepper_gateway.links.link import Kind, Received
 
 # [ns] chosen: between one and two periods of the device, so that a device that falls silent has lost none of its states
 HELD = 30_000_000
+READINGS = (Kind.SENSORS, Kind.SHAFT, Kind.SYNC_R)  # say nothing of what a state says
 
 
 class Repetition:
@@ -34,14 +35,15 @@ class StateSieve:
     def sift(self, received: Received, is_due: Callable[[int], bool]) -> list[Received]:
         """What the core is given now; `is_due(t_us)` is asked of a repeated state, with the device's time [us].
 
-        Before what differs comes the last state that was left out, so that the core sees how long it was true.
+        Before what differs, and before an answer or an event, comes the last state that was left out: the core sees how
+        long it was true, and nothing that was before it after it.
         """
         if self._repetition.is_in(received):
             if not is_due(state_time(received.payload)):
                 self._held = received
                 return []
             self._held = None
-        elif received.kind is Kind.STATE and self._held is not None:
+        elif received.kind not in READINGS and self._held is not None:
             return [*self.release(self._held.arrival + HELD), received]
         return [received]
 
