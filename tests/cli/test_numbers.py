@@ -108,6 +108,8 @@ OPTIONS = (
     Option("scene add it --plane --padding {}", LENGTH, "scene.padding"),
     Option("speed {}", SHARE, "options.share"),
     Option("device press offline {}", TIME, "press.value"),
+    Option("bag export a.mcap --lerobot out --task it --gap {}", TIME, "options.gap"),
+    Option("teach record it --duration {}", TIME, "options.duration"),
     Option("device press freeze {}", TIME, "press.value"),
     Option("device monitor --duration {}", TIME, "options.duration"),
     Option("collision fit urdf/rm1 --bulge {}", LENGTH, "options.bulge"),
@@ -241,7 +243,7 @@ def test_no_option_but_these_takes_a_bare_number():
         "ik --quaternion",
         "ik --axis", "ik --along", "ik --free-axis", "topic pub --rate", "tf echo --rate", "link bench --rate",
         "grip --max-effort", "scene add --scale", "scene resize --scale", "bag record --duration",
-        "bag record --max-minutes", "bag record --max-mb", "deploy keys --renew-within",
+        "bag export --fps", "bag record --max-minutes", "bag record --max-mb", "deploy keys --renew-within",
         "chaos --seed", "chaos --minutes", "chaos --episode", "soak --seed", "soak --hours",
         "replay --tolerance",
     }  # fmt: skip

@@ -321,6 +321,7 @@ ENGLISH: dict[str, str] = {
     "check_moving": "The arm is moving",
     "check_camera": "The camera shows nothing to go by",
     "check_cell": "The cell's file lacks something",
+    "check_demonstration": "The demonstration cannot be played so",
     "check_detection": "Nothing was found in the image",
     "check_grasp": "It cannot be grasped",
     "check_gripper": "There is no such gripper",

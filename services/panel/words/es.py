@@ -321,6 +321,7 @@ SPANISH: dict[str, str] = {
     "check_moving": "El brazo se está moviendo",
     "check_camera": "La cámara no muestra lo necesario",
     "check_cell": "Falta algo en el archivo de la celda",
+    "check_demonstration": "La demostración no se puede repetir así",
     "check_detection": "No se encontró nada en la imagen",
     "check_grasp": "No se puede agarrar",
     "check_gripper": "No hay tal pinza",

@@ -15,7 +15,7 @@ from gemelo.tools.cli.common.errors import ExitCode
 from gemelo.tools.cli.common.language import columns, sentence
 from gemelo.tools.cli.common.session import connect_arm, load_robot, reported
 from gemelo.tools.cli.common.text_table import table
-from gemelo.tools.cli.common.units import SHARE, parse_quantity
+from gemelo.tools.cli.common.units import SHARE, parse_quantity, positive_seconds
 from gemelo.tools.cli.parser import Choices, Options, Parser, json_option
 
 
@@ -27,7 +27,7 @@ def name_option(parser: Parser) -> None:
 def record_options(parser: Parser) -> None:
     """Adds name, duration and --overwrite."""
     name_option(parser)
-    parser.add_argument("--duration", type=float, metavar="S", help="end after so many seconds [at Ctrl-C]")
+    parser.add_argument("--duration", type=positive_seconds, metavar="TIME", help="end after it, as 10 or 10s")
     parser.add_argument("--overwrite", action="store_true", help="in place of one of that name")
 
 

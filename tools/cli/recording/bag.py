@@ -18,6 +18,7 @@ from gemelo.schemas.reasons import because, plain
 from gemelo.tools.cli.common.errors import CommandError, ExitCode, unknown, usage
 from gemelo.tools.cli.common.language import columns, sentence, word
 from gemelo.tools.cli.common.text_table import table
+from gemelo.tools.cli.common.units import positive_seconds
 from gemelo.tools.cli.parser import Options, Parser, json_option
 
 MOST = 1000.0  # [Hz] or [s] chosen: of a rate or of a pause that can be meant
@@ -69,7 +70,9 @@ def export_options(parser: Parser) -> None:
     parser.add_argument("--lerobot", type=Path, metavar="DIR", help="a new folder: demonstrations as a LeRobotDataset")
     parser.add_argument("--task", metavar="TEXT", help="what the demonstrations show, as a LeRobotDataset says it")
     parser.add_argument("--fps", type=float, default=30.0, metavar="HZ", help="frames of a LeRobotDataset [30]")
-    parser.add_argument("--gap", type=float, default=1.0, metavar="S", help="a pause that ends an episode [1 s]")
+    parser.add_argument(
+        "--gap", type=positive_seconds, default=1.0, metavar="TIME", help="a pause that ends an episode [1s]"
+    )
     parser.add_argument("--each-goal", action="store_true", help="an episode is one goal, not all up to a pause")
     parser.add_argument("--ros2", type=Path, metavar="FOLDER", help="a bag of ROS 2 there: MCAP with its messages")
 
