@@ -16,7 +16,7 @@ from gemelo.schemas.device import DeviceMode
 from gemelo.tools.stack.stack import Stack
 from tests.stack.gemelo import COMMAND, gemelo
 
-PROCESSES = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher")
+PROCESSES = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner")
 LONGEST = 60.0  # [s]
 
 
@@ -44,7 +44,10 @@ def test_an_old_publisher_moves_our_arm_and_the_wire_is_measured(stack):
     publisher.subscribe("ra/#")
     publisher.loop_start()
     with listening(stack) as listener:
-        drive_and_measure(stack, publisher, listener, said)
+        try:
+            drive_and_measure(stack, publisher, listener, said)
+        finally:
+            listener.kill()  # else what fails would wait for it for ever
     publisher.disconnect()
     publisher.loop_stop()
 
