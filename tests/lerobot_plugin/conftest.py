@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -55,3 +55,17 @@ def options(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """Of every configuration in these tests, whatever was started in this folder."""
     monkeypatch.setenv("GEMELO_CONFIG", str(ROOT / "deploy/local.toml"))
     return {"arm": "rm1", "id": "mine", "calibration_dir": tmp_path}
+
+
+@pytest.fixture
+def make(plugin: ModuleType, options: dict[str, Any]) -> Iterator[Callable[..., Any]]:
+    """A robot with these options; it is disconnected at the end."""
+    made: list[Any] = []
+
+    def make(**others: Any) -> Any:
+        made.append(plugin.Gemelo(plugin.GemeloConfig(**options, **others)))
+        return made[-1]
+
+    yield make
+    for robot in made:
+        robot.disconnect()

@@ -20,18 +20,10 @@ def with_cell():
 
 
 @pytest.fixture
-def make(plugin, options, monkeypatch):
-    """A robot of the arm with its cell, and these options; it is disconnected at the end."""
+def make(make, monkeypatch):
+    """A robot of the arm with its cell."""
     monkeypatch.setenv("GEMELO_CELL", str(CELL))
-    made = []
-
-    def make(**others):
-        made.append(plugin.Gemelo(plugin.GemeloConfig(**options, **others)))
-        return made[-1]
-
-    yield make
-    for robot in made:
-        robot.disconnect()
+    return make
 
 
 def test_features_have_the_cameras_of_the_cell_file_and_the_own_ones_without_a_connection(make):

@@ -18,20 +18,6 @@ HALF_A_STEP = 0.008  # [rad] of the coarsest joint
 
 
 @pytest.fixture
-def make(plugin, options):
-    """A robot with these options; it is disconnected at the end."""
-    made = []
-
-    def make(**others):
-        made.append(plugin.Gemelo(plugin.GemeloConfig(**options, **others)))
-        return made[-1]
-
-    yield make
-    for robot in made:
-        robot.disconnect()
-
-
-@pytest.fixture
 def robot(make, arm):
     """Connected, as LeRobot does it."""
     robot = make()
